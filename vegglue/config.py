@@ -1,0 +1,188 @@
+"""Cases as files: YAML with `extends`, its names checked against each other, and the hash that ties results to it."""
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from vegglue.agreement import disagreement
+from vegglue.errors import InputError
+from vegglue.refusal import Place, Refusal, dotted, first_refusal
+from vegglue.schema import Case
+
+# Keys whose value is a path, relative to the file it is written in.
+PATHS = ("file", "raster", "points")
+# A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
+DECLARING = ("law", "distribution")
+# What a finished ensemble does not depend on.
+NOT_SIMULATED = ("name", "title", "infer", "survey", "reference", "canopy_correction")
+
+Tree = dict[str, Any]
+
+
+def load_case(path: Path) -> Case:
+    """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do."""
+    layers = _layers(path, ())
+    tree: Tree = {}
+    for _, layer in reversed(layers):
+        tree = _merged(tree, layer)
+    tree = _with_one_inflow_named(tree) | {"source": path.resolve()}
+    try:
+        case = Case.model_validate(tree)
+    except ValidationError as error:
+        raise _input_error(layers, first_refusal(tree, error.errors())) from None
+    refusal = disagreement(case)
+    if refusal is not None:
+        raise _input_error(layers, refusal)
+    return case
+
+
+def resolved_yaml(case: Case) -> str:
+    """The case as one file without `extends`; data files are named relative to the file it was read from."""
+    tree = _plain(_dump(case), lambda file: _relative(file, case.source))
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+
+
+def case_hash(case: Case) -> str:
+    """sha256 of the resolved case and of the contents of every file it names, wherever they lie."""
+    return _hash(_dump(case))
+
+
+def simulation_hash(case: Case) -> str:
+    """Like case_hash, of only what an ensemble depends on: unchanged by likelihood, title or reference values."""
+    return _hash({key: value for key, value in _dump(case).items() if key not in NOT_SIMULATED})
+
+
+def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
+    """The file and what it extends, the most special one first."""
+    path = path.resolve()
+    if path in above:
+        circle = " -> ".join(_shown(file) for file in (*above[above.index(path) :], path))
+        raise InputError(f"{_shown(above[-1])}: `extends` goes round in a circle, {circle}: take one of them out.")
+    tree = _read(path, above)
+    base = tree.pop("extends", None)
+    layer = (path, _with_full_paths(tree, path.parent))
+    if base is None:
+        return [layer]
+    if not isinstance(base, str):
+        raise InputError(f"{_shown(path)}: `extends` expected the name of one YAML file, got {base!r}.")
+    return [layer, *_layers(path.parent / base, (*above, path))]
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> Tree:
+    try:
+        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except OSError as error:
+        named = f", named by `extends` in {_shown(above[-1])}," if above else ""
+        raise InputError(f"{_shown(path)}{named} cannot be read: {error.strerror}; check the path.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{_shown(path)} is not text in UTF-8: save it as UTF-8.") from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise InputError(f"{_shown(path)}{where}: {error.problem}; correct the YAML there or just before.") from None
+    except yaml.YAMLError as error:
+        raise InputError(f"{_shown(path)} is not valid YAML: {' '.join(str(error).split())}.") from None
+    if not isinstance(tree, dict):
+        raise InputError(f"{_shown(path)}: expected keys and values (`name: ...`), got {type(tree).__name__}.")
+    return tree
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as its version 1.2 reads numbers (1e-7 is one), and no key twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys: set[Any] = set()
+        for key_node, _ in node.value:
+            if isinstance(key_node, yaml.ScalarNode) and key_node.value in keys:
+                twice = f"the key `{key_node.value}` stands twice"
+                raise yaml.constructor.ConstructorError(None, None, twice, key_node.start_mark)
+            keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+"), list("-+.0123456789")
+)
+
+
+def _with_full_paths(tree: Any, folder: Path) -> Any:
+    if isinstance(tree, list):
+        return [_with_full_paths(item, folder) for item in tree]
+    if not isinstance(tree, dict):
+        return tree
+    paths = {key: str((folder / tree[key]).resolve()) for key in PATHS if isinstance(tree.get(key), str)}
+    return {key: _with_full_paths(value, folder) for key, value in tree.items()} | paths
+
+
+def _merged(base: Any, layer: Any) -> Any:
+    """`layer` over `base`: mappings key by key, anything else replaced; null takes an inherited key away."""
+    if not isinstance(layer, dict):
+        return layer
+    if not isinstance(base, dict) or any(key in layer for key in DECLARING):
+        base = {}
+    both = base | {key: _merged(base.get(key), value) for key, value in layer.items()}
+    return {key: value for key, value in both.items() if value is not None}
+
+
+def _with_one_inflow_named(tree: Tree) -> Tree:
+    """With a single inflow, `discharge: 2.66` means all of it: write it as {inflow: 2.66}."""
+    inflows, experiments = tree.get("inflows"), tree.get("experiments")
+    if not (isinstance(inflows, dict) and len(inflows) == 1 and isinstance(experiments, dict)):
+        return tree
+    (inflow,) = inflows
+    named = {name: _named(experiment, inflow) for name, experiment in experiments.items()}
+    return tree | {"experiments": named}
+
+
+def _named(experiment: Any, inflow: str) -> Any:
+    if not isinstance(experiment, dict) or isinstance(experiment.get("discharge"), dict | None):
+        return experiment
+    return experiment | {"discharge": {inflow: experiment["discharge"]}}
+
+
+def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputError:
+    """The sentence, with the file that says (or should say) what is refused: the first of those that say most of it."""
+    path, _ = max(layers, key=lambda layer: _depth(layer[1], refusal.place))
+    return InputError(f"{_shown(path)}: `{dotted(refusal.place)}` {refusal.complaint.rstrip('.')}.")
+
+
+def _depth(tree: Any, place: Place) -> int:
+    """How many keys of a place a tree has."""
+    for depth, key in enumerate(place):
+        keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
+        if key not in keys:
+            return depth
+        tree = tree[key]
+    return len(place)
+
+
+def _dump(case: Case) -> Tree:
+    return case.model_dump(by_alias=True, exclude_none=True)
+
+
+def _plain(tree: Any, of_file: Callable[[Path], Any]) -> Any:
+    if isinstance(tree, dict):
+        return {key: _plain(value, of_file) for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [_plain(value, of_file) for value in tree]
+    return of_file(tree) if isinstance(tree, Path) else tree
+
+
+def _hash(tree: Tree) -> str:
+    contents = _plain(tree, lambda file: hashlib.sha256(file.read_bytes()).hexdigest())
+    return hashlib.sha256(json.dumps(contents, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+
+
+def _relative(file: Path, source: Path) -> str:
+    return Path(os.path.relpath(file, source.parent)).as_posix()
+
+
+def _shown(path: Path) -> str:
+    return os.path.relpath(path)
