@@ -227,7 +227,11 @@ class Observation(Part):
 
 
 class Survey(Part):
-    file: Path = Field(description="CSV of the plant survey")
+    file: Path = Field(description="CSV of the plant survey: quantity,mean,standard_deviation,samples [SI]")
+    debris: bool = Field(default=False, description="true: stem diameters with the debris that hangs in them")
+    spread: Literal["plants", "mean"] = Field(default="plants", description="one plant for all, or their mean")
+    deflected_height: Positive | None = Field(default=None, description="height of the bent plants [m]")
+    undergrowth_density: Interval | None = Field(default=None, description="assumed range, if there is any [1/m2]")
 
 
 class Numerics(Part):
