@@ -39,7 +39,7 @@ class Site:
 def build_site(case: Case) -> Site:
     """The site of a case; InputError when a cell has no bed level or a file cannot be read."""
     grid = build_grid(case)
-    bed = _bed(case, grid)
+    bed = bed_levels(case, grid)
     patch = np.full(bed.shape, -1, dtype=np.int64)
     for index, area in enumerate(case.plants.patches):
         patch[cells_of_patch(area, grid)] = index
@@ -66,10 +66,11 @@ def slope(bed: Levels, grid: Grid) -> Levels:
     return np.hypot(along, across)
 
 
-def _bed(case: Case, grid: Grid) -> Levels:
+def bed_levels(case: Case, grid: Grid) -> Levels:
+    """Bed level of the case (nx, ny) at the points of any grid, its own or a finer one [m]; InputError where there is none."""
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     for layer in case.bed:
-        level = _layer(layer, grid)
+        level = _layer(layer, grid, case.grid.x[0])
         bed = np.where(np.isnan(level), bed, level)
     if np.isnan(bed).any():
         i, j = np.argwhere(np.isnan(bed))[0]
@@ -80,9 +81,9 @@ def _bed(case: Case, grid: Grid) -> Levels:
     return bed
 
 
-def _layer(layer: BedLayer, grid: Grid) -> Levels:
+def _layer(layer: BedLayer, grid: Grid, upstream: float) -> Levels:
     if layer.trapezoid is not None:
-        return _trapezoid(layer.trapezoid, grid)
+        return _trapezoid(layer.trapezoid, grid, upstream)
     if layer.raster is not None:
         return levels_at(read_raster(layer.raster), grid.x, grid.y)
     if layer.points is not None:
@@ -90,9 +91,8 @@ def _layer(layer: BedLayer, grid: Grid) -> Levels:
     return np.full((grid.x.size, grid.y.size), np.nan)
 
 
-def _trapezoid(channel: Trapezoid, grid: Grid) -> Levels:
+def _trapezoid(channel: Trapezoid, grid: Grid, upstream: float) -> Levels:
     """z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m]."""
-    upstream = grid.x[0] - 0.5 * grid.dx
     out = np.abs(grid.y - channel.axis) - 0.5 * channel.bottom_width
     reach = np.inf if channel.top_width is None else 0.5 * (channel.top_width - channel.bottom_width)
     bank = channel.bank_slope * np.clip(out, 0.0, reach)

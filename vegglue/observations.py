@@ -1,0 +1,111 @@
+"""What was measured: ADV points, depth-averaged velocities and gauge levels, as one table of stations."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.adv import Section, average_of, read_section
+from vegglue.discharge import Discharge
+from vegglue.errors import InputError
+from vegglue.profile import CanopyHeight, ProfileFit
+from vegglue.schema import Case, Observation
+from vegglue.table import read_table, refuse_repeated, refuse_rows
+
+STATION = ("experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device")
+
+Key = tuple[str, str]  # experiment, section
+
+
+@dataclass(frozen=True)
+class Observations:
+    """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
+
+    table: one row per station, columns STATION; `value` is a depth-averaged velocity along x [m/s] or a level [m];
+    standard_error and depth are NaN when unknown. Rows with used = False say why in `reason` (their value may be NaN).
+    points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the bed,
+    plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
+    profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear and
+    linear_error (the paper's rule), fitted and fitted_error (profile fit), law of the fit, within, slope, top and scatter
+    (see profile.ProfileFit; NaN without a fit), used, reason.
+    discharge: by (experiment, section), then by rule, `paper` and `profile`.
+    canopy_height: by (experiment, section), where verticals stand inside plants.
+    """
+
+    table: pd.DataFrame
+    points: pd.DataFrame
+    profiles: pd.DataFrame
+    discharge: dict[Key, dict[str, Discharge]]
+    canopy_height: dict[Key, CanopyHeight]
+
+
+def read_observations(case: Case) -> Observations:
+    """Read every file the case names, judge the quality, average over the depth.
+
+    Raises InputError, naming file and row, for what cannot be read, is missing, repeated, or no number; a vertical or
+    point that can be read but not trusted stays, with used = False and the reason.
+    """
+    sections: dict[Key, Section] = {}
+    stations = []
+    for observation in case.observations:
+        if observation.kind == "adv":
+            key = (str(observation.experiment), str(observation.section))
+            if key in sections:
+                raise InputError(f"{os.path.relpath(observation.file)}: section {key[1]} of experiment {key[0]} is read twice.")
+            sections[key] = read_section(case, observation)
+            stations.append(_averaged(sections[key].profiles, observation))
+        else:
+            stations.append(_read_stations(case, observation))
+    return Observations(
+        table=_joined(stations),
+        points=_joined([section.points for section in sections.values()]),
+        profiles=_joined([section.profiles for section in sections.values()]),
+        discharge={key: section.discharge for key, section in sections.items()},
+        canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
+    )
+
+
+def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
+    """The curve of one row of Observations.profiles, for drawing; None where the rule is linear. Its covariance is NaN."""
+    if not np.isfinite(profile["top"]):
+        return None
+    return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])
+
+
+def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(STATION))
+
+
+def _averaged(profiles: pd.DataFrame, observation: Observation) -> pd.DataFrame:
+    """Stations from the verticals of a section, by the rule the case has chosen."""
+    value, error = average_of(profiles, str(observation.average))
+    if observation.standard_error is not None:
+        error = pd.Series(observation.standard_error, index=profiles.index)
+    return profiles.assign(kind="velocity", value=value, standard_error=error)[list(STATION)]
+
+
+def _read_stations(case: Case, observation: Observation) -> pd.DataFrame:
+    """Depth-averaged velocities (x, y, u[, u_se]) or gauge levels (x, y, level[, level_se])."""
+    path, value = observation.file, {"velocity": "u", "level": "level"}[observation.kind]
+    own = ("experiment", "section") if observation.kind == "velocity" else ("experiment",)
+    names = [name for name in own if getattr(observation, name) is None]
+    rows = read_table(path, names, ("x", "y", value), (f"{value}_se",))
+    given = {name: getattr(observation, name) for name in ("experiment", "section") if name not in names}
+    rows = rows.assign(**{name: text or "" for name, text in given.items()})
+    unknown = ~rows["experiment"].isin(list(case.experiments))
+    refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
+    refuse_repeated(path, rows, ("experiment", "section", "x", "y"))
+    if f"{value}_se" not in rows:
+        rows[f"{value}_se"] = np.nan if observation.standard_error is None else observation.standard_error
+    refuse_rows(path, rows[f"{value}_se"] <= 0.0, f"expected {value}_se above 0; mend it or leave the column out")
+    stations = rows.rename(columns={value: "value", f"{value}_se": "standard_error"}).assign(
+        kind=observation.kind,
+        x=rows["x"] + observation.offset.x,
+        y=rows["y"] + observation.offset.y,
+        used=True,
+        reason="",
+        depth=np.nan,
+        device="",
+    )
+    return stations[list(STATION)]
