@@ -1,5 +1,6 @@
 """Whether the parts of a case agree: every name used is declared and every declaration used, files and places exist."""
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -58,7 +59,7 @@ def _names(case: Case) -> Iterator[Refusal]:
         for inflow in experiment.discharge:
             yield from _unknown((*at, "discharge"), inflow, case.inflows, "inflow")
         for inflow in case.inflows.keys() - experiment.discharge.keys():
-            yield Refusal((*at, "discharge"), f"says nothing about the inflow `{inflow}`: add it, 0 is not allowed")
+            yield Refusal((*at, "discharge"), f"says nothing about the inflow `{inflow}`: add it")
         for stand in experiment.stands:
             yield from _unknown((*at, "stands"), stand, stands, "stand")
         for present in experiment.plants if isinstance(experiment.plants, tuple) else ():
@@ -119,7 +120,9 @@ def _files(case: Case) -> Iterator[Refusal]:
     named += [(("survey", "file"), case.survey.file)] if case.survey else []
     for place, file in named:
         if file is not None and not file.is_file():
-            yield Refusal(place, f"expected an existing file, got {file}: put it there or correct the path")
+            yield Refusal(
+                place, f"expected an existing file, got {os.path.relpath(file)}: put it there or correct the path"
+            )
 
 
 def _likelihood(case: Case) -> Iterator[Refusal]:

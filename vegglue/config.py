@@ -50,7 +50,7 @@ def resolved_yaml(case: Case) -> str:
 
 
 def case_hash(case: Case) -> str:
-    """sha256 of the resolved case and of the contents of every file it names, wherever they lie."""
+    """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie."""
     return _hash(_dump(case))
 
 
@@ -150,7 +150,8 @@ def _named(experiment: Any, inflow: str) -> Any:
 def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputError:
     """The sentence, with the file that says (or should say) what is refused: the first of those that say most of it."""
     path, _ = max(layers, key=lambda layer: _depth(layer[1], refusal.place))
-    return InputError(f"{_shown(path)}: `{dotted(refusal.place)}` {refusal.complaint.rstrip('.')}.")
+    end = "" if refusal.complaint.endswith(("?", ".")) else "."
+    return InputError(f"{_shown(path)}: `{dotted(refusal.place)}` {refusal.complaint}{end}")
 
 
 def _depth(tree: Any, place: Place) -> int:
@@ -177,7 +178,7 @@ def _plain(tree: Any, of_file: Callable[[Path], Any]) -> Any:
 
 def _hash(tree: Tree) -> str:
     contents = _plain(tree, lambda file: hashlib.sha256(file.read_bytes()).hexdigest())
-    return hashlib.sha256(json.dumps(contents, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(contents, ensure_ascii=False).encode()).hexdigest()
 
 
 def _relative(file: Path, source: Path) -> str:

@@ -1,6 +1,7 @@
 """What the schema has against a file, as one sentence: where, what was expected, what came, what to do."""
 
 import difflib
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, get_args, get_origin
@@ -29,6 +30,9 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    expected = expected.replace("greater than", "a number greater than").replace(
+        "String should match pattern", "text like"
+    )
     quotes = "; write numbers without quotes" if isinstance(got, str) and "number" in expected else ""
     return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{quotes}".lstrip())
 
@@ -36,7 +40,7 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
 def nearest(word: str, known: Iterable[str]) -> str:
     """What to write instead of an unknown word."""
     known = list(known)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean `{near[0]}`?" if near else f"known here are {', '.join(known) or 'none'}"
 
 
@@ -46,7 +50,8 @@ def dotted(place: Place) -> str:
 
 
 def _shown(got: Any) -> str:
-    return f"a mapping with the keys {', '.join(map(str, got))}" if isinstance(got, dict) else repr(got)
+    text = ", ".join(f"{key}: {value}" for key, value in got.items()) if isinstance(got, dict) else repr(got)
+    return textwrap.shorten(text or "nothing", 120, placeholder=" ...")
 
 
 def _place(tree: Any, location: Place) -> Place:

@@ -57,7 +57,7 @@ class Grid(Part):
         for axis, (low, high), size in (("x", self.x, self.cell[0]), ("y", self.y, self.cell[1])):
             count = (high - low) / size
             if abs(count - round(count)) > 1e-6 or count < 3:
-                raise ValueError(f"a whole number of at least 3 cells of {size:g} m along {axis}, not {count:g}")
+                raise ValueError(f"a whole number of at least 3 cells along {axis}, where these make {count:g}")
         return self
 
 
@@ -196,9 +196,9 @@ class Parameter(Part):
         bounds = ("low", "high") if self.distribution == "normal" else ()
         _exactly(self, self.distribution, keys | {"loguniform": ("low", "high")}, bounds)
         if self.low is not None and self.high is not None and self.low >= self.high:
-            raise ValueError(f"a `low` below `high`, not {self.low:g} and {self.high:g}")
+            raise ValueError("a `low` below `high`")
         if self.distribution == "loguniform" and self.low is not None and self.low <= 0:
-            raise ValueError(f"a `low` above 0 for a loguniform prior, not {self.low:g}")
+            raise ValueError("a `low` above 0 for a loguniform prior")
         return self
 
 
@@ -231,7 +231,9 @@ class Survey(Part):
     debris: bool = Field(default=False, description="true: stem diameters with the debris that hangs in them")
     spread: Literal["plants", "mean"] = Field(default="plants", description="one plant for all, or their mean")
     deflected_height: Positive | None = Field(default=None, description="height of the bent plants [m]")
-    undergrowth_density: Interval | None = Field(default=None, description="assumed range, if there is any [1/m2]")
+    undergrowth_density: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] | None = Field(
+        default=None, description="assumed range, if there is any [1/m2]"
+    )
 
 
 class Numerics(Part):

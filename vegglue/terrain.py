@@ -74,9 +74,9 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
     points = read_points(path)
     try:
         surface = LinearNDInterpolator(points[:, :2], points[:, 2])
-    except QhullError:
+    except (QhullError, ValueError):
         raise InputError(
-            f"{path}: expected at least three points that are not on one line, to span a surface."
+            f"{path}: expected at least three points that are not on one line, got {len(points)}: add more."
         ) from None
     return np.asarray(surface(*np.meshgrid(x, y, indexing="ij")), dtype=np.float64)
 
