@@ -27,7 +27,7 @@ def _column_quantile(values: Floats, weights: Floats, levels: ArrayLike) -> Floa
         return np.full(np.size(levels), np.nan)
     order = np.argsort(values)
     share = weights[order] / weights.sum()
-    return np.interp(levels, np.cumsum(share) - 0.5 * share, values[order])
+    return np.interp(np.asarray(levels, float), np.cumsum(share) - 0.5 * share, values[order])
 
 
 def mixture_quantile(centres: Floats, weights: Floats, sd: Floats, levels: ArrayLike) -> Floats:

@@ -7,11 +7,11 @@ any moment leaves a file that opens.
 
 import errno
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -20,8 +20,11 @@ from vegglue.ensemble import ROWS, Ensemble, Header, ensemble_from, unsolved
 from vegglue.errors import InputError, StorageError
 from vegglue.layout import Group
 from vegglue.lock import hold_lock
+from vegglue.posterior import Posterior, attributes, groups, posterior_from
 
-FORMAT = "vegglue ensemble 1"
+ENSEMBLE_FORMAT, POSTERIOR_FORMAT = "vegglue ensemble 1", "vegglue posterior 1"
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -87,21 +90,23 @@ def read_ensemble(path: Path, expected_hash: str | None = None) -> Ensemble:
     Errors: InputError when there is none, or it was made from another config than the one with `expected_hash`;
     StorageError when the file is broken.
     """
-    if not path.exists():
-        found = "an unfinished run, which will be resumed" if _part(path).exists() else "no file"
-        raise InputError(f"{path}: expected the members of this config, found {found}; run `vegglue simulate CONFIG`.")
-    with _opened(path, "r") as file:
-        found = file.attrs.get("config_hash", "none")
-        if expected_hash is not None and found != expected_hash:
-            raise InputError(
-                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config or a data file "
-                "changed since the members were solved; run `vegglue simulate CONFIG` again."
-            )
-        try:
-            return ensemble_from(_read_groups(file), file.attrs)
-        except (KeyError, OSError) as error:
-            what = f"{path}: not a whole ensemble file ({error}); remove it and run `vegglue simulate CONFIG`."
-            raise StorageError(what) from error
+    if not path.exists() and _part(path).exists():
+        raise InputError(f"{path}: found only a part of the members; run `vegglue simulate CONFIG` to solve the rest.")
+    return _read(path, expected_hash, "simulate", ensemble_from)
+
+
+def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: str) -> None:
+    """Write a posterior with the resolved config it was inferred under, replacing an older file only when it is whole.
+
+    Errors: StorageError when it cannot be written.
+    """
+    own = {"config": config, "config_hash": config_hash, "format": POSTERIOR_FORMAT}
+    _write_whole(path, groups(posterior), attributes(posterior) | own)
+
+
+def read_posterior(path: Path, expected_hash: str | None = None) -> Posterior:
+    """Read a posterior; errors as those of read_ensemble, for `vegglue infer CONFIG`."""
+    return _read(path, expected_hash, "infer", posterior_from)
 
 
 def stored_hash(path: Path) -> str | None:
@@ -113,8 +118,26 @@ def stored_hash(path: Path) -> str | None:
         return None
 
 
+def _read(path: Path, expected_hash: str | None, step: str, understand: Callable[..., Result]) -> Result:
+    remedy = f"run `vegglue {step} CONFIG`"
+    if not path.exists():
+        raise InputError(f"{path}: expected the result of an earlier step, found no file; {remedy}.")
+    with _opened(path, "r") as file:
+        found = str(file.attrs.get("config_hash", "none"))
+        if expected_hash is not None and found != expected_hash:
+            raise InputError(
+                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config or a data file "
+                f"changed since this was made; {remedy} again."
+            )
+        try:
+            return understand(_read_groups(file), dict(file.attrs))
+        except (KeyError, OSError, TypeError, ValueError) as error:
+            raise StorageError(f"{path}: is broken or of another version ({error}); remove it and {remedy}.") from error
+
+
 def _attributes(header: Header) -> dict[str, Any]:
-    return {name: getattr(header, name) for name in ("config", "config_hash", "seed", "version")} | {"format": FORMAT}
+    own = {name: getattr(header, name) for name in ("config", "config_hash", "seed", "version")}
+    return own | {"format": ENSEMBLE_FORMAT}
 
 
 def _part(path: Path) -> Path:

@@ -1,0 +1,127 @@
+"""How well each member of an ensemble predicts what was measured, and what it therefore weighs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from vegglue.ensemble import FAILED, Ensemble
+from vegglue.errors import InputError
+from vegglue.statistics import Floats
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What each member makes of the used stations."""
+
+    solved: NDArray[np.bool_]  # (member,)
+    best: int
+    sigma: dict[str, float]  # by kind of measurement
+    noise: Floats  # (station,) NaN unknown
+    efficiency: Floats  # (member,) NaN for failed members
+    log_likelihood: Floats  # (member, station) NaN where not used or failed
+
+
+def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
+    """Rows of the used stations by kind of measurement."""
+    used = station["used"].to_numpy(bool)
+    return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}
+
+
+def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> Fit:
+    """Residual, sigma and Gaussian log-likelihood of each member at the stations, under the rule of sigma:
+
+    best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2;
+    known: the standard errors of the data. E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
+
+    Errors: InputError when no member was solved, a standard error is missing, or sigma would be zero.
+    """
+    kinds = stations_by_kind(station)
+    used = np.concatenate(list(kinds.values()))
+    solved = (ensemble.status != FAILED) & np.isfinite(ensemble.prediction[:, used]).all(axis=1)
+    if not solved.any():
+        raise InputError(f"ensemble: none of the {len(solved)} members was solved; see the reasons stored with them.")
+    value = station["value"].to_numpy(float)
+    residual = np.where(solved[:, None], value - ensemble.prediction, np.nan)
+    square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
+    errors = _known_errors(station, used) if rule == "known" else None
+    misfit = _profile_misfit(square, kinds) if errors is None else np.sum((residual / errors)[:, used] ** 2, axis=1)
+    best = int(np.nanargmin(misfit))
+    sigma = {kind: float(np.sqrt(each[best])) for kind, each in square.items()}
+    noise = station["kind"].map(sigma).to_numpy(float) if errors is None else errors
+    return Fit(
+        solved=solved,
+        best=best,
+        sigma=sigma if errors is None else {kind: root_mean_square(errors[rows]) for kind, rows in kinds.items()},
+        noise=noise,
+        efficiency=1 - np.mean([square[kind] / _variance(value[rows]) for kind, rows in kinds.items()], axis=0),
+        log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy(bool)),
+    )
+
+
+def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Floats:
+    errors = station["standard_error"].to_numpy(float)
+    unknown = [int(row) for row in used if not errors[row] > 0]
+    if unknown:
+        first = station.iloc[unknown[0]]
+        raise InputError(
+            f"observations: `infer.sigma: known` needs a standard error above 0 at every used station, but "
+            f"{len(unknown)} of {len(used)} have none, the first at x = {first['x']:g} m, y = {first['y']:g} m; "
+            "add `standard_error` to the observation or use `sigma: best-member`."
+        )
+    return errors
+
+
+def _profile_misfit(square: dict[str, Floats], kinds: dict[str, NDArray[np.intp]]) -> Floats:
+    """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]."""
+    for kind, each in square.items():
+        if np.nanmin(each) == 0:
+            raise InputError(
+                f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the residual; "
+                "give standard errors and use `infer.sigma: known`."
+            )
+    return np.sum([len(kinds[kind]) * np.log(each) for kind, each in square.items()], axis=0)
+
+
+def _variance(values: Floats) -> float:
+    """NaN instead of zero: against a constant no efficiency is defined."""
+    return float(np.var(values)) or float("nan")
+
+
+def _log_likelihood(residual: Floats, noise: Floats, used: NDArray[np.bool_]) -> Floats:
+    """ln p(u_i | U_i) = -ln(2 pi s_i^2) / 2 - (u_i - U_i)^2 / (2 s_i^2)."""
+    noise = np.where(used, noise, np.nan)
+    return -0.5 * np.log(2 * np.pi * noise**2) - 0.5 * (residual / noise) ** 2
+
+
+def member_weights(fit: Fit, likelihood: str, threshold: float) -> Floats:
+    """w_k = L_k / sum L (member,) [-]; zero for failed members and those of an efficiency below the threshold.
+
+    gaussian: L = prod_i p(u_i | U_i). nse: L = max(E, 0). inverse-variance: L = 1 / (1 - E), proportional to the
+    inverse error variance of Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305, with their shape 1.
+
+    Errors: InputError when no member has weight.
+    """
+    if (likelihood != "gaussian" or threshold > -np.inf) and np.isnan(fit.efficiency[fit.best]):
+        raise InputError("observations: no efficiency is defined where all measured values are equal; use gaussian.")
+    kept = fit.solved & ((threshold == -np.inf) | (fit.efficiency >= threshold))
+    weights = np.zeros(len(kept))
+    if likelihood == "gaussian":
+        log_weight = np.nansum(fit.log_likelihood, axis=1)
+        weights[kept] = np.exp(log_weight[kept] - np.max(log_weight[kept], initial=-np.inf))
+    elif likelihood == "nse":
+        weights[kept] = np.maximum(fit.efficiency[kept], 0)
+    else:
+        weights[kept] = 1 / np.maximum(1 - fit.efficiency[kept], np.finfo(float).tiny)
+    if not weights.sum() > 0:
+        raise InputError(
+            f"infer.behavioural: expected a member with an efficiency of at least {threshold:g} (and above 0 for nse), "
+            f"the best has {np.nanmax(fit.efficiency):.3g}; lower the threshold or widen the priors."
+        )
+    return weights / weights.sum()
+
+
+def root_mean_square(values: Floats) -> float:
+    """sqrt(mean x^2), in the unit of the values."""
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,195 @@
+"""The posterior: weights of the members, and what follows from them for parameters and predictions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pandas as pd
+
+from vegglue.ensemble import STATION_UNITS, VALUE_UNIT
+from vegglue.layout import Group, Stored, Variable, stored_fields, table_group
+
+LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # of all quantiles and bands: the 95 % and 50 % ranges and the median
+IDENTIFIED_BELOW = 0.5  # 95 % range of the posterior over that of the prior
+NEAR_BOUND = 0.02  # of the range of the prior
+PRESSES_ABOVE = 0.05  # posterior mass near a bound, where a prior that learned nothing has 0.02
+CHAINS, DRAWS = 4, 500  # equal-weight draws for ArviZ
+OWN_UNIT = "that of the parameter, see `unit`"
+ByParameter = Annotated[dict[str, float], Stored(("parameter",), OWN_UNIT)]
+ByLogParameter = Annotated[dict[str, float], Stored(("log_parameter",))]
+ByKind = Annotated[dict[str, float], Stored(("kind",), VALUE_UNIT)]
+
+
+@dataclass(frozen=True)
+class CorrectedCanopy:
+    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth."""
+
+    parameter: str
+    from_height: float  # [m]
+    to_height: float  # [m]
+    depth: float  # [m]
+    phi: Annotated[np.ndarray, Stored(("member",))]
+    median: float
+    sd: float
+    quantiles: Annotated[np.ndarray, Stored(("level",))]
+    log10_median: float
+    log10_sd: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Members weighed by their likelihood. `station` counts all rows of the station table; `kind` is velocity or level.
+
+    For a log-uniform or lognormal parameter log10 is what is looked at: in correlation, width_ratio and bound_mass.
+    """
+
+    parameters: tuple[str, ...]
+    likelihood: str
+    sigma_rule: str
+    threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
+    members: int
+    failed: int
+    weighed: int  # members solved and above the threshold
+    used: int  # stations that count
+    best: int  # member that fits best
+    effective_size: float  # Kish: equal members that the weights are worth [-]
+    largest_weight: float  # [-]
+    pareto_k: float  # shape of the tail of the weights [-]; above 0.7 they are not to be trusted
+    chi2: float  # of the best member against known standard errors [-], NaN where one is unknown
+    ensemble_hash: str  # config hash of the ensemble
+    seed: int
+    version: str
+    unit: Annotated[dict[str, str], Stored(("parameter",))]
+    theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
+    weights: Annotated[np.ndarray, Stored(("member",))]  # sum 1
+    efficiency: Annotated[np.ndarray, Stored(("member",))]  # Nash-Sutcliffe
+    log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]  # Gaussian; NaN where not used
+    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
+    median: ByParameter
+    sd: ByParameter
+    quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
+    prior_quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
+    log10_median: ByLogParameter
+    log10_sd: ByLogParameter
+    correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]
+    width_ratio: Annotated[dict[str, float], Stored(("parameter",))]  # 95 % range, posterior over prior
+    identified: Annotated[dict[str, bool], Stored(("parameter",))]
+    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]  # of the prior, maybe infinite
+    bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]  # within 2 % of the range of a bound
+    bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]  # whether it presses against it
+    sigma: ByKind  # RMS residual of the best member, or of the known standard errors
+    rmse: ByKind  # of the median prediction
+    best_rmse: ByKind
+    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # residual standard deviation, NaN unknown
+    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # measured minus median prediction
+    best_residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # measured minus best member
+    model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # spread of the members alone
+    total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # with the residual error
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"))]  # member indices, equal weights
+    predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]  # draws with residual error
+    station: pd.DataFrame
+    canopy: CorrectedCanopy | None
+
+
+def groups(posterior: Posterior) -> dict[str, Group]:
+    """All groups of posterior.h5: those ArviZ knows, `glue` with every array, and `stations` with the whole table."""
+    coordinates = _coordinates(posterior)
+    arrays = {name: _variable(getattr(posterior, name), stored) for name, stored in stored_fields(Posterior).items()}
+    own = {"glue": Group(coordinates, arrays), "stations": table_group(posterior.station, "station", STATION_UNITS)}
+    if posterior.canopy is not None:
+        stored = stored_fields(CorrectedCanopy).items()
+        values = {name: _variable(getattr(posterior.canopy, name), each) for name, each in stored}
+        own["canopy"] = Group({dim: coordinates[dim] for dim in ("member", "level")}, values)
+    return own | _arviz_groups(posterior)
+
+
+def attributes(posterior: Posterior) -> dict[str, Any]:
+    """Numbers and words of the posterior and its canopy correction, for the attributes of the file."""
+    own = {name: getattr(posterior, name) for name in _plain(Posterior)}
+    if posterior.canopy is None:
+        return own
+    return own | {f"canopy_{name}": getattr(posterior.canopy, name) for name in _plain(CorrectedCanopy)}
+
+
+def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]) -> Posterior:
+    """The posterior whose file has these groups and attributes."""
+    glue = read["glue"]
+    arrays = {name: _value(glue, name, stored, Posterior) for name, stored in stored_fields(Posterior).items()}
+    return Posterior(
+        **arrays,
+        **{name: kind(stated[name]) for name, kind in _plain(Posterior).items()},
+        parameters=tuple(glue["parameter"]),
+        station=pd.DataFrame({name: values for name, values in read["stations"].items() if name != "station"}),
+        canopy=_canopy_from(read["canopy"], stated) if "canopy" in read else None,
+    )
+
+
+def _canopy_from(group: Mapping[str, np.ndarray], stated: Mapping[str, Any]) -> CorrectedCanopy:
+    return CorrectedCanopy(
+        phi=group["phi"],
+        quantiles=group["quantiles"],
+        **{name: kind(stated[f"canopy_{name}"]) for name, kind in _plain(CorrectedCanopy).items()},
+    )
+
+
+def _plain(kind: type) -> dict[str, type]:
+    """Fields that are one number or word."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if hint in (str, int, float)}
+
+
+def _variable(value: Any, stored: Stored) -> Variable:
+    values = list(value.values()) if isinstance(value, dict) else value
+    shape = None if not isinstance(value, dict) or value else (0,) * len(stored.dims)
+    return Variable(stored.dims, np.zeros(shape) if shape else np.array(values), stored.unit)
+
+
+def _value(group: Mapping[str, np.ndarray], name: str, stored: Stored, kind: type) -> Any:
+    hint = get_type_hints(kind)[name]
+    if get_origin(hint) is not dict:
+        return group[name]
+    entry = get_args(hint)[1]
+    convert = entry if entry in (str, float, bool) else np.asarray
+    return {key: convert(value) for key, value in zip(group[stored.dims[0]], group[name], strict=True)}
+
+
+def _coordinates(posterior: Posterior) -> dict[str, Any]:
+    names = np.array(posterior.parameters, object)
+    return {
+        "member": np.arange(posterior.members),
+        "station": np.arange(len(posterior.station)),
+        "parameter": names,
+        "other_parameter": names,
+        "log_parameter": np.array(list(posterior.log10_median), object),
+        "kind": np.array(list(posterior.sigma), object),
+        "level": np.array(LEVELS),
+        "side": np.array(["low", "high"], object),
+        "chain": np.arange(CHAINS),
+        "draw": np.arange(DRAWS),
+    }
+
+
+def _arviz_groups(posterior: Posterior) -> dict[str, Group]:
+    """Equal-weight draws and used stations only, so that no NaN reaches ArviZ."""
+    used = np.flatnonzero(posterior.station["used"].to_numpy(bool))
+    draw = {"chain": np.arange(CHAINS), "draw": np.arange(DRAWS)}
+    prior = {"chain": np.arange(1), "draw": np.arange(posterior.members)}
+    station, at_draws = {"station": used}, ("chain", "draw")
+    member, log_likelihood = posterior.draws, posterior.log_likelihood[:, used]
+    units, theta = posterior.unit, posterior.theta
+    table = table_group(posterior.station.iloc[used], "station", STATION_UNITS)
+
+    def measured(dims: tuple[str, ...], values: Any, unit: str) -> dict[str, Variable]:
+        return {"measured": Variable((*dims, "station"), values, unit)}
+
+    stats = {"lp": Variable(at_draws, log_likelihood.sum(axis=1)[member]), "member": Variable(at_draws, member)}
+    value = posterior.station["value"].to_numpy(float)[used]
+    return {
+        "posterior": Group(draw, {name: Variable(at_draws, theta[name][member], units[name]) for name in theta}),
+        "prior": Group(prior, {name: Variable(at_draws, theta[name][None, :], units[name]) for name in theta}),
+        "log_likelihood": Group(draw | station, measured(at_draws, log_likelihood[member], "-")),
+        "posterior_predictive": Group(draw | station, measured(at_draws, posterior.predictive[:, :, used], VALUE_UNIT)),
+        "observed_data": Group(station, measured((), value, VALUE_UNIT)),
+        "constant_data": Group(station, table.variables),
+        "sample_stats": Group(draw, stats),
+    }
