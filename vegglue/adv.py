@@ -1,6 +1,5 @@
 """ADV points of one section: placed in the channel, judged, averaged over the depth and summed to the discharge."""
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from vegglue.profile import (
     Array,
     CanopyHeight,
     Column,
-    ProfileFit,
     fit_canopy_height,
     fit_log_law,
     fit_two_layers,
@@ -23,38 +21,40 @@ from vegglue.profile import (
 from vegglue.quality import dead_probes
 from vegglue.schema import Case, Observation
 from vegglue.site import Grid, bed_levels, cells_of_patch
-from vegglue.table import read_table, refuse_repeated, refuse_rows
+from vegglue.table import read_table, refuse_repeated, refuse_rows, shown
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
 GRID_STEP = 0.02  # m, along y and z: cells of the regular grid a section is summed on
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
+SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing about its time scale
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
 TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
 DURATION = 60.0  # s
-SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing about its time scale
 
 
 @dataclass(frozen=True)
 class Section:
-    """One measured section: `points`, `profiles`, `discharge` and `canopy_height` as in observations.Observations."""
+    """One measured section: `points`, `profiles`, and the rest for this one section as in observations.Observations."""
 
     points: pd.DataFrame
     profiles: pd.DataFrame
     discharge: dict[str, Discharge]
+    neighbour_error: float
     canopy_height: CanopyHeight | None
 
 
 def read_section(case: Case, observation: Observation) -> Section:
     """Everything one `kind: adv` entry yields; InputError names file and row of what cannot be used as given."""
     points = _read_points(observation)
-    x = float(points["x"].iloc[0])
-    section = _cross_section(case, observation, x)
-    plants = _among_plants(case, observation, x, points["y"].to_numpy())
-    points = _without_dead_probes(_with_errors(_placed(observation, points, section, plants)), section)
-    profiles = pd.DataFrame([_profile(group) for _, group in points.groupby("y", sort=True)])
-    columns = {y: _column(group) for y, group in points[points["plants"] & points["used"]].groupby("y")}
-    canopy = fit_canopy_height(list(columns.values())) if points["plants"].any() else None
-    return Section(points, profiles, _discharge(section, points, profiles), canopy)
+    section = _cross_section(case, observation, points["x"].iloc[0])
+    points = _without_dead_probes(_with_errors(_placed(case, observation, points)), section)
+    profiles = pd.DataFrame([_profile(group) for _, group in points.groupby("y")])
+    good = profiles[profiles["used"]]
+    error = neighbour_error(good["y"].to_numpy(), good["fitted"].to_numpy())
+    columns = [_column(group) for _, group in points[points["used"]].groupby("y")]
+    among = [column for column, plants in zip(columns, good["plants"], strict=True) if plants]
+    canopy = fit_canopy_height(among) if among else None
+    return Section(points, profiles, _discharge(section, columns, good, error), error, canopy)
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
@@ -70,52 +70,41 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 
 
 def _read_points(observation: Observation) -> pd.DataFrame:
-    path = observation.file
+    """Rows of the observed case, upwards in each vertical, in the coordinates of the grid."""
+    path, wanted = observation.file, observation.case
     rows = read_table(path, ("case", "device"), ("x", "y", "z", "u"), ("v", "w", "u_std", "duration_s"))
     for column in {"u_std", "duration_s"} & set(rows.columns):
-        wrong = rows[column] < 0.0 if column == "u_std" else rows[column] <= 0.0
-        refuse_rows(path, wrong, f"expected {column} above 0; mend or remove the row")
+        refuse_rows(path, rows[column] <= 0.0, f"expected {column} above 0; mend or remove the row")
     refuse_repeated(path, rows, ("case", "x", "y", "z"))
-    chosen = rows[rows["case"] == observation.case]
+    chosen = rows[rows["case"] == wanted]
     if chosen.empty:
         raise InputError(
-            f"{os.path.relpath(path)}: expected rows with case {observation.case!r}, got {', '.join(rows['case'].unique())}; "
+            f"{shown(path)}: expected rows with case {wanted!r}, got only {', '.join(rows['case'].unique())}; "
             f"correct `case` in the observation."
         )
-    refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the x of case {observation.case!r}, a single section")
+    refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
     moved = chosen.assign(x=chosen["x"] + observation.offset.x, y=chosen["y"] + observation.offset.y)
     return moved.drop(columns="case").sort_values(["y", "z"]).reset_index(drop=True)
 
 
-def _placed(observation: Observation, points: pd.DataFrame, section: CrossSection, plants: Array) -> pd.DataFrame:
-    """Points with bed (datum of the file), depth and height above the bed; those outside the water are not used."""
-    bed = np.interp(points["y"], section.y, section.bed)
-    points = points.assign(
-        experiment=observation.experiment,
-        section=observation.section,
-        bed=bed,
-        depth=section.surface - bed,
-        height=points["z"] - bed,
-        plants=plants,
-        reason="",
-    )
-    points.loc[points["height"] <= 0.0, "reason"] = "below the bed"
-    points.loc[points["z"] > section.surface, "reason"] = "above the water surface"
-    points["used"] = points["reason"] == ""
-    if not points["used"].any():
-        raise InputError(
-            f"{os.path.relpath(observation.file)}: expected points between the bed and the water surface at z = "
-            f"{section.surface:g} m, got none with case {observation.case!r}; check `floor`, `surface` and `offset`."
-        )
-    return points
+def _across(case: Case) -> Array:
+    low, high = case.grid.y
+    return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
+
+
+def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
+    """Bed level at x and each y in the datum of the file, in which the lowest bed of the section is `floor`."""
+    lowest = _local_bed(case, x, _across(case)).min()
+    return _local_bed(case, x, y) - lowest + float(observation.floor or 0.0)
+
+
+def _local_bed(case: Case, x: float, y: Array) -> Array:
+    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP))[0]
 
 
 def _cross_section(case: Case, observation: Observation, x: float) -> CrossSection:
-    """Bed and water level across the grid at x, in the datum of the file: the lowest bed of the section is `floor`."""
-    low, high = case.grid.y
-    y = np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
-    bed = bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP))[0]
-    return CrossSection(y, bed - bed.min() + float(observation.floor or 0.0), float(observation.surface or 0.0))
+    y = _across(case)
+    return CrossSection(y, _bed(case, observation, x, y), float(observation.surface or 0.0))
 
 
 def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> NDArray[np.bool_]:
@@ -129,37 +118,58 @@ def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> N
     return result
 
 
+def _placed(case: Case, observation: Observation, points: pd.DataFrame) -> pd.DataFrame:
+    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water."""
+    x, y, surface = points["x"].iloc[0], points["y"].to_numpy(), float(observation.surface or 0.0)
+    bed = _bed(case, observation, x, y)
+    reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
+    if (reason != "").all():
+        raise InputError(
+            f"{shown(observation.file)}: expected points of case {observation.case!r} between the bed and the "
+            f"water surface at z = {surface:g} m, got none; check `floor`, `surface` and `offset` of the observation."
+        )
+    return points.assign(
+        experiment=observation.experiment,
+        section=observation.section,
+        bed=bed,
+        depth=surface - bed,
+        height=points["z"] - bed,
+        plants=_among_plants(case, observation, x, y),
+        used=reason == "",
+        reason=reason,
+    )
+
+
 def _with_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Sampling error of every point; the integral time scale, which no file gives, is taken as h / U of the vertical.
 
     That is eddies as long as the water is deep, carried past at the mean velocity.
     """
-    mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST)
-    deviation = points["u_std"] if "u_std" in points else TURBULENCE * mean
-    duration = points["duration_s"] if "duration_s" in points else pd.Series(DURATION, index=points.index)
-    scale = (points["depth"].clip(lower=0.0) / mean).to_numpy()
-    error = sampling_error(deviation.to_numpy(), duration.to_numpy(), scale)
+    mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST).to_numpy()
+    deviation = points["u_std"].to_numpy() if "u_std" in points else TURBULENCE * mean
+    duration = points["duration_s"].to_numpy() if "duration_s" in points else np.full(len(points), DURATION)
+    error = sampling_error(deviation, duration, points["depth"].clip(lower=0.0).to_numpy() / mean)
     return points.assign(standard_error=np.maximum(error, SMALLEST_ERROR), u_std=points.get("u_std", np.nan))
 
 
 def _without_dead_probes(points: pd.DataFrame, section: CrossSection) -> pd.DataFrame:
     """Points with `used` false and the reason given in every vertical where the probe was dead."""
-    usable = points[points["used"]]
-    verticals = usable.groupby("y").agg(
-        points=("u", "size"), mean=("u", "mean"), deviation=("u_std", "median"), plants=("plants", "first")
+    verticals = (
+        points[points["used"]]
+        .assign(speed=points["u"].abs())
+        .groupby("y", as_index=False)
+        .agg(
+            points=("u", "size"),
+            largest=("speed", "max"),
+            mean=("u", "mean"),
+            deviation=("u_std", "median"),
+            plants=("plants", "first"),
+        )
     )
-    largest = usable["u"].abs().groupby(usable["y"]).max()
     wet = section.y[section.depth > 0.0]
-    reasons = dead_probes(
-        verticals.index.to_numpy(),
-        (float(wet[0]), float(wet[-1])),
-        verticals["points"].to_numpy(),
-        largest.to_numpy(),
-        verticals["mean"].to_numpy(),
-        verticals["deviation"].to_numpy(),
-        verticals["plants"].to_numpy(),
-    )
-    reason = points["y"].map(dict(zip(verticals.index, reasons, strict=True))).fillna("")
+    names = ("y", "points", "largest", "mean", "deviation", "plants")
+    reasons = dead_probes((wet[0], wet[-1]), *(verticals[name].to_numpy() for name in names))
+    reason = points["y"].map(dict(zip(verticals["y"], reasons, strict=True))).fillna("")
     return points.assign(reason=points["reason"].mask(reason != "", reason), used=points["used"] & (reason == ""))
 
 
@@ -169,56 +179,41 @@ def _column(points: pd.DataFrame) -> Column:
 
 
 def _profile(points: pd.DataFrame) -> dict[str, object]:
-    """One row of Observations.profiles from all points of one vertical."""
-    first = points.iloc[0]
-    inside_water = points[(points["height"] > 0.0) & ~points["reason"].str.startswith("above")]
+    """One row of Observations.profiles from all points of one vertical; a dead one is averaged too, to be shown."""
+    first, wet = points.iloc[0], points[points["height"].gt(0.0) & points["height"].le(points["depth"])]
     used = bool(points["used"].any())
     row = {name: first[name] for name in ("experiment", "section", "x", "y", "bed", "depth", "plants", "device")}
-    row |= {"points": len(inside_water), "used": used, "reason": "" if used else first["reason"]}
-    if inside_water.empty:
-        nothing = dict.fromkeys(("linear", "linear_error", "fitted", "fitted_error", "within", "slope", "top", "scatter"), np.nan)
-        return row | nothing | {"law": "none"}
-    column = _column(inside_water)
+    row |= {"points": len(wet), "used": used, "reason": "" if used else first["reason"], "law": "none"}
+    row |= dict.fromkeys(
+        ("linear", "linear_error", "fitted", "fitted_error", "within", "slope", "top", "scatter"), np.nan
+    )
+    if wet.empty:
+        return row
+    column = _column(wet)
     fit = fit_two_layers(column) if first["plants"] else fit_log_law(column)
-    return row | _averages(column, fit, "two layers" if first["plants"] else "log law")
-
-
-def _averages(column: Column, fit: ProfileFit | None, law: str) -> dict[str, object]:
     linear, linear_error = linear_average(column, fit.scatter if fit else 1.0)
+    row |= {"linear": linear, "linear_error": linear_error}
     if fit is None:
-        unknown = {"within": np.nan, "slope": np.nan, "top": np.nan, "scatter": np.nan}
-        return unknown | {
-            "linear": linear, "linear_error": linear_error, "fitted": linear, "fitted_error": linear_error, "law": "linear",
-        }  # fmt: skip
+        return row | {"fitted": linear, "fitted_error": linear_error, "law": "linear"}
     fitted, fitted_error = fit.average(column.depth)
-    return {
-        "linear": linear, "linear_error": linear_error, "fitted": fitted, "fitted_error": fitted_error, "law": law,
-        "within": fit.within, "slope": fit.slope, "top": fit.top, "scatter": fit.scatter,
-    }  # fmt: skip
+    law = "two layers" if first["plants"] else "log law"
+    curve = {"within": fit.within, "slope": fit.slope, "top": fit.top, "scatter": fit.scatter}
+    return row | curve | {"fitted": fitted, "fitted_error": fitted_error, "law": law}
 
 
-def _discharge(section: CrossSection, points: pd.DataFrame, profiles: pd.DataFrame) -> dict[str, Discharge]:
-    """By both rules, from the verticals that are used."""
-    good = profiles[profiles["used"]]
-    position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0).to_numpy()
-    columns = [_column(group) for _, group in points[points["used"]].groupby("y")]
+def _discharge(section: CrossSection, columns: list[Column], good: pd.DataFrame, error: float) -> dict[str, Discharge]:
+    """By both rules, from the verticals that are used; `error` is of one vertical among its neighbours [m/s]."""
+    position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
     grid = grid_weights(section, position, columns, GRID_STEP)
-    area = np.array([weights.sum() for weights in grid])
     paper = sum(float(weights @ column.velocity) for weights, column in zip(grid, columns, strict=True))
     errors = [
-        factor * np.linalg.norm(weights * column.standard_error)
+        factor * float(np.linalg.norm(weights * column.standard_error))
         for weights, column, factor in zip(grid, columns, scatter, strict=True)
     ]
-    conveyance = conveyance_weights(section, position, good["depth"].to_numpy())
-    profile = float(conveyance @ good["fitted"])
-    rule = float(abs(paper - profile) / np.sqrt(3.0))
-    spacing = neighbour_error(position, good["fitted"].to_numpy())
+    area = conveyance_weights(section, position, good["depth"].to_numpy())
+    profile = float(area @ good["fitted"].to_numpy())
+    spacing = error * float(np.linalg.norm(area))
     return {
-        "paper": combine(paper, float(np.linalg.norm(errors)), spacing * float(np.linalg.norm(area)), rule),
-        "profile": combine(
-            profile,
-            float(np.linalg.norm(conveyance * good["fitted_error"])),
-            spacing * float(np.linalg.norm(conveyance)),
-            0.0,
-        ),
+        "paper": combine(paper, float(np.linalg.norm(errors)), spacing, abs(paper - profile) / float(np.sqrt(3.0))),
+        "profile": combine(profile, float(np.linalg.norm(area * good["fitted_error"].to_numpy())), spacing, 0.0),
     }

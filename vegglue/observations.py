@@ -1,7 +1,7 @@
 """What was measured: ADV points, depth-averaged velocities and gauge levels, as one table of stations."""
 
-import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from vegglue.discharge import Discharge
 from vegglue.errors import InputError
 from vegglue.profile import CanopyHeight, ProfileFit
 from vegglue.schema import Case, Observation
-from vegglue.table import read_table, refuse_repeated, refuse_rows
+from vegglue.table import read_table, refuse_repeated, refuse_rows, shown
 
 STATION = ("experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device")
 
@@ -24,12 +24,14 @@ class Observations:
 
     table: one row per station, columns STATION; `value` is a depth-averaged velocity along x [m/s] or a level [m];
     standard_error and depth are NaN when unknown. Rows with used = False say why in `reason` (their value may be NaN).
-    points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the bed,
-    plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
-    profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear and
-    linear_error (the paper's rule), fitted and fitted_error (profile fit), law of the fit, within, slope, top and scatter
-    (see profile.ProfileFit; NaN without a fit), used, reason.
+    points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the
+    bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
+    profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
+    and linear_error (the paper's rule), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
+    scatter (see profile.ProfileFit; NaN without a fit), used, reason.
     discharge: by (experiment, section), then by rule, `paper` and `profile`.
+    neighbour_error: by (experiment, section), how far one vertical is off its neighbours [m/s]. Larger than its own
+    standard error, it holds what repeats do not show (position, stems), and true curvature across the channel.
     canopy_height: by (experiment, section), where verticals stand inside plants.
     """
 
@@ -37,6 +39,7 @@ class Observations:
     points: pd.DataFrame
     profiles: pd.DataFrame
     discharge: dict[Key, dict[str, Discharge]]
+    neighbour_error: dict[Key, float]
     canopy_height: dict[Key, CanopyHeight]
 
 
@@ -52,7 +55,10 @@ def read_observations(case: Case) -> Observations:
         if observation.kind == "adv":
             key = (str(observation.experiment), str(observation.section))
             if key in sections:
-                raise InputError(f"{os.path.relpath(observation.file)}: section {key[1]} of experiment {key[0]} is read twice.")
+                raise InputError(
+                    f"{shown(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
+                    f"observations of it; take one out of the case."
+                )
             sections[key] = read_section(case, observation)
             stations.append(_averaged(sections[key].profiles, observation))
         else:
@@ -62,12 +68,13 @@ def read_observations(case: Case) -> Observations:
         points=_joined([section.points for section in sections.values()]),
         profiles=_joined([section.profiles for section in sections.values()]),
         discharge={key: section.discharge for key, section in sections.items()},
+        neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
     )
 
 
 def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
-    """The curve of one row of Observations.profiles, for drawing; None where the rule is linear. Its covariance is NaN."""
+    """The curve of one row of Observations.profiles, for drawing; None without a fit. Its covariance is NaN."""
     if not np.isfinite(profile["top"]):
         return None
     return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])
@@ -86,26 +93,45 @@ def _averaged(profiles: pd.DataFrame, observation: Observation) -> pd.DataFrame:
 
 
 def _read_stations(case: Case, observation: Observation) -> pd.DataFrame:
-    """Depth-averaged velocities (x, y, u[, u_se]) or gauge levels (x, y, level[, level_se])."""
+    """Depth-averaged velocities (x, y, u[, u_se]) or gauge levels (x, y, level[, level_se]); an error of 0 is unknown.
+
+    An `experiment` or `section` in the case chooses the rows with that name, or names all rows of a file without it.
+    """
     path, value = observation.file, {"velocity": "u", "level": "level"}[observation.kind]
-    own = ("experiment", "section") if observation.kind == "velocity" else ("experiment",)
-    names = [name for name in own if getattr(observation, name) is None]
-    rows = read_table(path, names, ("x", "y", value), (f"{value}_se",))
-    given = {name: getattr(observation, name) for name in ("experiment", "section") if name not in names}
-    rows = rows.assign(**{name: text or "" for name, text in given.items()})
+    given = {"experiment": observation.experiment, "section": observation.section}
+    if observation.kind == "level" and observation.section is None:
+        given["section"] = ""
+    needed = [name for name, text in given.items() if text is None]
+    rows = read_table(path, needed, ("x", "y", value), (f"{value}_se",), [name for name in given if name not in needed])
+    for name, text in given.items():
+        rows = _chosen(path, rows, name, text)
     unknown = ~rows["experiment"].isin(list(case.experiments))
     refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
     refuse_repeated(path, rows, ("experiment", "section", "x", "y"))
-    if f"{value}_se" not in rows:
-        rows[f"{value}_se"] = np.nan if observation.standard_error is None else observation.standard_error
-    refuse_rows(path, rows[f"{value}_se"] <= 0.0, f"expected {value}_se above 0; mend it or leave the column out")
-    stations = rows.rename(columns={value: "value", f"{value}_se": "standard_error"}).assign(
+    error = rows.get(f"{value}_se", pd.Series(observation.standard_error or 0.0, index=rows.index))
+    refuse_rows(path, error < 0.0, f"expected {value}_se of at least 0; mend it or leave the column out")
+    stations = rows.rename(columns={value: "value"}).assign(
         kind=observation.kind,
         x=rows["x"] + observation.offset.x,
         y=rows["y"] + observation.offset.y,
+        standard_error=error.mask(error == 0.0),
         used=True,
         reason="",
         depth=np.nan,
         device="",
     )
     return stations[list(STATION)]
+
+
+def _chosen(path: Path, rows: pd.DataFrame, name: str, text: str | None) -> pd.DataFrame:
+    if text is None or (text == "" and name in rows):
+        return rows
+    if name not in rows:
+        return rows.assign(**{name: text})
+    chosen = rows[rows[name] == text]
+    if chosen.empty:
+        raise InputError(
+            f"{shown(path)}: expected rows with {name} {text!r}, got only {', '.join(rows[name].unique())}; correct "
+            f"`{name}` in the observation."
+        )
+    return chosen

@@ -1,6 +1,7 @@
 """Quality control of a section: which verticals cannot be trusted, and why. Nothing is dropped here."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.profile import Array
 
@@ -11,11 +12,17 @@ FEWEST = 3  # points; with fewer a slow vertical at the water's edge cannot be t
 
 
 def dead_probes(
-    position: Array, edges: tuple[float, float], points: Array, largest: Array, mean: Array, deviation: Array, plants: Array
+    edges: tuple[float, float],
+    position: Array,
+    points: NDArray[np.int64],
+    largest: Array,
+    mean: Array,
+    deviation: Array,
+    plants: NDArray[np.bool_],
 ) -> list[str]:
     """'' or the reason, for each vertical: near zero at every height where its neighbours are not, and no turbulence.
 
-    position (n,) and edges: y of the verticals and of the water's edges [m], where velocity and turbulence are zero;
+    edges and position (n,): y of the water's edges, where velocity and turbulence are zero, and of the verticals [m];
     points: how many; largest and mean: of |u| and u over the points [m/s]; deviation: median of u_std [m/s], NaN when
     unknown, and then a vertical inside plants (bool) gets the benefit of the doubt, since slow water is natural there.
 
@@ -27,10 +34,10 @@ def dead_probes(
     expected_mean = _between_neighbours(position, edges, mean, ~suspect)
     expected_deviation = _between_neighbours(position, edges, deviation, ~suspect)
     unknown = np.isnan(deviation) | np.isnan(expected_deviation)
-    calm = np.where(unknown, ~plants.astype(bool), deviation < CALM * expected_deviation)
+    calm = np.where(unknown, ~plants, deviation < CALM * expected_deviation)
     dead = suspect & calm & (largest < SHARE * expected_mean)
     return [
-        f"near zero at all {points[i]:.0f} heights (at most {largest[i]:.3f} m/s, where its neighbours give "
+        f"near zero at all {points[i]} heights (at most {largest[i]:.3f} m/s, where its neighbours give "
         f"{expected_mean[i]:.2f} m/s{_turbulence(deviation[i], expected_deviation[i])}): the probe is taken for dead"
         if dead[i]
         else ""
@@ -39,9 +46,10 @@ def dead_probes(
 
 
 def _turbulence(deviation: float, expected: float) -> str:
-    return "" if np.isnan(deviation) or np.isnan(expected) else f", and fluctuating by {deviation:.3f} against {expected:.3f} m/s"
+    known = np.isfinite(deviation) and np.isfinite(expected)
+    return f", and fluctuating by {deviation:.3f} against {expected:.3f} m/s" if known else ""
 
 
-def _between_neighbours(position: Array, edges: tuple[float, float], value: Array, good: Array) -> Array:
+def _between_neighbours(position: Array, edges: tuple[float, float], value: Array, good: NDArray[np.bool_]) -> Array:
     nodes = np.concatenate([[edges[0]], position[good], [edges[1]]])
     return np.interp(position, nodes, np.concatenate([[0.0], value[good], [0.0]]))

@@ -67,7 +67,7 @@ def slope(bed: Levels, grid: Grid) -> Levels:
 
 
 def bed_levels(case: Case, grid: Grid) -> Levels:
-    """Bed level of the case (nx, ny) at the points of any grid, its own or a finer one [m]; InputError where there is none."""
+    """Bed level of the case (nx, ny) at the points of any grid [m]; InputError where there is none."""
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     for layer in case.bed:
         level = _layer(layer, grid, case.grid.x[0])

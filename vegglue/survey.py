@@ -1,6 +1,5 @@
 """The plant survey to the rigid-cylinder estimate of phi, with its uncertainty by Monte Carlo."""
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from vegglue.errors import InputError
 from vegglue.schema import Survey
+from vegglue.table import read_table, refuse_repeated, refuse_rows, shown
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ DRAG_COEFFICIENT = 1.0  # the paper's choice for submerged plants, after Wunder 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One row of the survey: mean, standard deviation between plants and number of plants, in SI; 0 and 1 if unknown."""
+    """One row of the survey: mean, standard deviation between plants (0 if unknown) and number of plants, in SI."""
 
     mean: float
     standard_deviation: float
@@ -40,7 +40,7 @@ class Quantity:
 class RigidCylinder:
     """phi [-] of a stand of rigid cylinders: its draws and what they amount to.
 
-    `parts` are the means of stems, branches and undergrowth [-]; `assumption` says in one sentence what Table 1 leaves open.
+    `parts` are the means of stems, branches and undergrowth [-]; `assumption` says what was not surveyed.
     """
 
     draws: Array
@@ -63,55 +63,38 @@ class RigidCylinder:
 
 
 def read_survey(path: Path) -> dict[str, Quantity]:
-    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV by quantity.
+    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV, by quantity; one row for each of QUANTITIES.
 
-    Raises InputError naming the file and row for a missing file or quantity, and for numbers that are no such thing.
+    Raises InputError naming the file and row for what is missing, unknown, repeated, or not positive.
     """
-    try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected the CSV of a plant survey, which cannot be read ({error}).") from error
-    result = {row.get("quantity", ""): _quantity(path, number, row) for number, row in enumerate(rows, start=2)}
-    missing = [name for name in QUANTITIES if name not in result]
-    if missing or len(rows) != len(QUANTITIES):
+    rows = read_table(path, ("quantity",), ("mean", "standard_deviation", "samples"))
+    known = ", ".join(QUANTITIES)
+    refuse_rows(path, ~rows["quantity"].isin(QUANTITIES), f"expected one of the quantities {known}")
+    refuse_repeated(path, rows, ("quantity",))
+    refuse_rows(path, rows["mean"] <= 0.0, "expected a mean above 0; mend the row")
+    refuse_rows(path, rows["standard_deviation"] < 0.0, "expected a standard deviation of at least 0; mend the row")
+    refuse_rows(path, rows["samples"] < 1.0, "expected at least 1 sample; mend the row")
+    missing = [name for name in QUANTITIES if name not in set(rows["quantity"])]
+    if missing:
         raise InputError(
-            f"{path}: expected one row for each of {', '.join(QUANTITIES)}, but there are {len(rows)} rows"
-            f"{' without ' + ', '.join(missing) if missing else ''}; add what is missing and remove the rest."
+            f"{shown(path)}: expected a row for each of {known}, got none for {', '.join(missing)}; add it."
         )
-    return result
-
-
-def _quantity(path: Path, number: int, row: dict[str, str]) -> Quantity:
-    try:
-        quantity = Quantity(
-            float(row["mean"]), float(row["standard_deviation"] or 0.0), int(row["samples"] or 1)
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{path}, row {number}: expected quantity,mean,standard_deviation,samples with numbers in the last three, "
-            f"got {list(row.values())}; mend the row."
-        ) from error
-    values = (quantity.mean, quantity.standard_deviation)
-    if not all(map(math.isfinite, values)) or quantity.mean <= 0 or quantity.standard_deviation < 0 or quantity.samples < 1:
-        raise InputError(
-            f"{path}, row {number}: expected a mean above 0, a standard deviation of at least 0 and at least 1 sample, "
-            f"got {list(row.values())}; mend the row."
-        )
-    return quantity
+    columns = (rows["quantity"], rows["mean"], rows["standard_deviation"], rows["samples"])
+    return {name: Quantity(mean, error, int(samples)) for name, mean, error, samples in zip(*columns, strict=True)}
 
 
 def rigid_cylinder(survey: dict[str, Quantity], choice: Survey, draws: int = 20000, seed: int = 1) -> RigidCylinder:
     """phi = C_d m (D_s h_s + b D_b (h_w - h_s)) min(h_d / h_w, 1) + C_d m_u D_u min(h_u, h_d).
 
-    m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the willow height h_w, bent rigidly at
-    the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_w), and m_u stems of undergrowth of
-    diameter D_u and height h_u, which stay upright [m]; C_d = 1. No foliage.
+    m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the willow height h_w, bent rigidly
+    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_w; upright when
+    `choice.deflected_height` is not given), and m_u stems of undergrowth of diameter D_u and height h_u, which stay
+    upright [m]; C_d = 1. No foliage.
 
-    Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays positive.
-    `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the paper's +- is), `mean`
-    uses the error of the mean over the sampled plants. The density m_u was not surveyed: it is log-uniform between
-    `choice.undergrowth_density` [1/m2], an assumption of the user, and no undergrowth when that is not given.
+    Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
+    positive. `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the paper's +-
+    must be), `mean` uses the error of the mean over the sampled plants. The density m_u was not surveyed: it is
+    log-uniform between `choice.undergrowth_density` [1/m2], an assumption of the user; without it, no undergrowth.
 
     Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
     bending after Verschoren et al. (2016).
@@ -129,11 +112,8 @@ def rigid_cylinder(survey: dict[str, Quantity], choice: Survey, draws: int = 200
     covered = np.minimum(drawn["undergrowth_height"], deflected)
     undergrowth = DRAG_COEFFICIENT * density * drawn["undergrowth_diameter"] * covered
     parts = {"stems": stems, "branches": branches, "undergrowth": undergrowth}
-    assumption = (
-        f"The density of the undergrowth was not surveyed and is assumed log-uniform between {low:g} and {high:g} stems/m2."
-        if high > 0.0
-        else "No undergrowth is counted."
-    )
+    assumed = f"is assumed log-uniform between {low:g} and {high:g} stems/m2."
+    assumption = f"The density of the undergrowth was not surveyed and {assumed}" if high > 0.0 else "No undergrowth."
     return RigidCylinder(
         stems + branches + undergrowth, {name: float(part.mean()) for name, part in parts.items()}, assumption
     )
