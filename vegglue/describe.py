@@ -41,8 +41,8 @@ def _ensemble(posterior: Posterior) -> list[str]:
 def _worth(posterior: Posterior) -> list[str]:
     size = f"{posterior.effective_size:.3g}"
     sentences = [
-        f"The weights are worth {size} equal members; the largest weight is {posterior.largest_weight:.2g}, the index of "
-        f"their tail k-hat {posterior.pareto_k:.2g} (to be trusted below {HEAVY_TAIL})."
+        f"The weights are worth {size} equal members; the largest weight is {posterior.largest_weight:.2g}, the index "
+        f"of their tail k-hat {posterior.pareto_k:.2g} (to be trusted below {HEAVY_TAIL})."
     ]
     if posterior.effective_size < CLAIMED_FROM:
         sentences.append(

@@ -8,7 +8,7 @@ any moment leaves a file that opens.
 import errno
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -174,7 +174,7 @@ def _write_group(file: h5py.File, name: str, content: Group) -> None:
     group = file.create_group(name, track_order=True)
     clash = sorted(set(content.coordinates) & set(content.variables))
     if clash:
-        raise InputError(f"{file.filename}, group {name}: {clash} are names of dimensions; rename the parameter.")
+        raise InputError(f"parameters: {clash} are names of dimensions of the group {name}; rename them.")
     for dim, values in content.coordinates.items():
         _dataset(group, dim, values).make_scale(dim)
     for key, variable in content.variables.items():
@@ -217,15 +217,26 @@ def _write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[st
     Errors: StorageError when it cannot be written; a file of that name from before stays as it was.
     """
     new = path.with_name(path.name + ".new")
+    image = _image(groups, attributes)  # in memory: on a full disk the HDF5 library crashes instead of raising
     try:
         with _told_as_storage_error(path):
-            with h5py.File(new, "w") as file:
-                file.attrs.update(attributes)
-                for name, content in groups.items():
-                    _write_group(file, name, content)
+            with new.open("wb") as file:
+                file.write(image)
+                file.flush()
+                os.fsync(file.fileno())
             os.replace(new, path)
     finally:
-        new.unlink(missing_ok=True)
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
+
+
+def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs.update(attributes)
+        for name, content in groups.items():
+            _write_group(file, name, content)
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 @contextmanager
