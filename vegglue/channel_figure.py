@@ -47,7 +47,14 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     for patch in case.plants.patches:
         x, y = corners(patch).mean(axis=0)
         label(reach, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
-    reach.legend(handles=_legend(case, site, observations), loc="lower left", ncols=7, fontsize=SMALL, framealpha=1)
+    reach.legend(
+        handles=_legend(case, site, observations),
+        loc="lower left",
+        ncols=7,
+        fontsize=SMALL,
+        framealpha=1,
+        facecolor=COLOUR["paper"],
+    )
     _draw_section(across, case, site, 0.5 * (low + high))
     return figure
 
