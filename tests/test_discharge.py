@@ -51,12 +51,19 @@ def test_conveyance_rule_is_exact_for_a_constant_froude_number_whatever_the_vert
     assert weights @ (0.2 * np.sqrt(depth)) == pytest.approx(exact, rel=1e-9)
 
 
-def test_neighbour_error_is_the_noise_on_a_straight_profile():
+def test_neighbour_error_is_the_noise_on_a_smooth_profile():
     position = np.cumsum(np.random.default_rng(1).uniform(0.2, 0.6, 400))
-    straight = 0.1 + 0.3 * position
-    assert neighbour_error(position, straight) == pytest.approx(0.0, abs=1e-9)
+    smooth = 0.1 + 0.3 * position - 0.002 * position**2 + 1e-5 * position**3
+    assert neighbour_error(position, smooth) == pytest.approx(0.0, abs=1e-9)
     noise = np.random.default_rng(2).normal(0.0, 0.03, position.size)
-    assert neighbour_error(position, straight + noise) == pytest.approx(0.03, rel=0.15)
+    assert neighbour_error(position, smooth + noise) == pytest.approx(0.03, rel=0.15)
+
+
+def test_neighbour_error_of_few_verticals_takes_the_straight_line():
+    position, straight = np.array([0.0, 1.0, 3.0]), np.array([0.0, 1.0, 3.0])
+    assert neighbour_error(position, straight) == pytest.approx(0.0, abs=1e-12)
+    lifted = straight + np.array([0.0, 0.1, 0.0])
+    assert neighbour_error(position, lifted) == pytest.approx(0.1 / np.sqrt(1.0 + (2 / 3) ** 2 + (1 / 3) ** 2))
     assert np.isnan(neighbour_error(position[:2], straight[:2]))
 
 

@@ -39,7 +39,7 @@ def test_every_vertical_is_a_station_and_only_the_dead_probe_is_not_used(name, v
     assert list(table.index) == list(range(verticals))
     assert table["used"].sum() == used
     assert (table["used"] == (table["reason"] == "")).all()
-    assert table["standard_error"].between(0.0005, 0.02).all()
+    assert table["standard_error"].between(0.01, 0.05).all()
 
 
 def test_dead_probe_is_flagged_and_kept_with_all_its_points():
@@ -78,9 +78,13 @@ def test_discharge_is_the_known_one_within_its_error(name, rule):
 
 
 def test_neighbours_tell_the_error_that_was_put_on_every_vertical():
-    """0.8 of the paper's sigma, which no single vertical shows; D3b has too few verticals for it."""
-    assert READ["d0"].neighbour_error[KEY["d0"]] == pytest.approx(0.8 * 0.039, rel=0.35)
-    assert READ["d3a"].neighbour_error[KEY["d3a"]] == pytest.approx(0.8 * 0.024, rel=0.35)
+    """0.8 of the paper's sigma, which the points of a single vertical do not show."""
+    for name, sigma in {"d0": 0.039, "d3a": 0.024, "d3b": 0.030}.items():
+        error = READ[name].neighbour_error[KEY[name]]
+        assert error == pytest.approx(0.8 * sigma, rel=0.35)
+        used = READ[name].table.query("used")
+        assert np.sqrt((used["standard_error"] ** 2).mean()) == pytest.approx(error, rel=1e-6)
+        assert (READ[name].profiles["fitted_error"].max()) < error
 
 
 @pytest.mark.parametrize(("name", "height"), [("d3a", 0.8), ("d3b", 1.06)])
@@ -94,12 +98,11 @@ def test_rule_of_the_case_gives_the_value_and_its_error():
     profiles = READ["d3a"].profiles
     by_profile = read_observations(changed(CASES["d3a"], average="profile")).table
     assert np.array_equal(by_profile["value"], profiles["fitted"])
-    assert np.array_equal(by_profile["standard_error"], profiles["fitted_error"])
     assert np.array_equal(READ["d3a"].table["value"], profiles["linear"])
     difference = profiles["linear"] - profiles["fitted"]
-    assert READ["d3a"].table["standard_error"].to_numpy() == pytest.approx(
-        np.hypot(profiles["linear_error"], difference / np.sqrt(3.0))
-    )
+    own = {"fitted": profiles["fitted_error"], "linear": np.hypot(profiles["linear_error"], difference / np.sqrt(3.0))}
+    for table, error in ((by_profile, own["fitted"]), (READ["d3a"].table, own["linear"])):
+        assert np.ptp(table["standard_error"] ** 2 - error**2) == pytest.approx(0.0, abs=1e-12)
     given = read_observations(changed(CASES["d3a"], standard_error=0.024)).table
     assert set(given["standard_error"]) == {0.024}
 

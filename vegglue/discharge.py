@@ -34,8 +34,8 @@ class CrossSection:
 class Discharge:
     """Discharge and its standard error [m3/s], and what the error is made of.
 
-    sampling: of the verticals, from their own standard errors; spacing: of few verticals, from how badly each is told
-    by its neighbours (this contains the sampling error); rule: of the profile assumed where nothing was measured.
+    sampling: of the verticals, from their own standard errors; spacing: from how badly each is told by its neighbours
+    (this contains the sampling error); rule: of the profile assumed where nothing was measured.
     standard_error^2 = max(sampling, spacing)^2 + rule^2.
     """
 
@@ -91,17 +91,30 @@ def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> 
 
 
 def neighbour_error(position: Array, average: Array) -> float:
-    """s^2 = mean((U_i - w U_{i-1} - (1 - w) U_{i+1})^2 / (1 + w^2 + (1 - w)^2)): the error of one vertical [m/s].
+    """s^2 = mean((U_i - sum_j w_j U_j)^2 / (1 + sum_j w_j^2)): the error of one vertical, told by its neighbours [m/s].
 
-    The interpolated variance estimator; w by distance. True curvature across the channel counts as error, so it is
-    on the safe side where there are patch edges. NaN below three verticals.
-    Source: Cohn, Kiang and Mason (2013), doi 10.1061/(ASCE)HY.1943-7900.0000695.
+    w are the weights of the cubic through the two nearest verticals on either side at position_i (of the straight line
+    through the nearest ones when there are fewer than five), so that smooth curvature across the channel does not count
+    as error; jumps, as at the edge of plants, do. NaN below three verticals.
+    Source: the interpolated variance estimator of Cohn, Kiang and Mason (2013), doi
+    10.1061/(ASCE)HY.1943-7900.0000695, which takes the straight line.
     """
-    if len(position) < 3:
+    count = len(position)
+    reach = 2 if count >= 5 else 1
+    if count < 3:
         return float("nan")
-    left = (position[2:] - position[1:-1]) / (position[2:] - position[:-2])
-    miss = average[1:-1] - left * average[:-2] - (1.0 - left) * average[2:]
-    return float(np.sqrt(np.mean(miss**2 / (1.0 + left**2 + (1.0 - left) ** 2))))
+    squares = []
+    for index in range(reach, count - reach):
+        others = np.r_[index - reach : index, index + 1 : index + reach + 1]
+        weights = _lagrange(position[others], position[index])
+        squares.append((average[index] - weights @ average[others]) ** 2 / (1.0 + weights @ weights))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _lagrange(nodes: Array, at: float) -> Array:
+    """Weights (nodes,) which give the polynomial through the nodes at one place."""
+    gaps = nodes[:, None] - nodes + np.eye(len(nodes))
+    return np.prod(np.where(np.eye(len(nodes), dtype=bool), 1.0, at - nodes) / gaps, axis=1)
 
 
 def combine(value: float, sampling: float, spacing: float, rule: float) -> Discharge:

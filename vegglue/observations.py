@@ -30,8 +30,8 @@ class Observations:
     and linear_error (the paper's rule), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
     scatter (see profile.ProfileFit; NaN without a fit), used, reason.
     discharge: by (experiment, section), then by rule, `paper` and `profile`.
-    neighbour_error: by (experiment, section), how far one vertical is off its neighbours [m/s]. Larger than its own
-    standard error, it holds what repeats do not show (position, stems), and true curvature across the channel.
+    neighbour_error: by (experiment, section), the error of one vertical as its neighbours tell it [m/s]. Larger than
+    the error of its own points, it holds what these do not show (position, stems); part of standard_error in table.
     canopy_height: by (experiment, section), where verticals stand inside plants.
     """
 
@@ -60,7 +60,7 @@ def read_observations(case: Case) -> Observations:
                     f"observations of it; take one out of the case."
                 )
             sections[key] = read_section(case, observation)
-            stations.append(_averaged(sections[key].profiles, observation))
+            stations.append(_averaged(sections[key], observation))
         else:
             stations.append(_read_stations(case, observation))
     return Observations(
@@ -84,9 +84,16 @@ def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(STATION))
 
 
-def _averaged(profiles: pd.DataFrame, observation: Observation) -> pd.DataFrame:
-    """Stations from the verticals of a section, by the rule the case has chosen."""
-    value, error = average_of(profiles, str(observation.average))
+def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
+    """Stations from the verticals of a section, by the rule the case has chosen.
+
+    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0) with s the error told by the neighbours: the points of a vertical
+    cannot show that it stands beside a stem or a hand's breadth off. One given in the case takes the place of this.
+    """
+    profiles = section.profiles
+    value, own = average_of(profiles, str(observation.average))
+    hidden = np.nan_to_num(section.neighbour_error**2 - (own[profiles["used"]] ** 2).mean())
+    error = np.hypot(own, np.sqrt(max(hidden, 0.0)))
     if observation.standard_error is not None:
         error = pd.Series(observation.standard_error, index=profiles.index)
     return profiles.assign(kind="velocity", value=value, standard_error=error)[list(STATION)]
