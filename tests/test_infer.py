@@ -260,6 +260,17 @@ def test_insensitive_parameter_is_not_identified_and_hits_no_bound() -> None:
     assert any(sentence.startswith("c is not identified") for sentence in describe(posterior))
 
 
+def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
+    near = hits = 0
+    for seed in range(20):
+        value = DESIGN @ TRUTH + SIGMA * np.random.default_rng(seed).standard_normal(len(DESIGN))
+        posterior = infer(stations(value * [1, 1, 1, 0, 0]), DESIGN * [1, 1, 0], members=150)
+        near += int(np.sum(posterior.bound_mass["c"] > 0.05))
+        hits += int(np.sum(posterior.bound_hit["c"]))
+    assert near > 2  # with some 14 effective members, a twentieth of the mass lies there now and then
+    assert hits == 0
+
+
 @pytest.mark.parametrize(("true_a", "side", "word"), [(0.0, 0, "lower"), (1.0, 1, "upper")])
 def test_parameter_at_a_bound_is_named(true_a: float, side: int, word: str) -> None:
     design = SIGMA * np.diag(1 / np.array([0.05, 0.1, 0.2]))

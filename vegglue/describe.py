@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from vegglue.posterior import IDENTIFIED_BELOW, NEAR_BOUND, PRESSES_ABOVE, Posterior
+from vegglue.posterior import IDENTIFIED_BELOW, NEAR_BOUND, Posterior
 
 CLAIMED_FROM = 100  # effective members; below, no posterior is claimed
 HEAVY_TAIL = 0.7  # of pareto_k, above which weighted means are not to be trusted
@@ -27,12 +27,11 @@ def describe(posterior: Posterior) -> list[str]:
 def _ensemble(posterior: Posterior) -> list[str]:
     rule = "the root mean square residual of the best member" if posterior.sigma_rule == "best-member" else "known"
     sigma = " and ".join(f"{value:.3g} {UNIT_OF_KIND[kind]} for {kind}" for kind, value in posterior.sigma.items())
-    failed = f"{posterior.failed} of them failed and have no weight" if posterior.failed else "none of them failed"
     threshold = ""
     if math.isfinite(posterior.threshold):
         threshold = f", {posterior.weighed} of them with weight (efficiency at least {posterior.threshold:g})"
     return [
-        f"{posterior.members} members; {failed}.",
+        f"{posterior.members} members, {posterior.failed or 'none'} of them failed (no weight).",
         f"Weighed by the {posterior.likelihood} likelihood over {posterior.used} of {len(posterior.station)} stations"
         f"{threshold}; sigma is {sigma} ({rule}).",
     ]
@@ -58,7 +57,7 @@ def _parameter(posterior: Posterior, name: str) -> list[str]:
     logarithm = ""
     if name in posterior.log10_median:
         logarithm = f" = 10^({posterior.log10_median[name]:.2f} ± {posterior.log10_sd[name]:.2f})"
-    ratio = f"{100 * posterior.width_ratio[name]:.2g} % of the prior's"
+    ratio = f"{100 * posterior.width_ratio[name]:.0f} % of the prior's"
     if not posterior.identified[name]:
         return [
             f"{name} is not identified: its 95 % range, {low:.3g} to {high:.3g} {unit}".rstrip()
@@ -75,7 +74,7 @@ def _bounds(posterior: Posterior, name: str) -> list[str]:
     hits = [side for side, hit in zip(sides, posterior.bound_hit[name], strict=True) if hit]
     return [
         f"{name} presses against the {side} bound of its prior, {bound:.3g}: {mass:.2g} of the posterior lies within "
-        f"{100 * NEAR_BOUND:g} % of the prior's range of it (reported above {PRESSES_ABOVE:g})."
+        f"{100 * NEAR_BOUND:g} % of the prior's range of it ({NEAR_BOUND:g} if the data said nothing)."
         for side, bound, mass in hits
     ]
 

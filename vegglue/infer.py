@@ -124,7 +124,7 @@ def _marginals(ensemble: Ensemble, case: Case, weights: Floats) -> dict[str, Any
         "identified": {name: ratio[name] < IDENTIFIED_BELOW for name in theta},
         "bounds": {name: quantile(priors[name], (0.0, 1.0)) for name in theta},
         "bound_mass": mass,
-        "bound_hit": {name: mass[name] > PRESSES_ABOVE for name in theta},
+        "bound_hit": {name: mass[name] > _pressing_mass(effective_size(weights)) for name in theta},
     }
 
 
@@ -159,6 +159,11 @@ def _mass_near_bounds(seen: Floats, weights: Floats, prior: Parameter) -> Floats
     if not np.isfinite(near):
         return np.full(2, np.nan)
     return np.array([weights[seen < low + near].sum(), weights[seen > high - near].sum()])
+
+
+def _pressing_mass(effective: float) -> float:
+    """Mass near a bound that is not chance: three standard errors above what a parameter left at its prior has [-]."""
+    return max(PRESSES_ABOVE, NEAR_BOUND + 3 * math.sqrt(NEAR_BOUND * (1 - NEAR_BOUND) / effective))
 
 
 def _predictions(ensemble: Ensemble, fit: Fit, weights: Floats, station: pd.DataFrame) -> dict[str, Any]:
