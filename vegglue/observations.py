@@ -87,8 +87,8 @@ def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
 def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
     """Stations from the verticals of a section, by the rule the case has chosen.
 
-    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0) with s the error told by the neighbours: points cannot show that
-    their vertical stands beside a stem, or a hand's breadth off. An error given in the case takes the place of this.
+    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0) with s the error told by the neighbours: points cannot show
+    that their vertical stands beside a stem, or a hand's breadth off. An error given in the case replaces this.
     """
     profiles = section.profiles
     value, own = average_of(profiles, str(observation.average))
