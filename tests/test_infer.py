@@ -267,7 +267,7 @@ def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
         posterior = infer(stations(value * [1, 1, 1, 0, 0]), DESIGN * [1, 1, 0], members=150)
         near += int(np.sum(posterior.bound_mass["c"] > 0.05))
         hits += int(np.sum(posterior.bound_hit["c"]))
-    assert near > 2  # with some 14 effective members, a twentieth of the mass lies there now and then
+    assert near > 0  # some 15 effective members: chance alone puts more than 0.05 there, or this test shows nothing
     assert hits == 0
 
 
