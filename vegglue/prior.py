@@ -19,6 +19,11 @@ def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(_distribution(prior).ppf(probability), dtype=np.float64)
 
 
+def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
+    """F(x) = P(X <= x), the inverse of `quantile` [-]."""
+    return np.asarray(_distribution(prior).cdf(value), dtype=np.float64)
+
+
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
     """x_ij = F_j^-1(s_ij) with s the scrambled Sobol' sequence; one array (members,) per parameter [unit of the prior].
 

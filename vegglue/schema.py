@@ -237,7 +237,7 @@ class Survey(Part):
 
 
 class Numerics(Part):
-    film_depth: Positive = Field(default=0.002, description="depth that stays on dry cells [m]")
+    film_depth: Positive = Field(default=0.01, description="depth at the waterline, a tenth of it on dry land [m]")
     bank_argument_minimum: Annotated[Number, Field(gt=1)] = Field(default=1.3, description="floor of 12 h/k_s [-]")
     emergent: Literal["constant", "proportional"] = Field(
         default="constant", description="phi or phi h/h_d where h < h_d"

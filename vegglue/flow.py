@@ -1,0 +1,213 @@
+"""The nouns of the flow: a Problem (everything the equations need), a State (what they are solved for), their residual.
+
+    dh/dt + d(hu)/dx + d(hv)/dy = 0
+    du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
+
+with k = g / (C^2 h) [1/m] from the friction laws. A state of m members is one array (nx, 3, ny, m): level at cell centres,
+v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the east face of each cell.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue import kernels
+
+Array = NDArray[np.float64]
+LEVEL, ACROSS, ALONG = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Inflow:
+    """Discharge [m3/s] of each member through the cells start..stop-1 of one side ('west', 'south' or 'north')."""
+
+    side: str
+    start: int
+    stop: int
+    discharge: Array
+    by_conveyance: bool = True
+
+
+@dataclass(frozen=True)
+class Plants:
+    """Vegetated cells (column, row) and their Baptist values per cell and member: phi [-], h_d [m], C_b [m^1/2/s]."""
+
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
+    phi: Array
+    canopy_height: Array
+    bare_chezy: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One experiment for m members on one grid: bed (nx, ny) [m], friction classes, plants, boundaries, viscosity [m2/s]."""
+
+    dx: float
+    dy: float
+    bed: Array
+    friction_class: NDArray[np.int64]
+    law: NDArray[np.int64]
+    coefficient: Array
+    plants: Plants
+    viscosity: Array
+    inflows: tuple[Inflow, ...]
+    outlet: NDArray[np.bool_]
+    outlet_level: Array
+    film: float = 0.01
+    log_argument_minimum: float = 1.3
+    phi_proportional: bool = False
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.bed.shape[0], self.bed.shape[1]
+
+    @property
+    def members(self) -> int:
+        return self.outlet_level.size
+
+
+@dataclass(frozen=True)
+class Faces:
+    """What a state means on the grid: depths [m] at cells, faces, corners; velocities [m/s] and fluxes [m2/s] on faces."""
+
+    level: Array
+    cell: Array
+    face_x: Array
+    face_y: Array
+    corner: Array
+    u: Array
+    v: Array
+    flux_x: Array
+    flux_y: Array
+
+
+@dataclass(frozen=True)
+class FlowFields:
+    """One member at cell centres, (nx, ny): bed and level [m], depth [m], u and v [m/s]; NaN where dry."""
+
+    x: Array
+    y: Array
+    bed: Array
+    depth: Array
+    level: Array
+    u: Array
+    v: Array
+
+
+def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
+    """The same problem for some of its members (an index array; an index may repeat)."""
+    pick = lambda values: np.ascontiguousarray(values[..., members])  # noqa: E731
+    plants = problem.plants
+    return replace(
+        problem,
+        coefficient=pick(problem.coefficient),
+        plants=replace(
+            plants, phi=pick(plants.phi), canopy_height=pick(plants.canopy_height), bare_chezy=pick(plants.bare_chezy)
+        ),
+        viscosity=pick(problem.viscosity),
+        inflows=tuple(replace(inflow, discharge=pick(inflow.discharge)) for inflow in problem.inflows),
+        outlet_level=pick(problem.outlet_level),
+    )
+
+
+def crop(problem: Problem, south: int, north: int) -> Problem:
+    """The rows south..north-1 of a problem, with walls beside them; inflows through a side cut off must not exist."""
+    plants = problem.plants
+    inside = (plants.row >= south) & (plants.row < north)
+    kept = Plants(
+        plants.column[inside],
+        plants.row[inside] - south,
+        plants.phi[inside],
+        plants.canopy_height[inside],
+        plants.bare_chezy[inside],
+    )
+    rows = north - south
+    inflows = tuple(
+        replace(inflow, start=max(inflow.start - south, 0), stop=min(inflow.stop - south, rows))
+        if inflow.side == "west"
+        else inflow
+        for inflow in problem.inflows
+    )
+    return replace(
+        problem,
+        bed=np.ascontiguousarray(problem.bed[:, south:north]),
+        friction_class=np.ascontiguousarray(problem.friction_class[:, south:north]),
+        plants=kept,
+        inflows=inflows,
+        outlet=problem.outlet[south:north],
+    )
+
+
+def _spread(inflow: Inflow, depth: Array, width: float) -> Array:
+    """Flux q = Q w / (sum w * width) [m2/s] with w = h^(5/3) (conveyance) or 1; depth (cells of the segment, m)."""
+    weight = depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)
+    return inflow.discharge * weight / (weight.sum(axis=0) * width)
+
+
+def faces(problem: Problem, state: Array) -> Faces:
+    """Depths, velocities and fluxes of a state (nx, 3, ny, m), boundaries included."""
+    nx, _, ny, m = state.shape
+    level = np.ascontiguousarray(state[:, LEVEL])
+    cell, face_x, face_y, corner = kernels.depths(level, problem.bed, problem.outlet_level, problem.film)
+    u, v = np.empty((nx + 1, ny, m)), np.empty((nx, ny + 1, m))
+    u[1:], v[:, :ny] = state[:, ALONG], state[:, ACROSS]
+    u[0], v[:, 0], v[:, ny] = 0.0, 0.0, 0.0
+    for inflow in problem.inflows:
+        part = slice(inflow.start, inflow.stop)
+        if inflow.side == "west":
+            u[0, part] += _spread(inflow, face_x[0, part], problem.dy) / face_x[0, part]
+        elif inflow.side == "south":
+            v[part, 0] += _spread(inflow, face_y[part, 0], problem.dx) / face_y[part, 0]
+        else:
+            v[part, ny] -= _spread(inflow, face_y[part, ny], problem.dx) / face_y[part, ny]
+    return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
+
+
+def drag(problem: Problem, depth: Array) -> Array:
+    """Friction k = g / (C^2 h) [1/m] at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m]."""
+    rate = kernels.class_drag(
+        depth, problem.friction_class, problem.law, problem.coefficient, problem.log_argument_minimum
+    )
+    plants = problem.plants
+    kernels.plant_drag(
+        rate,
+        depth,
+        plants.column,
+        plants.row,
+        plants.phi,
+        plants.canopy_height,
+        plants.bare_chezy,
+        problem.phi_proportional,
+    )
+    return rate
+
+
+def residual(problem: Problem, state: Array) -> Array:
+    """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
+    wet = faces(problem, state)
+    rough = drag(problem, wet.cell)
+    viscosity = np.broadcast_to(problem.viscosity, wet.cell.shape)
+    viscosity = np.ascontiguousarray(viscosity)
+    force = np.zeros((2, *wet.cell.shape))
+    rates = np.empty_like(state)
+    shared = (wet.cell, wet.face_x, wet.face_y, wet.flux_x, wet.flux_y, wet.corner, rough, viscosity, force)
+    kernels.continuity(rates[:, LEVEL], wet.flux_x, wet.flux_y, problem.dx, problem.dy)
+    kernels.momentum_y(
+        rates[:, ACROSS], wet.level, wet.u, wet.v, *shared, problem.film, problem.dx, problem.dy
+    )
+    kernels.momentum_x(
+        rates[:, ALONG],
+        wet.level,
+        wet.u,
+        wet.v,
+        *shared,
+        problem.outlet,
+        problem.outlet_level,
+        problem.film,
+        problem.dx,
+        problem.dy,
+    )
+    rates[:, ACROSS, 0] = state[:, ACROSS, 0]
+    return rates

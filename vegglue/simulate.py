@@ -1,0 +1,147 @@
+"""config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
+
+A chunk is what one task solves: neighbours in the prior, the same set whatever the number of jobs, so that results are too.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+
+from vegglue import __version__
+from vegglue.config import resolved_yaml, simulation_hash
+from vegglue.ensemble import FAILED, Header
+from vegglue.neighbourhood import SIZE, leaves, solve_members
+from vegglue.observations import Observations
+from vegglue.prior import probability, quantile, sample_prior
+from vegglue.problem import build_problem
+from vegglue.schema import Case
+from vegglue.sensor import read_sensors
+from vegglue.site import Site, build_site
+from vegglue.store import ensemble_writer
+
+LEAVES_IN_A_CHUNK = 8
+Rows = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is: members solved of all, failed among them, members already there at the start."""
+
+    solved: int
+    members: int
+    failed: int
+    resumed: int
+
+
+def simulate(
+    case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]
+) -> None:
+    """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
+
+    Errors: StorageError when another run holds the folder or the disk is full (what was written stays).
+    """
+    site = build_site(case)
+    theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
+    places = unit_places(case, theta)
+    chunks = leaves(places, SIZE * LEAVES_IN_A_CHUNK)
+    header = make_header(case, observations, theta, len(chunks))
+    with ensemble_writer(path, header) as writer:
+        todo = [index for index in range(len(chunks)) if index not in writer.done]
+        resumed = sum(chunks[index].size for index in writer.done)
+        solved, failed = resumed, 0
+        report(Progress(solved, len(places), failed, resumed))
+        for index, rows in _solve_all(case, site, observations, places, chunks, todo, jobs):
+            writer.append(index, chunks[index], rows)
+            solved, failed = solved + chunks[index].size, failed + int((rows["status"] == FAILED).sum())
+            report(Progress(solved, len(places), failed, resumed))
+
+
+def _solve_all(
+    case: Case,
+    site: Site,
+    observations: Observations,
+    places: np.ndarray,
+    chunks: list[np.ndarray],
+    todo: list[int],
+    jobs: int,
+) -> Iterator[tuple[int, Rows]]:
+    tasks = (delayed(_solve_numbered)(index, case, site, observations, places[chunks[index]]) for index in todo)
+    yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)(tasks)
+
+
+def _solve_numbered(
+    index: int, case: Case, site: Site, observations: Observations, places: np.ndarray
+) -> tuple[int, Rows]:
+    with threadpool_limits(1):  # one task a core: threads of linear algebra would only get in each other's way
+        return index, solve_chunk(case, site, observations, places)
+
+
+def solve_chunk(case: Case, site: Site, observations: Observations, places: np.ndarray) -> Rows:
+    """The rows of the ensemble file for members at `places` of the unit cube, every experiment of the case."""
+    station, sections = observations.table, section_places(observations)
+    members = len(places)
+    rows: Rows = {
+        "prediction": np.full((members, len(station)), np.nan),
+        "section_flow": np.full((members, len(case.experiments), len(sections)), np.nan),
+        "mass_error": np.zeros(members),
+        "status": np.zeros(members, np.int8),
+        "reason": np.full(members, "", object),
+        "iterations": np.zeros(members, np.int32),
+        "seconds": np.zeros(members),
+    }
+    for number, experiment in enumerate(case.experiments):
+        began = time.perf_counter()
+
+        def problem_of(some: np.ndarray, experiment: str = experiment):  # type: ignore[no-untyped-def]
+            return build_problem(case, site, experiment, parameters_at(case, some))
+
+        solved = solve_members(problem_of, places, case.numerics.tolerance)
+        here = (station["experiment"] == experiment).to_numpy()
+        readings = read_sensors(problem_of(places), solved.state, site.grid, station[here], sections)
+        rows["prediction"][:, here] = readings.prediction
+        rows["section_flow"][:, number] = readings.section_flow
+        rows["mass_error"] = np.maximum(rows["mass_error"], readings.mass_error)
+        rows["status"] = np.maximum(rows["status"], solved.status.astype(np.int8))
+        rows["iterations"] += solved.iterations.astype(np.int32)
+        rows["seconds"] += (time.perf_counter() - began) / members
+        for member, reason in enumerate(solved.reason):
+            if reason:
+                rows["reason"][member] = f"{rows['reason'][member]} {experiment}: {reason}".strip()
+    rows["prediction"][rows["status"] == FAILED] = np.nan
+    return rows
+
+
+def make_header(case: Case, observations: Observations, theta: dict[str, np.ndarray], chunks: int) -> Header:
+    return Header(
+        parameters=theta,
+        units={name: parameter.unit for name, parameter in case.parameters.items()},
+        station=observations.table,
+        experiments=tuple(case.experiments),
+        sections=section_places(observations),
+        chunks=chunks,
+        config=resolved_yaml(case),
+        config_hash=simulation_hash(case),
+        seed=case.simulate.seed,
+        version=__version__,
+    )
+
+
+def section_places(observations: Observations) -> tuple[tuple[str, float], ...]:
+    """Name and mean x [m] of every section a velocity was measured in."""
+    velocity = observations.table[observations.table["kind"] == "velocity"]
+    return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())
+
+
+def unit_places(case: Case, theta: dict[str, np.ndarray]) -> np.ndarray:
+    """s_j = F_j(theta_j), the members' places in the unit cube, (members, parameters)."""
+    return np.column_stack([probability(case.parameters[name], values) for name, values in theta.items()])
+
+
+def parameters_at(case: Case, places: np.ndarray) -> dict[str, np.ndarray]:
+    """theta_j = F_j^-1(s_j)."""
+    return {name: quantile(prior, places[:, j]) for j, (name, prior) in enumerate(case.parameters.items())}
