@@ -1,0 +1,86 @@
+"""One run as one page: a self-contained HTML file that needs no network, and the figures beside it as files."""
+
+import os
+from pathlib import Path
+
+import jinja2
+
+from vegglue.ensemble import Ensemble
+from vegglue.errors import StorageError
+from vegglue.figure_style import palette_css
+from vegglue.findings import findings
+from vegglue.flow import FlowFields
+from vegglue.observations import Observations
+from vegglue.pictures import pictures
+from vegglue.posterior import Posterior
+from vegglue.report_tables import facts, failures, health, members, other_rows, parameter_rows, station_rows
+from vegglue.reported import Run, is_synthetic
+from vegglue.schema import Case
+from vegglue.site import build_site
+from vegglue.summary import key_numbers, verdict
+from vegglue.survey import RigidCylinder
+
+
+def write_report(
+    run: Path,
+    case: Case,
+    observations: Observations,
+    ensemble: Ensemble,
+    posterior: Posterior,
+    flow: dict[str, FlowFields],
+    survey: RigidCylinder | None,
+) -> Path:
+    """Write run/report.html and run/figures/*.svg and *.png; returns the page.
+
+    flow: the member of the median parameters, by experiment; what is not given is left out of the page.
+    survey: the rigid-cylinder estimate of plant drag, where there is one.
+    Errors: StorageError when a file cannot be written.
+    """
+    everything = Run(run, case, build_site(case), observations, ensemble, posterior, flow, survey)
+    path = run / "report.html"
+    try:
+        page = render(everything)
+        path.with_name("report.html.new").write_text(page, encoding="utf-8")
+        os.replace(path.with_name("report.html.new"), path)
+    except OSError as error:
+        raise StorageError(f"{path}: the report cannot be written ({error}); make room and run it again.") from error
+    return path
+
+
+def render(run: Run) -> str:
+    """The whole page as text; writes the figures as files on the way."""
+    light, dark = palette_css()
+    stations = station_rows(run)
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            light=light,
+            dark=dark,
+            case=run.case,
+            synthetic=is_synthetic(run.case),
+            verdict=verdict(run.case, run.posterior),
+            numbers=key_numbers(run.case, run.posterior),
+            findings=findings(run),
+            parameters=parameter_rows(run),
+            others=other_rows(run),
+            pictures=pictures(run),
+            stations=stations,
+            flagged=[row for row in stations if row.reason],
+            members=members(run.ensemble),
+            failures=failures(run.ensemble),
+            health=list(health(run)),
+            facts=list(facts(run)),
+            config=run.ensemble.config,
+        )
+    )
+
+
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

@@ -1,0 +1,96 @@
+"""Numbers, symbols and units as they are set: for the page (HTML) and for figures (mathtext)."""
+
+import html
+import math
+import re
+
+NARROW = "\u202f"  # between a number and its unit, never broken
+FIRM = "\u00a0"  # a space where a line must not break
+MINUS = "\u2212"
+
+
+def decimals(scale: float, figures: int = 2) -> int:
+    """Decimal places that show `scale` to this many significant figures; 0 for scales above that."""
+    if not math.isfinite(scale) or scale == 0:
+        return 3
+    return max(figures - 1 - math.floor(math.log10(abs(scale)) + 1e-9), 0)
+
+
+def fixed(value: float, places: int) -> str:
+    """value with so many decimals and a true minus; an en dash where there is no number."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", MINUS)  # + 0.0 makes a negative zero positive
+
+
+def short(value: float, figures: int = 3) -> str:
+    """value to so many significant figures, never in E notation: powers of ten as 1.2·10⁻⁵."""
+    if not math.isfinite(value):
+        return "–"
+    if value != 0 and not 1e-3 <= abs(value) < 1e6:
+        power = math.floor(math.log10(abs(value)))
+        leading = fixed(value / 10**power, 1)
+        return f"{'' if leading == '1.0' else leading + '·'}10{_raised(power)}"
+    return fixed(value, decimals(value, figures) if value else 0)
+
+
+def plus_minus(value: float, sd: float) -> str:
+    """value ± sd, both to two significant figures of sd."""
+    if not math.isfinite(sd):
+        return short(value)
+    places = min(decimals(sd), 6)
+    return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
+
+
+def as_given(value: float, sd: float = math.nan) -> str:
+    """value ± sd of others with the decimals they were given with, no more."""
+    if not math.isfinite(sd):
+        return f"{value:g}".replace("-", MINUS)
+    places = max(len(f"{number:g}".partition(".")[2]) for number in (value, sd))
+    return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
+
+
+def interval(low: float, high: float) -> str:
+    """low to high, to as many decimals as their distance deserves."""
+    places = decimals((high - low) / 4) if high > low else 3
+    return f"{fixed(low, places)} to {fixed(high, places)}"
+
+
+def count(number: int, one: str, many: str | None = None) -> str:
+    """'1 member', '12 members', '5,000 members'."""
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def percent(share: float) -> str:
+    """A share as '37 %'; small ones as '0.4 %' or '< 0.1 %'."""
+    if 0 < share < 0.0005:
+        return f"<{NARROW}0.1{NARROW}%"
+    return f"{fixed(100 * share, 0 if share >= 0.0995 or share == 0 else 1)}{NARROW}%"
+
+
+def symbol_html(symbol: str) -> str:
+    """n_b as n with a lowered b, the letter slanted."""
+    letter, _, lowered = symbol.partition("_")
+    return f"<var>{html.escape(letter)}</var>" + (f"<sub>{html.escape(lowered)}</sub>" if lowered else "")
+
+
+def symbol_math(symbol: str) -> str:
+    """The same for matplotlib's mathtext."""
+    letter, _, lowered = symbol.partition("_")
+    return f"${letter}_{{{lowered}}}$" if lowered else f"${letter}$"
+
+
+def unit_html(unit: str) -> str:
+    """'s m^(-1/3)' with its powers raised; nothing for '-'."""
+    if unit in ("", "-"):
+        return ""
+    return re.sub(r"\^\(?(-?[\d/.]+)\)?", lambda power: f"<sup>{power[1].replace('-', MINUS)}</sup>", html.escape(unit))
+
+
+def unit_math(unit: str) -> str:
+    """The same for matplotlib's mathtext, with a dash for what has no unit."""
+    return re.sub(r"\^\(?(-?[\d/.]+)\)?", r"$^{\1}$", unit) if unit not in ("", "-") else "–"
+
+
+def _raised(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

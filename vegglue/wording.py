@@ -1,0 +1,46 @@
+"""Words the report says in several places: a parameter, its estimate, what the data are worth (HTML)."""
+
+import numpy as np
+
+from vegglue.posterior import Posterior
+from vegglue.schema import Case
+from vegglue.typography import NARROW, plus_minus, short, symbol_html, unit_html
+
+
+def symbol(case: Case, name: str) -> str:
+    """How a parameter is written on the page."""
+    return symbol_html(case.parameters[name].symbol or name)
+
+
+def estimate(posterior: Posterior, name: str) -> str:
+    """Median ± standard deviation, as a power of ten for a parameter looked at in log10 (HTML, with unit)."""
+    unit = unit_html(posterior.unit[name])
+    unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
+    if name in posterior.log10_median:
+        power = plus_minus(posterior.log10_median[name], posterior.log10_sd[name])
+        return f"10<sup>{power}</sup>{unit}"
+    return plus_minus(posterior.median[name], posterior.sd[name]) + unit
+
+
+def plant_parameter(case: Case) -> str | None:
+    """The parameter that is phi of a stand growing in a patch, if there is one."""
+    stands = [case.plants.stands[patch.stand] for patch in case.plants.patches]
+    return next((stand.phi for stand in stands if isinstance(stand.phi, str)), None)
+
+
+def measurement_error(posterior: Posterior, kind: str) -> float:
+    """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
+    station = posterior.station
+    error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def pressed_side(posterior: Posterior, name: str) -> str:
+    """'upper' or 'lower', the bound of its prior a parameter presses against, or ''."""
+    low, high = posterior.bound_hit[name]
+    return "upper" if high else "lower" if low else ""
+
+
+def with_unit(value: float, kind: str) -> str:
+    """A residual or error of a kind of measurement with its unit."""
+    return f"{short(value, 2)}{NARROW}{'m' if kind == 'level' else 'm/s'}"
