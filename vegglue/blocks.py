@@ -10,43 +10,35 @@ from numba import njit
 
 compiled = njit(cache=True, error_model="numpy")
 
-# Residuals reach two cells to either side; unknowns this far apart may be disturbed together.
-REACH = 2
-PERIOD = 2 * REACH + 1
+# An unknown moves the residuals of the columns from one upstream to two downstream of it, and two rows to either side;
+# unknowns this far apart may be disturbed together.
+ALONG_PERIOD, ROWS_REACH = 4, 2
+ACROSS_PERIOD = 2 * ROWS_REACH + 1
 
 
 @compiled
-def disturb(state, kind, first_column, first_row, step, lanes, lane):
-    """Copy `state` (nx, 3, ny) into lane `lane` of `lanes`, adding `step` to one colour of one kind of unknown."""
-    nx, _, ny = state.shape
-    for i in range(nx):
-        for e in range(3):
-            for j in range(ny):
-                value = state[i, e, j]
-                if e == kind and i % PERIOD == first_column and j % PERIOD == first_row:
-                    value += step
-                lanes[i, e, j, lane] = value
-
-
-@compiled
-def collect(blocks, far, base, rates, kind, first_column, first_row, step, lane):
-    """Spread the change of one colour's lane over the entries of the Jacobian it belongs to.
+def collect(blocks, far, base, rates, colours, step):
+    """Spread the changes of the colours' lanes (kind, column, row) over the entries of the Jacobian they belong to.
 
     blocks (nx, 3, n, n): columns i - 1, i, i + 1 of row block i; far (nx, n): the diagonal coupling to i - 2.
     """
     nx, _, ny = base.shape
-    for column in range(first_column, nx, PERIOD):
-        for i in range(max(column - 1, 0), min(column + 3, nx)):
-            for row in range(first_row, ny, PERIOD):
+    for i in range(nx):
+        for lane in range(colours.shape[0]):
+            kind, first_column, first_row = colours[lane]
+            # The one column of this colour among those that move this block: i - 2 .. i + 1.
+            column = i + 1 - (i + 1 - first_column) % ALONG_PERIOD
+            if column < 0 or column >= nx:
+                continue
+            for row in range(first_row, ny, ACROSS_PERIOD):
                 source = kind * ny + row
+                if column == i - 2:
+                    far[i, source] = (rates[i, kind, row, lane] - base[i, kind, row]) / step
+                    continue
                 for e in range(3):
-                    for j in range(max(row - REACH, 0), min(row + REACH + 1, ny)):
+                    for j in range(max(row - ROWS_REACH, 0), min(row + ROWS_REACH + 1, ny)):
                         change = (rates[i, e, j, lane] - base[i, e, j]) / step
-                        if column == i - 2:
-                            if e == kind and j == row:
-                                far[i, source] = change
-                        else:
-                            blocks[i, column - i + 1, e * ny + j, source] = change
+                        blocks[i, column - i + 1, e * ny + j, source] = change
 
 
 @compiled
@@ -85,43 +77,59 @@ def solve(blocks, far, right):
 
 
 @compiled
-def mixing_weights(turns, step):
-    """g (depth, m): least squares of `step` (nx, 3, ny, m) by `turns` (depth, nx, 3, ny, m), member by member."""
-    depth, nx, _, ny, m = turns.shape
-    gram, right = np.zeros((m, depth, depth)), np.zeros((m, depth))
+def remember(turns, sums, slot, state, step, last_state, last_step):
+    """Slot of the memory: t = f - f_last, s = (x - x_last) + t, member by member."""
+    nx, _, ny, m = state.shape
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
-                for a in range(depth):
-                    for k in range(m):
-                        right[k, a] += turns[a, i, e, j, k] * step[i, e, j, k]
-                    for b in range(a + 1):
-                        for k in range(m):
-                            gram[k, a, b] += turns[a, i, e, j, k] * turns[b, i, e, j, k]
-    weights = np.empty((depth, m))
-    for k in range(m):
-        for a in range(depth):
-            for b in range(a):
-                gram[k, b, a] = gram[k, a, b]
-            gram[k, a, a] = gram[k, a, a] * (1.0 + 1e-12) + 1e-300
-        weights[:, k] = np.linalg.solve(gram[k], right[k])
-    return weights
+                for k in range(m):
+                    turn = step[i, e, j, k] - last_step[i, e, j, k]
+                    turns[slot, i, e, j, k] = turn
+                    sums[slot, i, e, j, k] = turn + state[i, e, j, k] - last_state[i, e, j, k]
 
 
 @compiled
-def mix(state, step, turns, sums):
-    """Anderson: x + f - sum_d g_d s_d with g the weights of f in the turns t_d, s_d the change of x + f."""
-    if turns.shape[0] == 0:
-        return state + step
-    weights = mixing_weights(turns, step)
+def products(turns, slot, step):
+    """Inner products per member of turn `slot` with every turn, and of every turn with f: two arrays (depth, m)."""
     depth, nx, _, ny, m = turns.shape
+    gram, right = np.zeros((depth, m)), np.zeros((depth, m))
+    for i in range(nx):
+        for e in range(3):
+            for j in range(ny):
+                for d in range(depth):
+                    for k in range(m):
+                        gram[d, k] += turns[slot, i, e, j, k] * turns[d, i, e, j, k]
+                        right[d, k] += turns[d, i, e, j, k] * step[i, e, j, k]
+    return gram, right
+
+
+@compiled
+def mix(state, step, sums, weights):
+    """Anderson's next state x + f - sum_d g_d s_d."""
+    depth, nx, _, ny, m = sums.shape
     mixed = np.empty_like(state)
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
                 for k in range(m):
-                    value = state[i, e, j, k] + step[i, e, j, k]
-                    for d in range(depth):
-                        value -= weights[d, k] * sums[d, i, e, j, k]
-                    mixed[i, e, j, k] = value
+                    mixed[i, e, j, k] = state[i, e, j, k] + step[i, e, j, k]
+                for d in range(depth):
+                    for k in range(m):
+                        mixed[i, e, j, k] -= weights[d, k] * sums[d, i, e, j, k]
     return mixed
+
+
+@compiled
+def minimise(gram, right):
+    """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing."""
+    depth, _, m = gram.shape
+    weights = np.empty((depth, m))
+    for k in range(m):
+        matrix = np.empty((depth, depth))
+        for a in range(depth):
+            for b in range(depth):
+                matrix[a, b] = gram[a, b, k]
+            matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
+        weights[:, k] = np.linalg.solve(matrix, np.ascontiguousarray(right[:, k]))
+    return weights

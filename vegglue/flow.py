@@ -140,28 +140,25 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
     )
 
 
-def _spread(inflow: Inflow, depth: Array, width: float) -> Array:
-    """Flux q = Q w / (sum w * width) [m2/s] with w = h^(5/3) (conveyance) or 1; depth (cells of the segment, m)."""
-    weight = depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)
-    return inflow.discharge * weight / (weight.sum(axis=0) * width)
+def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
+    """q = Q w / (sum w * width) [m2/s] into the west (ny, m), south and north (nx, m) side, w = h^(5/3) or 1."""
+    (nx, ny), m = problem.shape, problem.members
+    fluxes = {"west": np.zeros((ny, m)), "south": np.zeros((nx, m)), "north": np.zeros((nx, m))}
+    beside = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}
+    for inflow in problem.inflows:
+        part = slice(inflow.start, inflow.stop)
+        width = problem.dy if inflow.side == "west" else problem.dx
+        there = beside[inflow.side][part]
+        weight = there ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(there)
+        fluxes[inflow.side][part] += inflow.discharge * weight / (weight.sum(axis=0) * width)
+    return fluxes["west"], fluxes["south"], fluxes["north"]
 
 
 def faces(problem: Problem, state: Array) -> Faces:
     """Depths, velocities and fluxes of a state (nx, 3, ny, m), boundaries included."""
-    nx, _, ny, m = state.shape
     level = np.ascontiguousarray(state[:, LEVEL])
     cell, face_x, face_y, corner = kernels.depths(level, problem.bed, problem.outlet_level, problem.film)
-    u, v = np.empty((nx + 1, ny, m)), np.empty((nx, ny + 1, m))
-    u[1:], v[:, :ny] = state[:, ALONG], state[:, ACROSS]
-    u[0], v[:, 0], v[:, ny] = 0.0, 0.0, 0.0
-    for inflow in problem.inflows:
-        part = slice(inflow.start, inflow.stop)
-        if inflow.side == "west":
-            u[0, part] += _spread(inflow, face_x[0, part], problem.dy) / face_x[0, part]
-        elif inflow.side == "south":
-            v[part, 0] += _spread(inflow, face_y[part, 0], problem.dx) / face_y[part, 0]
-        else:
-            v[part, ny] -= _spread(inflow, face_y[part, ny], problem.dx) / face_y[part, ny]
+    u, v = kernels.velocities(state, 0, problem.shape[0], cell, *_side_fluxes(problem, cell))
     return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
 
 
@@ -186,28 +183,17 @@ def drag(problem: Problem, depth: Array) -> Array:
 
 def residual(problem: Problem, state: Array) -> Array:
     """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
-    wet = faces(problem, state)
-    rough = drag(problem, wet.cell)
-    viscosity = np.broadcast_to(problem.viscosity, wet.cell.shape)
-    viscosity = np.ascontiguousarray(viscosity)
-    force = np.zeros((2, *wet.cell.shape))
-    rates = np.empty_like(state)
-    shared = (wet.cell, wet.face_x, wet.face_y, wet.flux_x, wet.flux_y, wet.corner, rough, viscosity, force)
-    kernels.continuity(rates[:, LEVEL], wet.flux_x, wet.flux_y, problem.dx, problem.dy)
-    kernels.momentum_y(
-        rates[:, ACROSS], wet.level, wet.u, wet.v, *shared, problem.film, problem.dx, problem.dy
-    )
-    kernels.momentum_x(
-        rates[:, ALONG],
-        wet.level,
-        wet.u,
-        wet.v,
-        *shared,
+    depth = kernels.cell_depth(state, problem.bed, problem.film)
+    viscosity = np.broadcast_to(problem.viscosity, depth.shape)
+    return kernels.rates(
+        state,
+        problem.bed,
+        drag(problem, depth),
+        np.ascontiguousarray(viscosity),
+        *_side_fluxes(problem, depth),
         problem.outlet,
         problem.outlet_level,
         problem.film,
         problem.dx,
         problem.dy,
     )
-    rates[:, ACROSS, 0] = state[:, ACROSS, 0]
-    return rates

@@ -14,6 +14,8 @@ KARMAN = 0.4
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest.
 REST_SPEED = 1e-3
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
+# Columns computed together, and those beside them they look at.
+STRIP, HALO = 40, 3
 
 compiled = njit(cache=True, fastmath={"contract", "nsz", "arcp", "reassoc"}, error_model="numpy")
 
@@ -25,8 +27,7 @@ def _film(depth: float, film: float) -> float:
     h = (d + r) / 2 + f (1 - d/r) / 20 with r = sqrt(d^2 + 4 f^2).
     """
     root = math.sqrt(depth * depth + 4.0 * film * film)
-    above = 0.5 * (depth + root) if depth > 0.0 else 2.0 * film * film / (root - depth)
-    return above + 0.05 * film * (1.0 - depth / root)
+    return 0.5 * (depth + root) + 0.05 * film * (1.0 - depth / root)
 
 
 @compiled
@@ -81,6 +82,7 @@ def class_drag(depth, friction_class, law, coefficient, log_argument_minimum):
     """k = g / (C^2 h) [1/m] of the class laws: C = h^(1/6)/n, C = 18 log10(max(12 h/k_s, floor)), or C given."""
     nx, ny, m = depth.shape
     drag = np.empty((nx, ny, m))
+    floor = 18.0 * math.log10(log_argument_minimum)
     for i in range(nx):
         for j in range(ny):
             c = friction_class[i, j]
@@ -92,7 +94,8 @@ def class_drag(depth, friction_class, law, coefficient, log_argument_minimum):
             elif kind == KEULEGAN:
                 for k in range(m):
                     h = depth[i, j, k]
-                    chezy = 18.0 * math.log10(max(12.0 * h / coefficient[c, k], log_argument_minimum))
+                    ratio = 12.0 * h / coefficient[c, k]
+                    chezy = 18.0 * math.log10(ratio) if ratio > log_argument_minimum else floor
                     drag[i, j, k] = GRAVITY / (chezy * chezy * h)
             else:
                 for k in range(m):
@@ -129,15 +132,16 @@ def _upwind_downstream(flux: float, far_left: float, left: float, right: float) 
 
 
 @compiled
-def momentum_x(out, level, u, v, cell, face_x, face_y, flux_x, flux_y, corner, drag, viscosity, force, outlet, outlet_level, film, dx, dy):
-    """Rate R_u [m/s2] on faces f = 1 .. nx, written to out[f - 1]; the outlet face takes its level from outside."""
+def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy):
+    """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
+    cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
-    for f in range(1, nx + 1):
+    for f in range(first + 1, stop + 1):
         a, b = f - 1, min(f, nx - 1)
         f1, f2 = max(f - 2, 0), min(f + 1, nx)
         for j in range(ny):
             if f == nx and not outlet[j]:
-                out[a, j] = u[f, j]
+                out[offset + a - first, 2, j] = u[f, j]
                 continue
             j1, j2, j3, j4 = max(j - 2, 0), max(j - 1, 0), min(j + 1, ny - 1), min(j + 2, ny - 1)
             for k in range(m):
@@ -165,18 +169,17 @@ def momentum_x(out, level, u, v, cell, face_x, face_y, flux_x, flux_y, corner, d
                     (drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]) / (cell[a, j, k] + cell[b, j, k])
                 ) * speed * here
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
-                pushed = 0.5 * (force[0, a, j, k] + force[0, b, j, k])
                 moved = (carried - mixed / face_x[f, j, k]) * _afloat(face_x[f, j, k], film)
-                out[a, j, k] = moved + GRAVITY * drop / dx + rough - pushed
+                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop / dx + rough
 
 
 @compiled
-def momentum_y(out, level, u, v, cell, face_x, face_y, flux_x, flux_y, corner, drag, viscosity, force, film, dx, dy):
-    """Rate R_v [m/s2] on faces j = 1 .. ny - 1, written to out[:, j]; out[:, 0] is v itself, which a wall or inflow sets."""
+def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film, dx, dy):
+    """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
+    cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
-    for i in range(nx):
+    for i in range(first, stop):
         i1, i2, i3 = max(i - 2, 0), max(i - 1, 0), min(i + 1, nx - 1)
-        out[i, 0] = 0.0
         for j in range(1, ny):
             j1, j4 = max(j - 2, 0), min(j + 2, ny)
             for k in range(m):
@@ -206,17 +209,71 @@ def momentum_y(out, level, u, v, cell, face_x, face_y, flux_x, flux_y, corner, d
                     / (cell[i, j, k] + cell[i, j - 1, k])
                 ) * speed * here
                 slope = (level[i, j, k] - level[i, j - 1, k]) / dy
-                pushed = 0.5 * (force[1, i, j, k] + force[1, i, j - 1, k])
                 moved = (carried - mixed / face_y[i, j, k]) * _afloat(face_y[i, j, k], film)
-                out[i, j, k] = moved + GRAVITY * slope + rough - pushed
+                out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + rough
 
 
 @compiled
-def continuity(out, flux_x, flux_y, dx, dy):
-    """Rate R_level = d(hu)/dx + d(hv)/dy [m/s] at cell centres."""
-    nx, ny, m = out.shape
-    for i in range(nx):
+def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy):
+    """Rate R_level = d(hu)/dx + d(hv)/dy [m/s] of columns first .. stop - 1, into out[offset ..]."""
+    _, _, ny, m = out.shape
+    for i in range(first, stop):
         for j in range(ny):
             for k in range(m):
                 along = (flux_x[i + 1, j, k] - flux_x[i, j, k]) / dx
-                out[i, j, k] = along + (flux_y[i, j + 1, k] - flux_y[i, j, k]) / dy
+                out[offset + i - first, 0, j, k] = along + (flux_y[i, j + 1, k] - flux_y[i, j, k]) / dy
+
+
+@compiled
+def cell_depth(state, bed, film):
+    """h (nx, ny, m) at cell centres [m] of a state (nx, 3, ny, m)."""
+    nx, _, ny, m = state.shape
+    depth = np.empty((nx, ny, m))
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(m):
+                depth[i, j, k] = _film(state[i, 0, j, k] - bed[i, j], film)
+    return depth
+
+
+@compiled
+def velocities(state, first, stop, cell, west, south, north):
+    """u on faces first .. stop and v on the south and north faces of columns first .. stop - 1, boundaries included.
+
+    west (ny, m), south and north (nx, m): fluxes [m2/s] through the sides, positive into the domain; cell: their depth.
+    """
+    _, _, ny, m = state.shape
+    u, v = np.empty((stop - first + 1, ny, m)), np.empty((stop - first, ny + 1, m))
+    for i in range(first, stop):
+        u[i - first + 1] = state[i, 2]
+        v[i - first, 1:ny] = state[i, 1, 1:]
+        for k in range(m):
+            v[i - first, 0, k] = south[i, k] / cell[i - first, 0, k]
+            v[i - first, ny, k] = -north[i, k] / cell[i - first, ny - 1, k]
+    if first > 0:
+        u[0] = state[first - 1, 2]
+    else:
+        u[0] = west / cell[0]
+    return u, v
+
+
+@compiled
+def rates(state, bed, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
+    """R(state), (nx, 3, ny, m), strip by strip so that what is between fits the cache; drag and viscosity (nx, ny, m)."""
+    nx, _, ny, m = state.shape
+    out = np.empty_like(state)
+    for first in range(0, nx, STRIP):
+        stop = min(first + STRIP, nx)
+        a, b = max(first - HALO, 0), min(stop + HALO, nx)
+        level = state[a:b, 0].copy()
+        cell, face_x, face_y, corner = depths(level, bed[a:b], outlet_level, film)
+        u, v = velocities(state, a, b, cell, west, south, north)
+        wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
+        lo, hi = first - a, stop - a
+        continuity(out, first, lo, hi, wet[4], wet[5], dx, dy)
+        momentum_y(out, first, lo, hi, level, u, v, wet, drag[a:b], viscosity[a:b], film, dx, dy)
+        momentum_x(
+            out, first, lo, hi, level, u, v, wet, drag[a:b], viscosity[a:b], outlet, outlet_level, film, dx, dy
+        )
+        out[first:stop, 1, 0] = state[first:stop, 1, 0]
+    return out

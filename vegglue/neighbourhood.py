@@ -4,15 +4,15 @@ Coordinates s (m, d) are the members' places in the unit cube (prior probabiliti
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
-from vegglue.flow import ACROSS, ALONG, LEVEL, Array, Problem, crop, residual, take
+from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual, take
 from vegglue.march import settle
 from vegglue.start import backwater
-from vegglue.steady import Factors, Solution, chord, factors, newton
+from vegglue.steady import Factors, Solution, chord, factors, finish
 
 SIZE = 16
 TANGENT_STEP = 1e-4
@@ -35,32 +35,33 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class _Anchor:
-    """A solved member others may start from: its place, state (nx, 3, ny, 1) and tangents d state / d s_p."""
+class _Tangents:
+    """d state / d s_p (nx, 3, ny, 1) at one place of the unit cube."""
 
     place: Array
-    state: Array
-    tangents: tuple[Array, ...]
+    slopes: tuple[Array, ...]
 
-    def predict(self, places: Array) -> Array:
-        """state + sum_p tangent_p (s_p - place_p), (nx, 3, ny, m)."""
-        predicted = np.repeat(self.state, len(places), axis=3)
-        for p, tangent in enumerate(self.tangents):
-            predicted += tangent * (places[:, p] - self.place[p])
+    def predict(self, state: Array, origin: Array, places: Array) -> Array:
+        """state + sum_p slope_p (s_p - origin_p), (nx, 3, ny, m), from the state (nx, 3, ny, 1) solved at origin."""
+        predicted = np.repeat(state, len(places), axis=3)
+        for p, slope in enumerate(self.slopes):
+            predicted += slope * (places[:, p] - origin[p])
         return predicted
 
 
 def leaves(places: Array, size: int) -> list[np.ndarray]:
-    """Index sets of at most `size` neighbours: halved across the longest side, in an order that walks the cube."""
+    """Index sets of at most `size` neighbours, halved across the longest side; each next to the one before it."""
 
-    def halve(index: np.ndarray) -> list[np.ndarray]:
+    def halve(index: np.ndarray, upwards: bool) -> list[np.ndarray]:
         if index.size <= size:
             return [index]
         longest = int(np.argmax(np.ptp(places[index], axis=0)))
         ordered = index[np.argsort(places[index, longest], kind="stable")]
-        return halve(ordered[: index.size // 2]) + halve(ordered[index.size // 2 :])
+        low, high = ordered[: index.size // 2], ordered[index.size // 2 :]
+        first, second = (low, high) if upwards else (high, low)
+        return halve(first, True) + halve(second, False)
 
-    return halve(np.arange(len(places)))
+    return halve(np.arange(len(places)), True)
 
 
 def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Solved:
@@ -69,77 +70,115 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Sol
     (nx, ny), m = whole.shape, len(places)
     state = np.full((nx, 3, ny, m), np.nan)
     status, reason, iterations = np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64)
-    anchors: list[_Anchor] = []
+    known: list[_Tangents] = []
     for leaf in leaves(places, SIZE):
         pending = leaf
         while pending.size:
-            centre = _next_centre(places, pending, leaf, anchors)
-            lead = _solve_centre(problem_of, whole, centre, places, anchors, tolerance)
+            solved = np.flatnonzero(status != FAILED)
+            centre = _next_centre(places, pending, leaf, solved)
+            warm = _warm_start(places, centre, solved, state, known)
+            lead = _solve_centre(problem_of, whole, centre, places[centre], warm, tolerance)
             iterations[centre] += lead.iterations
-            status[centre], reason[centre], state[..., centre] = lead.status, lead.reason, lead.anchor.state[..., 0]
+            status[centre], reason[centre], state[..., centre] = lead.status, lead.reason, lead.state[..., 0]
             pending = pending[pending != centre]
-            if lead.status == FAILED:
+            if lead.tangents is None:
                 continue
-            anchors.append(lead.anchor)
-            if lead.factors is None or pending.size == 0:
+            known.append(lead.tangents)
+            if pending.size == 0:
                 continue
-            start = lead.anchor.predict(places[pending])
-            followers, band = _chord_in_band(take(whole, pending), start, lead, tolerance)
+            start = lead.tangents.predict(lead.state, places[centre], places[pending])
+            followers = _chord_in_band(take(whole, pending), start, lead, tolerance)
             iterations[pending] += followers.iterations
-            there = pending[followers.converged]
-            status[there] = SOLVED_BY_NEWTON
-            state[..., there] = _widen(followers.state[..., followers.converged], start[..., followers.converged], band)
-            pending = pending[~followers.converged]
+            there = followers.converged
+            status[pending[there]] = SOLVED_BY_NEWTON
+            state[..., pending[there]] = _widen(followers.state[..., there], ny, lead.band)
+            pending = pending[~there]
     return Solved(state, status, reason, iterations)
+
+
+def _warm_start(
+    places: Array, centre: int, solved: np.ndarray, state: Array, known: list[_Tangents]
+) -> Array | None:
+    """From the nearest solved member, along the nearest tangents."""
+    if solved.size == 0 or not known:
+        return None
+    nearest = int(solved[np.argmin(((places[solved] - places[centre]) ** 2).sum(axis=1))])
+    tangents = min(known, key=lambda some: float(((some.place - places[centre]) ** 2).sum()))
+    return tangents.predict(state[..., nearest : nearest + 1], places[nearest], places[centre][None])
 
 
 @dataclass(frozen=True)
 class _Lead:
-    anchor: _Anchor
+    """A centre: its state (nx, 3, ny, 1) and, unless it had to be marched, what its neighbours need of it."""
+
+    state: Array
     status: int
     reason: str
     iterations: int
+    tangents: _Tangents | None
     factors: Factors | None
     band: tuple[int, int]
 
 
-def _next_centre(places: Array, pending: np.ndarray, leaf: np.ndarray, anchors: list[_Anchor]) -> int:
+def _next_centre(places: Array, pending: np.ndarray, leaf: np.ndarray, solved: np.ndarray) -> int:
     """The middle of a fresh leaf; afterwards the pending member nearest to a solved one."""
-    if pending.size == leaf.size:
+    if pending.size == leaf.size or solved.size == 0:
         distance = ((places[pending] - places[leaf].mean(axis=0)) ** 2).sum(axis=1)
     else:
-        known = np.array([anchor.place for anchor in anchors[-SIZE:]]).reshape(-1, places.shape[1])
-        gaps = ((places[pending][:, None] - known[None]) ** 2).sum(axis=2)
-        distance = gaps.min(axis=1) if known.size else gaps.sum(axis=1)
+        distance = ((places[pending][:, None] - places[solved][None]) ** 2).sum(axis=2).min(axis=1)
     return int(pending[np.argmin(distance)])
 
 
 def _solve_centre(
-    problem_of: ProblemOf, whole: Problem, centre: int, places: Array, anchors: list[_Anchor], tolerance: float
+    problem_of: ProblemOf, whole: Problem, centre: int, place: Array, warm: Array | None, tolerance: float
 ) -> _Lead:
-    """Start from the nearest anchor, else cold; chord, then Newton, then Newton from cold, then marching."""
-    place, problem = places[centre], take(whole, np.array([centre]))
-    warm = None
-    if anchors:
-        nearest = min(anchors, key=lambda anchor: float(((anchor.place - place) ** 2).sum()))
-        warm = nearest.predict(place[None])
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
+    problem = take(whole, np.array([centre]))
     spent = 0
-    for start, quick in ((warm, True), (warm, False), (backwater(problem), False)):
-        if start is None:
+    for attempt in (_quick, _by_newton, _from_cold):
+        if warm is None and attempt is not _from_cold:
             continue
-        band = _band(problem, start)
-        part, inside = crop(problem, *band), _inside(start, band)
-        shared = factors(part, inside, precision=np.float32) if quick else None
-        solution = newton(part, inside, tolerance) if shared is None else chord(part, inside, shared, tolerance, 20)
+        solution, shared, band = attempt(problem, warm, tolerance)
         spent += int(solution.iterations[0])
-        if solution.converged[0] and _overflows(part, solution.state, band, problem.shape[1])[0]:
-            start = _widen(solution.state, start, band)
-            band = _band(problem, start)
-            part, shared = crop(problem, *band), None
-            solution = newton(part, _inside(start, band), tolerance)
-        if solution.converged[0]:
-            return _lead(problem_of, place, part, band, start, solution, shared, spent)
-    return _marched(problem, place, spent, tolerance)
+        if solution.converged[0] and shared is not None:
+            return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
+    return _marched(problem, spent, tolerance)
+
+
+Attempt = tuple[Solution, Factors | None, tuple[int, int]]
+
+
+def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
+    band = _band(problem, warm)
+    part, start = crop(problem, *band), _inside(warm, band)
+    shared = factors(part, start)
+    solution = chord(part, start, shared, tolerance, most=16)
+    if solution.converged[0] and solution.iterations[0] > FRESH_AFTER:
+        shared = factors(part, solution.state)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float = 200.0) -> Attempt:
+    band = _band(problem, warm)
+    solution, shared = finish(crop(problem, *band), _inside(warm, band), tolerance, time_step)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _from_cold(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
+    return _by_newton(problem, backwater(problem), tolerance, time_step=10.0)
+
+
+def _checked(
+    problem: Problem, solution: Solution, shared: Factors | None, band: tuple[int, int], tolerance: float
+) -> Attempt:
+    """Solved again in a wider band if water came to stand at the edge of this one."""
+    part = crop(problem, *band)
+    if not (solution.converged[0] and _overflows(part, solution.state, band, problem.shape[1])[0]):
+        return solution, shared, band
+    wider = _widen(solution.state, problem.shape[1], band)
+    band = _band(problem, wider)
+    solution, shared = finish(crop(problem, *band), _inside(wider, band), tolerance, 200.0)
+    return solution, shared, band
 
 
 def _lead(
@@ -147,17 +186,14 @@ def _lead(
     place: Array,
     part: Problem,
     band: tuple[int, int],
-    start: Array,
     solution: Solution,
-    shared: Factors | None,
+    shared: Factors,
     spent: int,
 ) -> _Lead:
-    if shared is None or solution.iterations[0] > FRESH_AFTER:
-        shared = factors(part, solution.state, precision=np.float32)
-    tangents = _tangents(problem_of, place, part, band, solution.state, shared)
-    full = _widen(solution.state, start, band)
-    wide = tuple(_widen(tangent, np.zeros_like(full), band) for tangent in tangents)
-    return _Lead(_Anchor(place, full, wide), SOLVED_BY_NEWTON, "", spent, shared, band)
+    ny = problem_of(place[None]).shape[1]
+    slopes = tuple(_widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared))
+    state = _widen(solution.state, ny, band)
+    return _Lead(state, SOLVED_BY_NEWTON, "", spent, _Tangents(place, slopes), shared, band)
 
 
 def _tangents(
@@ -172,29 +208,23 @@ def _tangents(
     return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(place.size)]
 
 
-def _marched(problem: Problem, place: Array, spent: int, tolerance: float) -> _Lead:
+def _marched(problem: Problem, spent: int, tolerance: float) -> _Lead:
     """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
     start = backwater(problem)
     marched = settle(problem, start, tolerance)
     status = SOLVED_BY_MARCHING if marched.steady else FAILED
     reason = "" if marched.steady else f"no steady state: {marched.sentence}"
     state = marched.state if marched.steady else np.full_like(start, np.nan)
-    anchor = _Anchor(place, state, ())
-    return _Lead(anchor, status, reason, spent + marched.steps, None, (0, problem.shape[1]))
+    return _Lead(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))
 
 
-def _chord_in_band(
-    problem: Problem, start: Array, lead: _Lead, tolerance: float
-) -> tuple[Solution, tuple[int, int]]:
+def _chord_in_band(problem: Problem, start: Array, lead: _Lead, tolerance: float) -> Solution:
     """Followers in the band of their centre; one that outgrows it counts as not converged."""
     assert lead.factors is not None
     part = crop(problem, *lead.band)
     solution = chord(part, _inside(start, lead.band), lead.factors, tolerance)
     overflowing = _overflows(part, solution.state, lead.band, problem.shape[1])
-    kept = Solution(
-        solution.state, solution.correction, solution.iterations, solution.converged & ~overflowing
-    )
-    return kept, lead.band
+    return replace(solution, converged=solution.converged & ~overflowing)
 
 
 def _band(problem: Problem, start: Array) -> tuple[int, int]:
@@ -221,11 +251,11 @@ def _inside(state: Array, band: tuple[int, int]) -> Array:
     return inside
 
 
-def _widen(inside: Array, outside: Array, band: tuple[int, int]) -> Array:
-    """The band put back; beyond it the level runs on flat and nothing moves."""
-    wide = np.zeros_like(outside)
+def _widen(inside: Array, rows: int, band: tuple[int, int]) -> Array:
+    """The band put back into all rows; beyond it the level runs on flat and nothing moves."""
+    nx, _, _, m = inside.shape
+    wide = np.zeros((nx, 3, rows, m))
     wide[:, :, band[0] : band[1]] = inside
     wide[:, LEVEL, : band[0]] = inside[:, LEVEL, :1]
     wide[:, LEVEL, band[1] :] = inside[:, LEVEL, -1:]
-    wide[:, ALONG, : band[0]] = 0.0
     return wide

@@ -6,7 +6,7 @@ Anderson's mixing (Walker and Ni 2011, doi:10.1137/10078356X). However a member 
 residual only: the largest correction M^-1 R, in m/s and m, is below the tolerance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,8 @@ LANES = 15
 DEPTH = 6
 # A step this long [m, m/s] leaves the range where the linearisation means anything.
 LONGEST = 0.25
+# Near enough [m, m/s] for one factorisation to do the rest.
+CLOSE = 5e-3
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,9 @@ class Factors:
     def solve(self, right: Array) -> Array:
         """J^-1 right, (nx, 3, ny, m)."""
         nx, _, ny, m = right.shape
-        work = np.ascontiguousarray(right, dtype=self.columns.dtype).reshape(nx, 3 * ny, m).copy()
+        work = right.astype(np.float32).reshape(nx, 3 * ny, m)
         blocks.solve(self.columns, self.far, work)
-        return work.reshape(right.shape).astype(np.float64)
+        return work.reshape(right.shape)
 
 
 @dataclass(frozen=True)
@@ -46,44 +48,42 @@ class Solution:
 
 
 def jacobian(problem: Problem, state: Array) -> tuple[Array, Array]:
-    """J = dR/dstate of one member by coloured differences: blocks (nx, 3, n, n) and far diagonal (nx, n), n = 3 ny."""
+    """J = dR/dstate of one member by coloured differences: blocks (nx, 3, n, n) and far diagonal (nx, n), n = 3 ny.
+
+    Single precision is enough: the factors only lead to the root, the residual in double precision says where it is.
+    """
     nx, _, ny, _ = state.shape
     base = residual(problem, state)[..., 0]
-    alone = np.ascontiguousarray(state[..., 0])
-    columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny)), np.zeros((nx, 3 * ny))
-    colours = [(kind, a, b) for kind in range(3) for a in range(blocks.PERIOD) for b in range(blocks.PERIOD)]
+    columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
+    colours = np.array(list(np.ndindex(3, blocks.ALONG_PERIOD, blocks.ACROSS_PERIOD)))
     many = take(problem, np.zeros(LANES, dtype=np.int64))
     lanes = np.empty((nx, 3, ny, LANES))
-    for first in range(0, len(colours), LANES):
-        group = colours[first : first + LANES]
-        for lane, colour in enumerate(group):
-            blocks.disturb(alone, *colour, STEP, lanes, lane)
-        rates = residual(many, lanes)
-        for lane, colour in enumerate(group):
-            blocks.collect(columns, far, base, rates, *colour, STEP, lane)
+    for group in np.split(colours, range(LANES, len(colours), LANES)):
+        lanes[...] = state
+        for lane, (kind, column, row) in enumerate(group):
+            lanes[column :: blocks.ALONG_PERIOD, kind, row :: blocks.ACROSS_PERIOD, lane] += STEP
+        blocks.collect(columns, far, base, residual(many, lanes), group, STEP)
     return columns, far
 
 
-def factors(problem: Problem, state: Array, time_step: float = np.inf, precision: type = np.float64) -> Factors:
-    """Factors of D/dt + J at one state, D the wet share of each cell (1 for velocities)."""
-    return _eliminate(*jacobian(problem, state), _storage(problem, state), time_step, precision)
+def factors(problem: Problem, state: Array) -> Factors:
+    """Factors of J at one state."""
+    return _eliminate(*jacobian(problem, state))
 
 
 def _storage(problem: Problem, state: Array) -> Array:
     """dh/dz_s of the film at each level, 1 for velocities: (nx, n)."""
     nx, _, ny, _ = state.shape
     above = state[:, LEVEL, :, 0] - problem.bed
-    storage = np.ones((nx, 3, ny))
+    storage = np.ones((nx, 3, ny), np.float32)
     storage[:, LEVEL] = 0.5 * (1.0 + above / np.sqrt(above**2 + 4.0 * problem.film**2))
     return storage.reshape(nx, 3 * ny)
 
 
-def _eliminate(columns: Array, far: Array, storage: Array, time_step: float, precision: type) -> Factors:
-    shifted, diagonal = columns.astype(precision), np.arange(storage.shape[1])
-    shifted[:, 1, diagonal, diagonal] += (storage / time_step).astype(precision)
-    far = far.astype(precision)
-    blocks.factor(shifted, far)
-    return Factors(shifted, far)
+def _eliminate(columns: Array, far: Array) -> Factors:
+    """Factors in the place of the blocks."""
+    blocks.factor(columns, far)
+    return Factors(columns, far)
 
 
 def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, time_step: float = 10.0) -> Solution:
@@ -96,18 +96,34 @@ def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, tim
         if not size < LONGEST:
             return _alone(state, size, iteration, False)
         state = state + step
-        if size < tolerance and time_step > 1e4:
+        if size < tolerance and time_step > min(1e4, 1.0 / tolerance):
             return _alone(state, size, iteration, True)
         time_step = min(time_step * (8.0 if size < 0.02 else 2.0 if size < 0.12 else 1.0), 1e9)
     return _alone(state, size, most, False)
+
+
+def finish(problem: Problem, start: Array, tolerance: float, time_step: float) -> tuple[Solution, Factors | None]:
+    """Newton until close, then one more factorisation, which neighbours can share, to the tolerance."""
+    near = newton(problem, start, CLOSE, time_step=time_step)
+    if not near.converged[0]:
+        return near, None
+    shared = factors(problem, near.state)
+    end = chord(problem, near.state, shared, tolerance)
+    if not end.converged[0]:
+        end = newton(problem, near.state, tolerance, time_step=1e3)
+    return replace(end, iterations=end.iterations + near.iterations), shared
 
 
 def _bounded_step(
     rates: Array, columns_far: tuple[Array, Array], storage: Array, time_step: float
 ) -> tuple[Array, float]:
     """-(D/dt + J)^-1 R with dt cut until no entry is longer than LONGEST; the last one tried if none is."""
+    columns, far = columns_far
+    diagonal = np.arange(far.shape[1])
     for _ in range(12):
-        step = -_eliminate(*columns_far, storage, time_step, np.float64).solve(rates)
+        shifted = columns.copy()
+        shifted[:, 1, diagonal, diagonal] += storage / np.float32(time_step)
+        step = -_eliminate(shifted, far).solve(rates)
         if np.abs(step).max() < LONGEST:
             break
         time_step /= 4.0
@@ -118,15 +134,40 @@ def _alone(state: Array, size: float, iterations: int, converged: bool) -> Solut
     return Solution(state, np.array([size]), np.array([iterations]), np.array([converged]))
 
 
-@dataclass(frozen=True)
 class _Memory:
-    """The last DEPTH changes of each member: of its correction, and of state plus correction (depth, nx, 3, ny, m)."""
+    """The last DEPTH changes of every member's correction, for Anderson's mixing; filled in place, slot by slot."""
 
-    turns: Array
-    sums: Array
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.turns, self.sums = np.zeros((DEPTH, *shape), np.float32), np.zeros((DEPTH, *shape), np.float32)
+        self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
+        self.last: tuple[Array, Array] | None = None
+        self.count = 0
 
-    def keep(self, members: np.ndarray) -> "_Memory":
-        return _Memory(np.ascontiguousarray(self.turns[..., members]), np.ascontiguousarray(self.sums[..., members]))
+    def keep(self, members: np.ndarray) -> None:
+        self.turns, self.sums = _columns(self.turns, members), _columns(self.sums, members)
+        self.gram = _columns(self.gram, members)
+        if self.last is not None:
+            self.last = _columns(self.last[0], members), _columns(self.last[1], members)
+
+    def next_state(self, state: Array, step: Array) -> Array:
+        """x + f, less what the memory knows to overshoot."""
+        if self.last is not None:
+            slot = self.count % DEPTH
+            blocks.remember(self.turns, self.sums, slot, state, step, *self.last)
+            self.count += 1
+            known = min(self.count, DEPTH)
+            row, right = blocks.products(self.turns[:known], slot, step)
+            self.gram[slot, :known], self.gram[:known, slot] = row, row
+            weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
+            mixed = blocks.mix(state, step, self.sums[:known], weights)
+        else:
+            mixed = state + step
+        self.last = state, step
+        return mixed
+
+
+def _columns(values: Array, members: np.ndarray) -> Array:
+    return np.ascontiguousarray(values[..., members])
 
 
 def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> Solution:
@@ -134,27 +175,24 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
     members = problem.members
     final, correction = start.copy(), np.full(members, np.inf)
     iterations, converged = np.zeros(members, dtype=np.int64), np.zeros(members, dtype=bool)
-    active, state, part = np.arange(members), start, problem
-    memory = _Memory(np.zeros((DEPTH, *start.shape)), np.zeros((DEPTH, *start.shape)))
-    previous: tuple[Array, Array] | None = None
-    for iteration in range(most):
+    active, running = np.arange(members), np.ones(members, dtype=bool)
+    state, part, memory = start, problem, _Memory(start.shape)
+    for iteration in range(1, most + 1):
         step = -shared.solve(residual(part, state))
         size = np.abs(step).max(axis=(0, 1, 2))
-        iterations[active], correction[active] = iteration + 1, size
-        final[..., active] = state + step
-        converged[active] = size < tolerance
-        keep = np.flatnonzero(~(size < tolerance) & (size < 4.0 * LONGEST))
-        if keep.size == 0:
+        now = active[running]
+        iterations[now], correction[now] = iteration, size[running]
+        done = running & (size < tolerance)
+        final[..., active[done]], converged[active[done]] = (state + step)[..., done], True
+        running = running & ~done & (size < 4.0 * LONGEST)
+        if not running.any():
             break
-        if keep.size < active.size:
-            active, part, memory = active[keep], take(part, keep), memory.keep(keep)
-            state, step = np.ascontiguousarray(state[..., keep]), np.ascontiguousarray(step[..., keep])
-            previous = previous and (previous[0][..., keep], previous[1][..., keep])
-        if previous is not None:
-            slot = (iteration - 1) % DEPTH
-            memory.turns[slot] = step - previous[1]
-            memory.sums[slot] = memory.turns[slot] + (state - previous[0])
-        previous = (state, step)
-        known = min(iteration, DEPTH)
-        state = blocks.mix(state, step, memory.turns[:known], memory.sums[:known])
+        if running.sum() <= active.size // 2:
+            keep = np.flatnonzero(running)
+            active, part, running = active[keep], take(part, keep), running[keep]
+            state, step = _columns(state, keep), _columns(step, keep)
+            memory.keep(keep)
+        # Members that strayed stay in their lane until the next cut: they must not spoil the arithmetic of others.
+        step[..., ~running] = 0.0
+        state = memory.next_state(state, step)
     return Solution(final, correction, iterations, converged)
