@@ -147,7 +147,7 @@ def draw_joint(
     """
     figure, axes = canvas(NARROW_WIDTH, 3.0)
     x, y = across.coordinate(across.values), upward.coordinate(upward.values)
-    axes.plot(x[:SHOWN], y[:SHOWN], ".", markersize=1.6, markeredgewidth=0, color=COLOUR["prior"])
+    axes.plot(x[:SHOWN], y[:SHOWN], ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
     heavy = weights > 1e-3 * weights.max()
     axes.scatter(
         x[heavy], y[heavy], 55 * weights[heavy] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0

@@ -237,10 +237,9 @@ def draw_quantiles(standardised: Array, names: Sequence[str]) -> Figure:
     reach = 1.1 * max(np.abs(expected).max(), np.abs(standardised).max())
     axes.plot([-reach, reach], [-reach, reach], color=COLOUR["model"], linewidth=1)
     axes.plot(expected, standardised[order], "o", markersize=4.2, color=COLOUR["measured"])
-    for place in (0, len(order) - 1):
+    for place, side, offset in ((0, "left", (5, -11)), (len(order) - 1, "right", (-5, 6))):
         text = names[order[place]]
-        side = {"ha": "left" if place == 0 else "right", "xytext": (6 if place == 0 else -6, -3)}
-        label(axes, expected[place], standardised[order[place]], text, "measured", **side)
+        label(axes, expected[place], standardised[order[place]], text, "measured", ha=side, xytext=offset)
     label(axes, 0.45 * reach, 0.45 * reach, "as assumed", "model", xytext=(7, -9))
     axes.set(xlabel="normal quantile [–]", ylabel="residual / error [–]")
     return figure

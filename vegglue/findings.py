@@ -15,7 +15,15 @@ from vegglue.reported import Run, standing
 from vegglue.schema import Case
 from vegglue.survey import RigidCylinder
 from vegglue.typography import NARROW, count, fixed, interval, percent, plus_minus, short, unit_html
-from vegglue.wording import estimate, measurement_error, plant_parameter, pressed_side, symbol, with_unit
+from vegglue.wording import (
+    estimate,
+    largest_mass_error,
+    measurement_error,
+    plant_parameter,
+    pressed_side,
+    symbol,
+    with_unit,
+)
 
 MASS_LIMIT = 1e-4  # of |Q/Q_in - 1|: what a stored member is held to
 
@@ -206,7 +214,7 @@ def _members(ensemble: Ensemble) -> Finding:
 
 
 def _mass(ensemble: Ensemble) -> Finding:
-    worst = float(np.nanmax(ensemble.mass_error, initial=0.0))
+    worst = largest_mass_error(ensemble)
     inside = worst < MASS_LIMIT
     return Finding(
         "mass",

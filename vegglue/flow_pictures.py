@@ -45,9 +45,12 @@ def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str
     speed = np.hypot(flow.u, flow.v)
     inside = ((flow.x >= reach[0]) & (flow.x <= reach[1]))[:, None] & np.isfinite(speed)
     moves = ""
+    ground = np.isin(run.site.friction_class, np.unique(run.site.friction_class[plants]))
     if (plants & inside).any():
-        among, beside = speed[plants & inside].mean(), speed[~plants & inside].mean()
-        moves = f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s beside them."
+        among, beside = speed[plants & inside].mean(), speed[~plants & inside & ground].mean()
+        moves = (
+            f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
+        )
     return (
         f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, at true scale, median "
         f"parameters.{moves} Between two streamlines flows a tenth of the discharge; dots are stations."

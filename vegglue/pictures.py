@@ -22,7 +22,7 @@ from vegglue.measured_pictures import discharges, residuals, sections, verticals
 from vegglue.reported import Run, picture
 from vegglue.statistics import weighted_quantile
 from vegglue.typography import fixed, percent, plus_minus, short
-from vegglue.wording import estimate, plant_parameter, symbol
+from vegglue.wording import estimate, largest_mass_error, plant_parameter, symbol
 
 MOST_PAIRS = 6  # of parameters drawn together
 
@@ -92,7 +92,7 @@ def _corrected(run: Run) -> Iterator[Picture]:
     references = _references(run, canopy.parameter)
     marked = [reference.value for reference in references]
     low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
-    unknown = replace(_unknown(run, canopy.parameter), values=phi, low=low / 2, high=high)
+    unknown = replace(_unknown(run, canopy.parameter), values=phi, low=low / 1.5, high=1.5 * high)
     caption = (
         f"{symbol(run.case, canopy.parameter)} corrected to a canopy of {canopy.to_height:g} m: "
         f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>."
@@ -116,9 +116,8 @@ def _joints(run: Run) -> Iterator[Picture]:
             if across.name == upward.name
         ]
         both = f"{symbol(run.case, names[i])} and {symbol(run.case, names[j])}"
-        strength = (
-            "hardly constrain each other" if abs(r) < 0.3 else f"are traded {'with' if r > 0 else 'against'} each other"
-        )
+        tied = "rise together" if r > 0 else "trade off: one rises as the other falls"
+        strength = "hardly constrain each other" if abs(r) < 0.3 else tied
         figure = draw_joint(_unknown(run, names[i]), _unknown(run, names[j]), run.posterior.weights, marks)
         caption = f"{both} {strength} (correlation {fixed(r, 2)}). Area of a disc: weight of a member; grey: prior."
         alt = f"Members in the plane of {names[i]} and {names[j]}, weighted by likelihood; correlation {fixed(r, 2)}."
@@ -155,7 +154,7 @@ def _weights(run: Run) -> Picture:
 
 
 def _mass_error(run: Run) -> Picture:
-    worst = short(float(np.nanmax(run.ensemble.mass_error, initial=0.0)), 2)
+    worst = short(largest_mass_error(run.ensemble), 2)
     caption = f"The largest mass error of any member is {worst}; members are held to {short(MASS_LIMIT, 1)}."
     return picture(
         run, draw_mass_error(run.ensemble.mass_error, MASS_LIMIT), "mass-error", caption, "Histogram of mass errors."

@@ -13,7 +13,7 @@ from vegglue.posterior import CorrectedCanopy
 from vegglue.reported import Run, zones
 from vegglue.schema import Case
 from vegglue.typography import NARROW, as_given, fixed, percent, plus_minus, short
-from vegglue.wording import estimate, symbol
+from vegglue.wording import estimate, largest_mass_error, symbol
 
 STATUS = {
     SOLVED_BY_NEWTON: "solved by Newton's method",
@@ -205,7 +205,7 @@ def health(run: Run) -> Iterator[tuple[str, str]]:
     """What tells whether the numbers are to be trusted: a name and a value each."""
     ensemble, posterior = run.ensemble, run.posterior
     solved = ensemble.status != FAILED
-    yield "largest mass error of a member", short(float(np.nanmax(ensemble.mass_error, initial=0.0)), 2)
+    yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
     yield "effective members", f"{posterior.effective_size:,.0f} of {posterior.members:,}"
     yield "largest weight", percent(posterior.largest_weight)
     yield "tail of the weights, k̂", f"{fixed(posterior.pareto_k, 2)} (to be trusted below 0.7)"

@@ -29,7 +29,7 @@ def verdict(case: Case, posterior: Posterior) -> str:
     if unknown:
         sentence += f"; {_listed(case, unknown)} {_are(unknown)} not"
     size = max(posterior.effective_size, 1.0)
-    caution = f"Provisional, for the weights are worth {size:.0f} of {posterior.members:,} members: " * (
+    caution = f"A first look only, for the weights are worth {size:.0f} of {posterior.members:,} members: " * (
         size < CLAIMED_FROM
     )
     return f"{caution}{sentence}. {_how_well(posterior)}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vegglue.ensemble import FAILED, Ensemble
 from vegglue.posterior import Posterior
 from vegglue.schema import Case
 from vegglue.typography import NARROW, plus_minus, short, symbol_html, unit_html
@@ -44,3 +45,8 @@ def pressed_side(posterior: Posterior, name: str) -> str:
 def with_unit(value: float, kind: str) -> str:
     """A residual or error of a kind of measurement with its unit."""
     return f"{short(value, 2)}{NARROW}{'m' if kind == 'level' else 'm/s'}"
+
+
+def largest_mass_error(ensemble: Ensemble) -> float:
+    """Largest |Q/Q_in - 1| of the solved members [-]."""
+    return float(np.max(ensemble.mass_error[ensemble.status != FAILED]))
