@@ -1,0 +1,111 @@
+"""Channels that the verification tests share: small problems, walls without friction, one member unless `take` says more."""
+
+import numpy as np
+
+from vegglue import kernels
+from vegglue.flow import ACROSS, ALONG, LEVEL, Array, Inflow, Plants, Problem, faces
+from vegglue.start import backwater
+from vegglue.steady import newton
+
+GRAVITY = 9.81
+NO_PLANTS = Plants(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((0, 1)))
+
+
+def centres(length: float, cells: int) -> Array:
+    return (np.arange(cells) + 0.5) * length / cells
+
+
+def make_problem(
+    bed: Array,
+    cell: tuple[float, float],
+    discharge: float,
+    level: float,
+    friction: tuple[int, float] = (kernels.CHEZY, 50.0),
+    **changes: object,
+) -> Problem:
+    """One friction class, inflow from the west by conveyance, outlet all along the east, a film of 0.1 mm."""
+    nx, ny = bed.shape
+    settings = {
+        "dx": cell[0],
+        "dy": cell[1],
+        "bed": np.ascontiguousarray(bed),
+        "friction_class": np.zeros((nx, ny), np.int64),
+        "law": np.array([friction[0]]),
+        "coefficient": np.array([[friction[1]]]),
+        "plants": NO_PLANTS,
+        "viscosity": np.zeros(1),
+        "inflows": (Inflow("west", 0, ny, np.array([discharge])),),
+        "outlet": np.ones(ny, bool),
+        "outlet_level": np.array([level]),
+        "film": 1e-4,
+    }
+    return Problem(**(settings | changes))
+
+
+def sloping(length: float, cells: int, rows: int, slope: float) -> Array:
+    """A plane bed, zero at x = 0."""
+    return np.repeat(-slope * centres(length, cells)[:, None], rows, axis=1)
+
+
+def planted(shape: tuple[int, int], phi: float, canopy_height: float, bare_chezy: float) -> Plants:
+    """Plants in every cell."""
+    column, row = (index.ravel() for index in np.indices(shape))
+    fields = [np.full((column.size, 1), value) for value in (phi, canopy_height, bare_chezy)]
+    return Plants(column, row, *fields)
+
+
+def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple[Array, Array]:
+    """Bed and classes (0 floor, 1 bank) of the paper's section: floor 3 m, banks 1:1.5, slope 0.001."""
+    x, y = centres(length, cells[0]), centres(2.0 * half_width, cells[1]) - half_width
+    bed = -0.001 * x[:, None] + np.maximum(np.abs(y) - 1.5, 0.0)[None] / 1.5
+    return bed, np.repeat((np.abs(y) > 1.5).astype(np.int64)[None], cells[0], axis=0)
+
+
+def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: object) -> Problem:
+    """30 m of the paper's channel with dry banks, three classes of resistance and one patch of plants beside the axis."""
+    bed, banks = trapezoid(30.0, 4.5, cells)
+    x, y = centres(30.0, cells[0]), centres(9.0, cells[1]) - 4.5
+    column, row = np.nonzero(((x > 12.0) & (x < 16.0))[:, None] & ((y > 0.0) & (y < 1.5))[None])
+    one = np.ones((column.size, 1))
+    settings = {
+        "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+        "coefficient": np.array([[0.06], [1.0]]),
+        "friction_class": banks,
+        "plants": Plants(column, row, 4.0 * one, 0.7 * one, 60.0 * one),
+        "viscosity": np.array([0.01]),
+        "film": film,
+    }
+    cell = (30.0 / cells[0], 9.0 / cells[1])
+    return make_problem(bed, cell, 2.0, 0.95, **(settings | changes))
+
+
+def solved(problem: Problem, tolerance: float = 1e-10) -> Array:
+    """The steady state that Newton finds from the backwater estimate."""
+    solution = newton(problem, backwater(problem), tolerance)
+    assert solution.converged[0], f"Newton stopped at {solution.correction[0]:.1e} after {solution.iterations[0]}"
+    return solution.state
+
+
+def discharge(problem: Problem, state: Array) -> Array:
+    """Discharge through every west-east face, (nx + 1, m) [m3/s]."""
+    return faces(problem, state).flux_x.sum(axis=1) * problem.dy
+
+
+def order(errors: list[float]) -> float:
+    """Observed order of convergence from the last of a series of halvings."""
+    return float(np.log2(errors[-2] / errors[-1]))
+
+
+def filled(problem: Problem, level: float) -> Array:
+    """Water at rest at one level."""
+    state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
+    state[:, LEVEL] = level
+    return state
+
+
+def mirrored(state: Array) -> Array:
+    """The state seen in a mirror along the axis."""
+    other = np.zeros_like(state)
+    other[:, LEVEL], other[:, ALONG] = state[:, LEVEL, ::-1], state[:, ALONG, ::-1]
+    other[:, ACROSS, 1:] = -state[:, ACROSS, :0:-1]
+    return other
