@@ -4,8 +4,9 @@ A chunk is what one task solves: neighbours in the prior, the same set whatever 
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +16,13 @@ from threadpoolctl import threadpool_limits
 from vegglue import __version__
 from vegglue.config import resolved_yaml, simulation_hash
 from vegglue.ensemble import FAILED, Header
+from vegglue.flow import FlowFields, Problem
 from vegglue.neighbourhood import SIZE, leaves, solve_members
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile, sample_prior
 from vegglue.problem import build_problem
 from vegglue.schema import Case
-from vegglue.sensor import read_sensors
+from vegglue.sensor import flow_fields, read_sensors
 from vegglue.site import Site, build_site
 from vegglue.store import ensemble_writer
 
@@ -96,13 +98,10 @@ def solve_chunk(case: Case, site: Site, observations: Observations, places: np.n
     }
     for number, experiment in enumerate(case.experiments):
         began = time.perf_counter()
-
-        def problem_of(some: np.ndarray, experiment: str = experiment):  # type: ignore[no-untyped-def]
-            return build_problem(case, site, experiment, parameters_at(case, some))
-
-        solved = solve_members(problem_of, places, case.numerics.tolerance)
+        build = partial(_problem_at, case, site, experiment)
+        solved = solve_members(build, places, case.numerics.tolerance)
         here = (station["experiment"] == experiment).to_numpy()
-        readings = read_sensors(problem_of(places), solved.state, site.grid, station[here], sections)
+        readings = read_sensors(build(places), solved.state, site.grid, station[here], sections)
         rows["prediction"][:, here] = readings.prediction
         rows["section_flow"][:, number] = readings.section_flow
         rows["mass_error"] = np.maximum(rows["mass_error"], readings.mass_error)
@@ -114,6 +113,23 @@ def solve_chunk(case: Case, site: Site, observations: Observations, places: np.n
                 rows["reason"][member] = f"{rows['reason'][member]} {experiment}: {reason}".strip()
     rows["prediction"][rows["status"] == FAILED] = np.nan
     return rows
+
+
+def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
+    """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
+    site = build_site(case)
+    place = unit_places(case, {name: np.array([theta[name]]) for name in case.parameters})
+    fields = {}
+    for experiment in case.experiments:
+        build = partial(_problem_at, case, site, experiment)
+        solved = solve_members(build, place, case.numerics.tolerance)
+        if solved.status[0] != FAILED:
+            fields[experiment] = flow_fields(build(place), solved.state, site.grid)
+    return fields
+
+
+def _problem_at(case: Case, site: Site, experiment: str, places: np.ndarray) -> Problem:
+    return build_problem(case, site, experiment, parameters_at(case, places))
 
 
 def make_header(case: Case, observations: Observations, theta: dict[str, np.ndarray], chunks: int) -> Header:

@@ -1,0 +1,62 @@
+# Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests.
+PYTHON ?= python3
+JOBS ?= -1
+DEMO_MEMBERS ?= 1024
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+VEGGLUE := $(BIN)/vegglue
+CASES := d0 d3a d3b d3b_paper
+SOURCES := $(wildcard vegglue/*.py vegglue/*.j2)
+SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+.PHONY: help demo paper test check bench clean simulate infer report setup
+.PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
+help:
+	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
+
+setup: $(READY)  # the environment, in .venv
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	touch $@
+
+demo: $(READY)  # the paper's cases with $(DEMO_MEMBERS) members each, to finished reports
+	@for case in $(CASES); do \
+	  $(VEGGLUE) simulate configs/$$case.yaml --members $(DEMO_MEMBERS) --jobs $(JOBS) --runs runs/demo && \
+	  $(VEGGLUE) infer configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo && \
+	  $(VEGGLUE) report configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo || exit $$?; \
+	done
+	@echo; echo "Reports:"; ls -1 $(CURDIR)/runs/demo/*/report.html
+
+paper: report  # the paper's cases with all 5,000 members
+simulate: $(CASES:%=runs/%/ensemble.h5)  # ensembles that are out of date
+infer: $(CASES:%=runs/%/posterior.h5)  # posteriors that are out of date
+report: $(CASES:%=runs/%/report.html)  # reports that are out of date
+
+runs/%/ensemble.h5: configs/%.yaml $(SHARED)
+	$(VEGGLUE) simulate $< --jobs $(JOBS)
+	@touch $@
+runs/%/posterior.h5: runs/%/ensemble.h5
+	$(VEGGLUE) infer configs/$*.yaml
+runs/%/report.html: runs/%/posterior.h5
+	$(VEGGLUE) report configs/$*.yaml
+
+test: $(READY)  # everything that must pass
+	$(BIN)/ruff check vegglue tests
+	$(BIN)/mypy
+	$(BIN)/pytest tests
+
+check: $(READY)  # the fast part, under a minute
+	$(BIN)/ruff check vegglue tests
+	$(BIN)/mypy
+	$(BIN)/pytest tests -m 'not slow'
+
+bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
+	$(BIN)/python -m tests.bench
+
+clean:  # remove the environment and all runs
+	rm -rf $(VENV) build dist *.egg-info runs/*/

@@ -1,0 +1,5 @@
+"""`python -m vegglue` is `vegglue`."""
+
+from vegglue.cli import main
+
+main()

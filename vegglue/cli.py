@@ -1,0 +1,181 @@
+"""The shell: reads files, calls the verbs, prints what they say. The only place that knows typer and rich."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+from vegglue import __version__
+from vegglue.channel_figure import save_channel_figure
+from vegglue.check import check_case
+from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
+from vegglue.describe import describe
+from vegglue.errors import InputError, StorageError
+from vegglue.infer import glue
+from vegglue.observations import Observations, read_observations
+from vegglue.report import write_report
+from vegglue.schema import Case
+from vegglue.simulate import Progress, simulate, solve_flow
+from vegglue.site import build_site
+from vegglue.store import read_ensemble, read_posterior, write_posterior
+from vegglue.survey import read_survey, rigid_cylinder
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+console = Console(highlight=False, soft_wrap=True)
+
+Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
+Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
+Jobs = Annotated[int, typer.Option(help="Processes at once; -1 for one on every core. Results do not depend on it.")]
+Members = Annotated[
+    int | None,
+    typer.Option(help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),
+]
+
+
+@app.callback()
+def about() -> None:
+    """Calibrate a model of flow through plants against measured velocities, and see where it fails.
+
+    check, then simulate -> infer -> report; every command takes the same CONFIG and works in runs/<name>.
+    """
+
+
+@app.command()
+def version() -> None:
+    """Print the version."""
+    console.print(__version__)
+
+
+@app.command()
+def check(config: Config, runs: Runs = Path("runs")) -> None:
+    """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
+    case, observations = _read(config)
+    site = build_site(case)
+    figure = _folder(runs, case) / "channel.png"
+    oddities = check_case(case, site, observations)
+    for sentence in oddities:
+        console.print(f"- {sentence}")
+    save_channel_figure(case, site, observations, figure)
+    used = int(observations.table["used"].sum())
+    console.print(
+        f"{case.name}: {len(case.experiments)} experiment(s), {site.bed.size:,} cells, {used} of "
+        f"{len(observations.table)} stations in use, {len(oddities)} remark(s). Channel drawn in {figure}"
+    )
+
+
+@app.command(name="simulate")
+def simulate_command(
+    config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs")
+) -> None:
+    """Solve every member of the ensemble; a run that was stopped goes on where it was."""
+    case, observations = _read(config, members)
+    path = _folder(runs, case) / "ensemble.h5"
+    if _is_current(path, case):
+        console.print(f"{path} is up to date.")
+        return
+    with _progress(case.name) as report:
+        simulate(case, observations, path, jobs, report)
+    ensemble = read_ensemble(path)
+    status = ensemble.status
+    console.print(
+        f"{path}: {len(status):,} members, {int((status == 1).sum())} by marching, {int((status == 2).sum())} failed, "
+        f"largest mass error {ensemble.mass_error.max():.1e}"
+    )
+
+
+@app.command()
+def infer(config: Config, members: Members = None, runs: Runs = Path("runs")) -> None:
+    """Weigh the members by the measurements and say what was found."""
+    case, observations = _read(config, members)
+    folder = _folder(runs, case)
+    ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
+    posterior = glue(ensemble, case, observations)
+    write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
+    for sentence in describe(posterior):
+        console.print(f"- {sentence}")
+    console.print(f"Written to {folder / 'posterior.h5'}")
+
+
+@app.command()
+def report(config: Config, members: Members = None, runs: Runs = Path("runs")) -> None:
+    """Make the page and the figures of a run."""
+    case, observations = _read(config, members)
+    folder = _folder(runs, case)
+    ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
+    posterior = read_posterior(folder / "posterior.h5", case_hash(case))
+    flow = solve_flow(case, posterior.median)
+    survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
+    page = write_report(folder, case, observations, ensemble, posterior, flow, survey)
+    console.print(f"Report: {page.resolve()}")
+
+
+def _read(config: Path, members: int | None = None) -> tuple[Case, Observations]:
+    case = load_case(config)
+    if members is not None:
+        case = case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
+    return case, read_observations(case)
+
+
+def _folder(runs: Path, case: Case) -> Path:
+    folder = runs / case.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _is_current(path: Path, case: Case) -> bool:
+    try:
+        read_ensemble(path, simulation_hash(case))
+    except (InputError, StorageError):
+        return False
+    return True
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Callable[[Progress], None]]:
+    """A bar with the time left on a terminal, a line now and then elsewhere."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("members,"),
+        TimeElapsedColumn(),
+        TextColumn("spent,"),
+        TimeRemainingColumn(elapsed_when_finished=False),
+        TextColumn("left{task.fields[note]}"),
+    )
+    with Bar(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(name, total=None, note="")
+
+        def show(progress: Progress) -> None:
+            failed = f", {progress.failed} failed" if progress.failed else ""
+            bar.update(task, completed=progress.solved, total=progress.members, note=failed)
+            if not console.is_terminal:
+                resumed = f" ({progress.resumed} from before)" if progress.resumed else ""
+                print(f"{name}: {progress.solved} of {progress.members} members{resumed}{failed}", flush=True)
+
+        yield show
+
+
+def main() -> None:
+    """Entry point: errors a user can mend are one sentence and exit code 2, a full disk or a lock 3, Ctrl-C 130."""
+    try:
+        app()
+    except InputError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    except StorageError as error:
+        print(error, file=sys.stderr)
+        sys.exit(3)
+    except KeyboardInterrupt:
+        print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()
