@@ -13,7 +13,7 @@ from vegglue.figure_posterior import Reference, Unknown, density, draw_cylinder,
 from vegglue.figure_style import COLOUR, PALETTE, inline, publish
 from vegglue.figures import Bands, Vertical, draw_quantiles, draw_section, draw_verticals
 from vegglue.flow import FlowFields
-from vegglue.typography import as_given, fixed, interval, percent, plus_minus, short, symbol_html, unit_html
+from vegglue.typography import as_given, fixed, interval, percent, plus_minus, short, symbol_html, unit_html, unit_math
 
 Y = np.array([3.0, 1.0, 2.0])  # not in order, as a table need not be
 BANDS = Bands(
@@ -215,7 +215,9 @@ def luminance(colour: str) -> float:
         (percent(0.067), "6.7 %"),
         (symbol_html("n_b"), "<var>n</var><sub>b</sub>"),
         (unit_html("s m^(-1/3)"), "s m<sup>−1/3</sup>"),
+        (unit_html("m3/s"), "m<sup>3</sup>/s"),
         (unit_html("-"), ""),
+        (unit_math("s m^(-1/3)"), "s m$^{-1/3}$"),
     ],
 )
 def test_numbers_are_set_as_in_print(set_: str, expected: str) -> None:

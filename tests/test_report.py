@@ -48,7 +48,7 @@ def an_ensemble(case: Case, table: pd.DataFrame, truth: dict[str, float], failed
         parameters=parameters, prediction=prediction, status=status, station=table, sections=sections,
         reason=np.where(status == FAILED, "the water ran <off> the grid", "").astype(object), mass_error=mass_error,
         iterations=np.full(MEMBERS, 9, np.int32), seconds=np.full(MEMBERS, 0.25), experiments=experiments,
-        section_flow=np.tile(np.where(status == FAILED, np.nan, 2.66)[:, None, None], (1, len(experiments), len(sections))),
+        section_flow=np.tile(mass_error[:, None, None] + 2.66, (1, len(experiments), len(sections))),
         config="name: toy\n", config_hash="0123456789abcdef", seed=1, version="0.1.0",
     )  # fmt: skip
 
@@ -295,6 +295,12 @@ def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
     assert doubt
     sentence = re.sub("<[^>]*>", "", verdict(run.case, replace(run.posterior, identified=known, effective_size=500.0)))
     assert sentence.startswith("nb and ks are identified by these 20 stations; φ is not.")
+
+
+def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
+    manning, drag = (row.posterior for row in parameter_rows(toy[0])[:2])
+    assert float(manning.split()[0]) == pytest.approx(toy[0].posterior.median["n_b"], rel=0.01)
+    assert drag.startswith("10<sup>")
 
 
 def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:

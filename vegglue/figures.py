@@ -211,20 +211,20 @@ def draw_canopy_profiles(inside: Sequence[Vertical], canopy: tuple[float, float]
 
 
 @styled
-def draw_residuals(y: Array, residual: Array, zone: Sequence[str], unit: str) -> Figure:
-    """Measured minus modelled of each station against where it stands, each zone with its mean."""
+def draw_residuals(place: Array, axis: str, residual: Array, zone: Sequence[str], unit: str) -> Figure:
+    """Measured minus modelled of each station against its place on an axis, x or y; a marker for each zone."""
     figure, axes = canvas()
     axes.axhline(0, color=COLOUR["muted"], linewidth=0.8)
-    axes.vlines(y, 0, residual, color=COLOUR["measured"], linewidth=0.8)
+    axes.vlines(place, 0, residual, color=COLOUR["measured"], linewidth=0.8)
     names = list(dict.fromkeys(zone))
     for marker, name in zip("osD^vP", names, strict=False):
         chosen = np.array([other == name for other in zone])
-        axes.plot(y[chosen], residual[chosen], marker, markersize=4.4, color=COLOUR["measured"])
+        axes.plot(place[chosen], residual[chosen], marker, markersize=4.4, color=COLOUR["measured"])
         last = int(np.argmax(np.where(chosen, np.abs(residual), -1)))
         side = 7 if residual[last] >= 0 else -12
-        label(axes, y[last], residual[last], name, "measured", ha="center", xytext=(0, side))
+        label(axes, place[last], residual[last], name, "measured", ha="center", xytext=(0, side))
     axes.margins(y=0.18)
-    axes.set(xlabel="y [m]", ylabel=f"measured − modelled [{unit}]")
+    axes.set(xlabel=f"{axis} [m]", ylabel=f"measured − modelled [{unit}]")
     return figure
 
 

@@ -16,6 +16,7 @@ from vegglue.schema import Case
 from vegglue.survey import RigidCylinder
 from vegglue.typography import NARROW, count, fixed, interval, percent, plus_minus, short, unit_html
 from vegglue.wording import (
+    as_power,
     estimate,
     largest_mass_error,
     measurement_error,
@@ -59,7 +60,7 @@ def findings(run: Run) -> list[Finding]:
 def _parameter(case: Case, posterior: Posterior, name: str) -> Finding:
     low, high = posterior.quantiles[name][0], posterior.quantiles[name][-1]
     unit = unit_html(posterior.unit[name])
-    span = interval(low, high) if name not in posterior.log10_median else f"{short(low, 2)} to {short(high, 2)}"
+    span = interval(low, high) if not as_power(posterior, name) else f"{short(low, 2)} to {short(high, 2)}"
     text = f"{symbol(case, name)} = {estimate(posterior, name)} (95{NARROW}% range {span}{NARROW}{unit})".rstrip()
     share = percent(posterior.width_ratio[name])
     side = pressed_side(posterior, name)

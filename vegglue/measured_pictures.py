@@ -73,7 +73,7 @@ def _below(run: Run, experiment: str, x: float) -> CrossSection | None:
 
 
 def residuals(run: Run) -> Iterator[Picture]:
-    """Residuals across the channel by zone, and against normal quantiles, for each kind of measurement."""
+    """Residuals of each kind by zone, velocities across and levels along the channel, and against normal quantiles."""
     table, posterior = run.observations.table, run.posterior
     used = table["used"].to_numpy(bool)
     zone = np.array(zones(run))
@@ -84,15 +84,15 @@ def residuals(run: Run) -> Iterator[Picture]:
         told = "; ".join(
             f"{html.escape(name)} {fixed(part.mean(), 3)} ± {fixed(part.std(), 3)}" for name, part in means.items()
         )
-        unit = "m" if kind == "level" else "m/s"
-        figure = draw_residuals(table["y"].to_numpy()[rows], residual, list(where), unit)
+        unit, axis = ("m", "x") if kind == "level" else ("m/s", "y")
+        figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit)
         caption = f"Measured minus median prediction, {kind}, by zone (mean ± spread, {unit}): {told}."
-        yield picture(
-            run, figure, f"residuals-{kind}", caption, f"Residuals of {kind} across the channel, by zone. {told}"
-        )
+        yield picture(run, figure, f"residuals-{kind}", caption, f"Residuals of {kind} along {axis}, by zone. {told}")
         score = residual / posterior.noise[rows]
         worst = int(np.argmax(np.abs(score)))
-        names = [f"{table['section'][row] or table['experiment'][row]}, y = {table['y'][row]:g} m" for row in rows]
+        names = [
+            f"{table['section'][row] or table['experiment'][row]}, {axis} = {table[axis][row]:g} m" for row in rows
+        ]
         caption = (
             f"Residuals of {kind} over the error assumed, σ = {short(posterior.sigma[kind], 2)} {unit}: "
             f"the largest is {fixed(score[worst], 1)} at {html.escape(names[worst])}."

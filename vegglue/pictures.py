@@ -22,7 +22,7 @@ from vegglue.measured_pictures import discharges, residuals, sections, verticals
 from vegglue.reported import Run, picture
 from vegglue.statistics import weighted_quantile
 from vegglue.typography import fixed, percent, plus_minus, short
-from vegglue.wording import estimate, largest_mass_error, plant_parameter, symbol
+from vegglue.wording import as_power, estimate, largest_mass_error, plant_parameter, symbol
 
 MOST_PAIRS = 6  # of parameters drawn together
 
@@ -43,13 +43,13 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
 
 
 def _unknown(run: Run, name: str) -> Unknown:
-    low, high = run.posterior.bounds[name]
+    (low, high), logarithmic = run.posterior.bounds[name], as_power(run.posterior, name)
     values = run.posterior.theta[name]
     return Unknown(
         values,
-        float(low) if np.isfinite(low) and (low > 0 or name not in run.posterior.log10_median) else float(values.min()),
+        float(low) if np.isfinite(low) and (low > 0 or not logarithmic) else float(values.min()),
         float(high) if np.isfinite(high) else float(values.max()),
-        name in run.posterior.log10_median,
+        logarithmic,
         run.case.parameters[name].symbol or name,
         run.posterior.unit[name],
     )

@@ -13,7 +13,7 @@ from vegglue.posterior import CorrectedCanopy
 from vegglue.reported import Run, zones
 from vegglue.schema import Case
 from vegglue.typography import NARROW, as_given, fixed, percent, plus_minus, short
-from vegglue.wording import estimate, largest_mass_error, symbol
+from vegglue.wording import as_power, estimate, largest_mass_error, symbol
 
 STATUS = {
     SOLVED_BY_NEWTON: "solved by Newton's method",
@@ -78,7 +78,7 @@ def parameter_rows(run: Run) -> list[ParameterRow]:
     posterior, canopy = run.posterior, run.posterior.canopy
     rows = []
     for name in posterior.parameters:
-        logarithmic = name in posterior.log10_median
+        logarithmic = as_power(posterior, name)
         centre = posterior.log10_median[name] if logarithmic else posterior.median[name]
         sd = posterior.log10_sd[name] if logarithmic else posterior.sd[name]
         beside = _Beside() if canopy and canopy.parameter == name else _beside(run, name, centre, sd)
@@ -130,7 +130,7 @@ def _prior(run: Run, name: str) -> str:
 def _stated(run: Run, name: str) -> tuple[float, float] | None:
     """Median and standard deviation another study gives, on the scale the parameter is looked at."""
     table = run.case.reference.table if run.case.reference else {}
-    stated = table.get(f"log10_{name}" if name in run.posterior.log10_median else name)
+    stated = table.get(f"log10_{name}" if as_power(run.posterior, name) else name)
     return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
 
 
@@ -139,7 +139,7 @@ def _beside(run: Run, name: str, centre: float, sd: float) -> _Beside:
 
     From another study in the standard deviations of both together; from known values in our own and in the study's.
     """
-    logarithmic = name in run.posterior.log10_median
+    logarithmic = as_power(run.posterior, name)
     stated, known = _stated(run, name), (run.case.reference.made_with if run.case.reference else {}).get(name)
     study = from_study = known_value = from_known = "–"
     if stated is not None:

@@ -7,6 +7,7 @@ import re
 NARROW = "\u202f"  # between a number and its unit, never broken
 FIRM = "\u00a0"  # a space where a line must not break
 MINUS = "\u2212"
+POWER = re.compile(r"\^\(?(-?[\d/.]+)\)?|(?<=[a-z])(\d)")  # in a unit: ^(-1/3), ^2, or the 3 of m3/s
 
 
 def decimals(scale: float, figures: int = 2) -> int:
@@ -81,15 +82,19 @@ def symbol_math(symbol: str) -> str:
 
 
 def unit_html(unit: str) -> str:
-    """'s m^(-1/3)' with its powers raised; nothing for '-'."""
-    if unit in ("", "-"):
-        return ""
-    return re.sub(r"\^\(?(-?[\d/.]+)\)?", lambda power: f"<sup>{power[1].replace('-', MINUS)}</sup>", html.escape(unit))
+    """'s m^(-1/3)' or 'm3/s' with its powers raised; nothing for '-'."""
+    return POWER.sub(lambda power: f"<sup>{_digits(power).replace('-', MINUS)}</sup>", html.escape(unit)) * (
+        unit != "-"
+    )
 
 
 def unit_math(unit: str) -> str:
     """The same for matplotlib's mathtext, with a dash for what has no unit."""
-    return re.sub(r"\^\(?(-?[\d/.]+)\)?", r"$^{\1}$", unit) if unit not in ("", "-") else "–"
+    return POWER.sub(lambda power: f"$^{{{_digits(power)}}}$", unit) if unit != "-" else "–"
+
+
+def _digits(power: re.Match[str]) -> str:
+    return power[1] or power[2]
 
 
 def _raised(power: int) -> str:

@@ -13,11 +13,17 @@ def symbol(case: Case, name: str) -> str:
     return symbol_html(case.parameters[name].symbol or name)
 
 
+def as_power(posterior: Posterior, name: str) -> bool:
+    """Whether a parameter is told as a power of ten: looked at in log10, over more than a decade of its prior."""
+    low, high = posterior.prior_quantiles[name][[0, -1]]
+    return name in posterior.log10_median and high > 10 * low
+
+
 def estimate(posterior: Posterior, name: str) -> str:
-    """Median ± standard deviation, as a power of ten for a parameter looked at in log10 (HTML, with unit)."""
+    """Median ± standard deviation, as a power of ten where as_power says so (HTML, with unit)."""
     unit = unit_html(posterior.unit[name])
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
-    if name in posterior.log10_median:
+    if as_power(posterior, name):
         power = plus_minus(posterior.log10_median[name], posterior.log10_sd[name])
         return f"10<sup>{power}</sup>{unit}"
     return plus_minus(posterior.median[name], posterior.sd[name]) + unit
