@@ -12,14 +12,12 @@ from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual, take
 from vegglue.march import settle
 from vegglue.start import backwater
-from vegglue.steady import Factors, Solution, chord, factors, finish
+from vegglue.steady import CLOSE, Factors, Solution, chord, finish, newton
 
 SIZE = 16
 TANGENT_STEP = 1e-4
-# Factors of a start that took more turns than this are renewed at the solution before others lean on them.
-FRESH_AFTER = 8
 # Rows whose bed lies further than this [m] above the water are left out of the band that is solved.
-MARGIN = 0.3
+MARGIN = 0.1
 
 ProblemOf = Callable[[Array], Problem]
 
@@ -150,21 +148,22 @@ Attempt = tuple[Solution, Factors | None, tuple[int, int]]
 
 def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
     band = _band(problem, warm)
-    part, start = crop(problem, *band), _inside(warm, band)
-    shared = factors(part, start)
-    solution = chord(part, start, shared, tolerance, most=16)
-    if solution.converged[0] and solution.iterations[0] > FRESH_AFTER:
-        shared = factors(part, solution.state)
+    solution, shared = finish(crop(problem, *band), _inside(warm, band), tolerance)
     return _checked(problem, solution, shared, band, tolerance)
 
 
 def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float = 200.0) -> Attempt:
     band = _band(problem, warm)
-    solution, shared = finish(crop(problem, *band), _inside(warm, band), tolerance, time_step)
+    part = crop(problem, *band)
+    near = newton(part, _inside(warm, band), CLOSE, time_step=time_step)
+    if not near.converged[0]:
+        return near, None, band
+    solution, shared = finish(part, near.state, tolerance)
+    solution = replace(solution, iterations=solution.iterations + near.iterations)
     return _checked(problem, solution, shared, band, tolerance)
 
 
-def _from_cold(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
+def _from_cold(problem: Problem, warm: Array, tolerance: float) -> Attempt:
     return _by_newton(problem, backwater(problem), tolerance, time_step=10.0)
 
 
@@ -177,7 +176,7 @@ def _checked(
         return solution, shared, band
     wider = _widen(solution.state, problem.shape[1], band)
     band = _band(problem, wider)
-    solution, shared = finish(crop(problem, *band), _inside(wider, band), tolerance, 200.0)
+    solution, shared = finish(crop(problem, *band), _inside(wider, band), tolerance)
     return solution, shared, band
 
 

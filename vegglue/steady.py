@@ -18,8 +18,10 @@ LANES = 15
 DEPTH = 6
 # A step this long [m, m/s] leaves the range where the linearisation means anything.
 LONGEST = 0.25
-# Near enough [m, m/s] for one factorisation to do the rest.
-CLOSE = 5e-3
+# Near enough [m, m/s] for chord steps to do the rest.
+CLOSE = 2e-2
+# Factors of a state further than this [m, m/s] from the root are renewed before neighbours lean on them.
+FRESH = 5e-2
 
 
 @dataclass(frozen=True)
@@ -102,16 +104,24 @@ def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, tim
     return _alone(state, size, most, False)
 
 
-def finish(problem: Problem, start: Array, tolerance: float, time_step: float) -> tuple[Solution, Factors | None]:
-    """Newton until close, then one more factorisation, which neighbours can share, to the tolerance."""
-    near = newton(problem, start, CLOSE, time_step=time_step)
-    if not near.converged[0]:
-        return near, None
-    shared = factors(problem, near.state)
-    end = chord(problem, near.state, shared, tolerance)
-    if not end.converged[0]:
-        end = newton(problem, near.state, tolerance, time_step=1e3)
-    return replace(end, iterations=end.iterations + near.iterations), shared
+def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> tuple[Solution, Factors | None]:
+    """One member from a start near its root: chord steps, the factors renewed while they help (Shamanskii 1967).
+
+    The factors handed back are those of a state that lies within CLOSE of the root, or none if there was no root.
+    """
+    state, spent, largest = near, 0, np.inf
+    for _ in range(rounds):
+        shared = factors(problem, state)
+        end = chord(problem, state, shared, tolerance, most=10)
+        spent += int(end.iterations[0])
+        moved = float(np.abs(end.state - state).max())
+        end = replace(end, iterations=np.array([spent]))
+        if end.converged[0]:
+            return end, shared if moved < FRESH else factors(problem, end.state)
+        if not end.correction[0] < min(largest, LONGEST):
+            break
+        state, largest = end.state, float(end.correction[0])
+    return end, None
 
 
 def _bounded_step(
@@ -171,19 +181,23 @@ def _columns(values: Array, members: np.ndarray) -> Array:
 
 
 def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> Solution:
-    """All members from their starts with one factorisation; those that stall or stray are left unconverged."""
+    """All members from their starts with one factorisation; those that stall or stray keep their best state."""
     members = problem.members
-    final, correction = start.copy(), np.full(members, np.inf)
+    final = start.copy()
     iterations, converged = np.zeros(members, dtype=np.int64), np.zeros(members, dtype=bool)
+    best = np.full(members, np.inf)
     active, running = np.arange(members), np.ones(members, dtype=bool)
     state, part, memory = start, problem, _Memory(start.shape)
     for iteration in range(1, most + 1):
         step = -shared.solve(residual(part, state))
         size = np.abs(step).max(axis=(0, 1, 2))
         now = active[running]
-        iterations[now], correction[now] = iteration, size[running]
+        iterations[now] = iteration
         done = running & (size < tolerance)
-        final[..., active[done]], converged[active[done]] = (state + step)[..., done], True
+        better = running & (size < best[active])
+        best[active[better]] = size[better]
+        final[..., active[better]] = (state + step)[..., better]
+        converged[active[done]] = True
         running = running & ~done & (size < 4.0 * LONGEST)
         if not running.any():
             break
@@ -195,4 +209,4 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
         # Members that strayed stay in their lane until the next cut: they must not spoil the arithmetic of others.
         step[..., ~running] = 0.0
         state = memory.next_state(state, step)
-    return Solution(final, correction, iterations, converged)
+    return Solution(final, best, iterations, converged)
