@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jinja2
 
+from vegglue.config import resolved_yaml
 from vegglue.ensemble import Ensemble
 from vegglue.errors import StorageError
 from vegglue.figure_style import palette_css
@@ -71,7 +72,7 @@ def render(run: Run) -> str:
             failures=failures(run.ensemble),
             health=list(health(run)),
             facts=list(facts(run)),
-            config=run.ensemble.config,
+            config=resolved_yaml(run.case),
         )
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from vegglue.config import case_hash
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
 from vegglue.posterior import CorrectedCanopy
 from vegglue.reported import Run, zones
@@ -234,7 +235,7 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     """What the run depends on: a name and a value each."""
     numerics, infer = run.case.numerics, run.case.infer
     yield "config", run.case.source.name
-    yield "hash of config and data", run.ensemble.config_hash[:16]
+    yield "hash of config and data", case_hash(run.case)[:16]
     yield "seed", str(run.ensemble.seed)
     yield "vegglue", run.ensemble.version
     yield "Python", platform.python_version()
