@@ -59,9 +59,9 @@ def findings(run: Run) -> list[Finding]:
 
 def _parameter(case: Case, posterior: Posterior, name: str) -> Finding:
     low, high = posterior.quantiles[name][0], posterior.quantiles[name][-1]
-    unit = unit_html(posterior.unit[name])
+    unit = f"{NARROW}{unit_html(posterior.unit[name])}".rstrip()
     span = interval(low, high) if not as_power(posterior, name) else f"{short(low, 2)} to {short(high, 2)}"
-    text = f"{symbol(case, name)} = {estimate(posterior, name)} (95{NARROW}% range {span}{NARROW}{unit})".rstrip()
+    text = f"{symbol(case, name)} = {estimate(posterior, name)} (95{NARROW}% range {span}{unit})"
     share = percent(posterior.width_ratio[name])
     side = pressed_side(posterior, name)
     if side:
