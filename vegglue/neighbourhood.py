@@ -48,18 +48,20 @@ class _Tangents:
 
 
 def leaves(places: Array, size: int) -> list[np.ndarray]:
-    """Index sets of at most `size` neighbours, halved across the longest side; each next to the one before it."""
+    """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the last."""
 
-    def halve(index: np.ndarray, upwards: bool) -> list[np.ndarray]:
-        if index.size <= size:
+    def cut(index: np.ndarray, parts: int, upwards: bool) -> list[np.ndarray]:
+        if parts == 1:
             return [index]
         longest = int(np.argmax(np.ptp(places[index], axis=0)))
         ordered = index[np.argsort(places[index, longest], kind="stable")]
-        low, high = ordered[: index.size // 2], ordered[index.size // 2 :]
+        fewer = parts // 2
+        border = index.size * fewer // parts
+        low, high = (ordered[:border], fewer), (ordered[border:], parts - fewer)
         first, second = (low, high) if upwards else (high, low)
-        return halve(first, True) + halve(second, False)
+        return cut(*first, True) + cut(*second, False)
 
-    return halve(np.arange(len(places)), True)
+    return cut(np.arange(len(places)), -(-len(places) // size), True)
 
 
 def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Solved:

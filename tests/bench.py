@@ -1,0 +1,93 @@
+"""Measured speed of the solver at the paper's scale: `make bench`. States figures, asserts none."""
+
+import cProfile
+import os
+import platform
+import pstats
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.config import load_case
+from vegglue.march import advance
+from vegglue.neighbourhood import SIZE, leaves
+from vegglue.observations import read_observations
+from vegglue.prior import sample_prior
+from vegglue.problem import build_problem
+from vegglue.simulate import LEAVES_IN_A_CHUNK, simulate, solve_chunk, unit_places
+from vegglue.site import build_site
+from vegglue.start import backwater
+
+CONFIG = Path(__file__).parents[1] / "configs" / "d3a.yaml"
+PHASES = {
+    "residual": "residual",
+    "jacobian": "Jacobian, its residuals included",
+    "_eliminate": "factorisation",
+    "solve": "back-substitution",
+    "next_state": "Anderson mixing",
+}
+PAPER_STEPS = 6000
+
+
+def main() -> None:
+    case = load_case(CONFIG)
+    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}")
+    step = marching(case)
+    member = steady(case)
+    print(f"steady state by Newton / {PAPER_STEPS:,} marched steps: {PAPER_STEPS * step / member:.0f} times faster")
+    cores(case)
+
+
+def marching(case) -> float:  # type: ignore[no-untyped-def]
+    """Seconds a member and step, eight members at once."""
+    site = build_site(case)
+    problem = build_problem(case, site, "D3a", sample_prior(case.parameters, 8, 1))
+    state = backwater(problem)
+    advance(problem, state, 0.3, 1.0)
+    began = time.perf_counter()
+    for _ in range(10):
+        state = state + advance(problem, state, 0.3, 1.0)
+    seconds = (time.perf_counter() - began) / 10 / 8
+    print(f"marching, 1142 x 40 cells, 8 members: {site.bed.size / seconds / 1e6:.1f} million cell-steps/s on one core")
+    return seconds
+
+
+def steady(case) -> float:  # type: ignore[no-untyped-def]
+    """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
+    site, observations = build_site(case), read_observations(case)
+    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
+    chunk = places[leaves(places, SIZE * LEAVES_IN_A_CHUNK)[7]]
+    solve_chunk(case, site, observations, chunk[:2])
+    profile = cProfile.Profile()
+    began = time.perf_counter()
+    rows = profile.runcall(solve_chunk, case, site, observations, chunk)
+    seconds = time.perf_counter() - began
+    print(
+        f"steady, 1142 x 40 cells: {len(chunk) / seconds:.1f} members/s on one core, "
+        f"{np.median(rows['iterations']):.0f} iterations a member, mass error {rows['mass_error'].max():.0e}, "
+        f"{int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed"
+    )
+    calls = {key[2]: (value[1], value[3]) for key, value in pstats.Stats(profile).stats.items() if "vegglue" in key[0]}  # type: ignore[attr-defined]
+    for name, words in PHASES.items():
+        count, spent = calls[name]
+        print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
+    return seconds / len(chunk)
+
+
+def cores(case) -> None:  # type: ignore[no-untyped-def]
+    """Speed-up from one to two processes over the same members."""
+    observations = read_observations(case)
+    small = case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": 512})})
+    spent = []
+    for jobs in (1, 2):
+        with tempfile.TemporaryDirectory() as folder:
+            began = time.perf_counter()
+            simulate(small, observations, Path(folder) / "ensemble.h5", jobs, lambda progress: None)
+            spent.append(time.perf_counter() - began)
+    print(f"512 members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two, {spent[0] / spent[1]:.2f} times")
+
+
+if __name__ == "__main__":
+    main()
