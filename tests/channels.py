@@ -1,4 +1,4 @@
-"""Channels that the verification tests share: small problems, walls without friction, one member unless `take` says more."""
+"""Channels that the verification tests share: small, with smooth walls, of one member."""
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple
 
 
 def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: object) -> Problem:
-    """30 m of the paper's channel with dry banks, three classes of resistance and one patch of plants beside the axis."""
+    """30 m of the paper's channel: dry banks, Manning, Keulegan, and one patch of plants beside the axis."""
     bed, banks = trapezoid(30.0, 4.5, cells)
     x, y = centres(30.0, cells[0]), centres(9.0, cells[1]) - 4.5
     column, row = np.nonzero(((x > 12.0) & (x < 16.0))[:, None] & ((y > 0.0) & (y < 1.5))[None])
@@ -94,6 +94,11 @@ def discharge(problem: Problem, state: Array) -> Array:
 def order(errors: list[float]) -> float:
     """Observed order of convergence from the last of a series of halvings."""
     return float(np.log2(errors[-2] / errors[-1]))
+
+
+def shown(errors: list[float]) -> str:
+    """A series of errors and its order, to print."""
+    return f"errors {', '.join(f'{error:.2e}' for error in errors)}, order {order(errors):.2f}"
 
 
 def filled(problem: Problem, level: float) -> Array:

@@ -5,7 +5,7 @@
 
 import numpy as np
 import pytest
-from channels import GRAVITY, centres, discharge, make_problem, order, sloping, solved
+from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import quad, solve_bvp
 
 from vegglue import kernels
@@ -43,15 +43,13 @@ def halves(smooth, rough):
 def shiono_knight(mixing: float):
     """nu = mixing h u: u^2 = C^2 h S + A cosh(gamma s) in each half, gamma^2 = 2 c_f / (mixing h^2), s from the wall.
 
-    Shiono and Knight (1991), doi:10.1017/S0022112091001246, without secondary current, with lambda sqrt(f/8) = mixing in
-    both halves; A makes u and the flux of momentum meet in the middle.
+    Shiono and Knight (1991), doi:10.1017/S0022112091001246, without secondary current; mixing = lambda sqrt(f/8) is one
+    number for both halves; A makes u and the flux of momentum meet in the middle.
     """
     gamma = [np.sqrt(2.0 * GRAVITY / mixing) / (chezy * DEPTH) for chezy in (SMOOTH, ROUGH)]
     far = [chezy**2 * DEPTH * SLOPE for chezy in (SMOOTH, ROUGH)]
     arm = [g * 0.5 * WIDTH for g in gamma]
-    meet = np.array(
-        [[np.cosh(arm[0]), -np.cosh(arm[1])], [gamma[0] * np.sinh(arm[0]), gamma[1] * np.sinh(arm[1])]]
-    )
+    meet = np.array([[np.cosh(arm[0]), -np.cosh(arm[1])], [gamma[0] * np.sinh(arm[0]), gamma[1] * np.sinh(arm[1])]])
     height = np.linalg.solve(meet, [far[1] - far[0], 0.0])
     return halves(*(lambda s, k=k: np.sqrt(far[k] + height[k] * np.cosh(gamma[k] * s)) for k in (0, 1)))
 
@@ -60,11 +58,9 @@ def integrated(viscosity: float):
     """The same with a constant viscosity, where u^2 has no closed form: solved as a boundary-value problem."""
 
     def slopes(_, u):
-        return np.array(
-            [part for k, chezy in ((0, SMOOTH), (2, ROUGH)) for part in (
-                u[k + 1], (GRAVITY / (chezy**2 * DEPTH) * u[k] ** 2 - GRAVITY * SLOPE) / viscosity
-            )]
-        )
+        smooth = GRAVITY * (u[0] ** 2 / (SMOOTH**2 * DEPTH) - SLOPE) / viscosity
+        rough = GRAVITY * (u[2] ** 2 / (ROUGH**2 * DEPTH) - SLOPE) / viscosity
+        return np.array([u[1], smooth, u[3], rough])
 
     def ends(wall, middle):
         return np.array([wall[1], wall[3], middle[0] - middle[2], middle[1] + middle[3]])
@@ -87,7 +83,7 @@ def test_velocity_across_two_roughnesses(kind):
         y = centres(WIDTH, rows)
         viscosity = 0.1 * DEPTH * exact(y) if kind == "shiono-knight" else np.full(rows, 0.05)
         errors.append(float(np.abs(developed(viscosity, flow, rows) - exact(y)).max()))
-    print(f"{kind}: u from {exact(6.0):.3f} to {exact(0.0):.3f} m/s, errors {errors}, order {order(errors):.2f}")
+    print(f"{kind}: u from {exact(6.0):.3f} to {exact(0.0):.3f} m/s, {shown(errors)}")
     assert errors[-1] < 4e-4
     assert order(errors) > 1.8
 
