@@ -1,8 +1,9 @@
-"""The Jacobian as blocks of one column each, filled from differences of the residual, factored and solved along the channel.
+"""The Jacobian as blocks of one column each, filled from differences of the residual, factored and solved along the
+channel.
 
-Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from downstream, so
-eliminating from upstream downwards leaves, at each column, the well-posed problem of the reach above it under a given level:
-no exchange of rows between blocks is needed.
+Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from
+downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the reach above
+it under a given level: no exchange of rows between blocks is needed.
 """
 
 import numpy as np
@@ -43,7 +44,9 @@ def collect(blocks, far, base, rates, colours, step):
 
 @compiled
 def factor(blocks, far):
-    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i), so that solving is three products a column."""
+    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i), so that solving is three products a
+    column.
+    """
     nx, _, n, _ = blocks.shape
     for i in range(nx):
         if i > 1:

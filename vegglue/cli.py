@@ -70,9 +70,7 @@ def check(config: Config, runs: Runs = Path("runs")) -> None:
 
 
 @app.command(name="simulate")
-def simulate_command(
-    config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs")
-) -> None:
+def simulate_command(config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs")) -> None:
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
     case, observations = _read(config, members)
     path = _folder(runs, case) / "ensemble.h5"

@@ -3,8 +3,9 @@
     dh/dt + d(hu)/dx + d(hv)/dy = 0
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
 
-with k = g / (C^2 h) [1/m] from the friction laws. A state of m members is one array (nx, 3, ny, m): level at cell centres,
-v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the east face of each cell.
+with k = g / (C^2 h) [1/m] from the friction laws. A state of m members is one array (nx, 3, ny, m): level at cell
+centres, v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the east face of each
+cell.
 """
 
 from dataclasses import dataclass, replace
@@ -42,7 +43,9 @@ class Plants:
 
 @dataclass(frozen=True)
 class Problem:
-    """One experiment for m members on one grid: bed (nx, ny) [m], friction classes, plants, boundaries, viscosity [m2/s]."""
+    """One experiment for m members on one grid: bed (nx, ny) [m], friction classes, plants, boundaries, viscosity
+    [m2/s].
+    """
 
     dx: float
     dy: float
@@ -70,7 +73,9 @@ class Problem:
 
 @dataclass(frozen=True)
 class Faces:
-    """What a state means on the grid: depths [m] at cells, faces, corners; velocities [m/s] and fluxes [m2/s] on faces."""
+    """What a state means on the grid: depths [m] at cells, faces, corners; velocities [m/s] and fluxes [m2/s] on
+    faces.
+    """
 
     level: Array
     cell: Array

@@ -1,7 +1,8 @@
 """Compiled loops of the shallow-water residual; the innermost axis of every array is the member (a SIMD lane).
 
-Staggered grid of nx x ny cells: level at cell centres, u on west-east faces, v on south-north faces. Shapes, with m members:
-cells (nx, ny, m), west-east faces (nx + 1, ny, m), south-north faces (nx, ny + 1, m), corners (nx + 1, ny + 1, m).
+Staggered grid of nx x ny cells: level at cell centres, u on west-east faces, v on south-north faces. Shapes, with m
+members: cells (nx, ny, m), west-east faces (nx + 1, ny, m), south-north faces (nx, ny + 1, m), corners (nx + 1, ny +
+1, m).
 """
 
 import math
@@ -22,7 +23,8 @@ compiled = njit(cache=True, fastmath={"contract", "nsz", "arcp", "reassoc"}, err
 
 @compiled
 def _film(depth: float, film: float) -> float:
-    """h > 0 [m], smooth: d + f^2/d + .. above the waterline, 1.05 f on it, f / 10 on dry land, where the water table runs on.
+    """h > 0 [m], smooth: d + f^2/d + .. above the waterline, 1.05 f on it, f / 10 on dry land, where the water table
+    runs on.
 
     h = (d + r) / 2 + f (1 - d/r) / 20 with r = sqrt(d^2 + 4 f^2).
     """
@@ -32,7 +34,9 @@ def _film(depth: float, film: float) -> float:
 
 @compiled
 def _afloat(depth: float, film: float) -> float:
-    """Share of advection and mixing kept, 1 - O((2 f / h)^4): none in the film on dry land, where friction rules alone."""
+    """Share of advection and mixing kept, 1 - O((2 f / h)^4): none in the film on dry land, where friction rules
+    alone.
+    """
     ratio = (0.5 * depth / film) ** 2
     ratio *= ratio
     return ratio / (1.0 + ratio)
@@ -154,7 +158,9 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 u_e = _upwind_downstream(c_e, u[f - 1, j, k], here, u[f2, j, k])
                 u_s = _upwind(c_s, u[f, j1, k], u[f, j2, k], here, u[f, j3, k])
                 u_n = _upwind(c_n, u[f, j2, k], here, u[f, j3, k], u[f, j4, k])
-                carried = (c_e * (u_e - here) - c_w * (u_w - here)) / dx + (c_n * (u_n - here) - c_s * (u_s - here)) / dy
+                carried = (c_e * (u_e - here) - c_w * (u_w - here)) / dx + (
+                    c_n * (u_n - here) - c_s * (u_s - here)
+                ) / dy
                 nu_a, nu_b = viscosity[a, j, k], viscosity[b, j, k]
                 t_e = 2.0 * nu_b * cell[b, j, k] * (u[f2, j, k] - here) / dx
                 t_w = 2.0 * nu_a * cell[a, j, k] * (here - u[f - 1, j, k]) / dx
@@ -166,8 +172,10 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 across = 0.25 * (v[a, j, k] + v[a, j + 1, k] + v[b, j, k] + v[b, j + 1, k])
                 speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
                 rough = (
-                    (drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]) / (cell[a, j, k] + cell[b, j, k])
-                ) * speed * here
+                    ((drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]) / (cell[a, j, k] + cell[b, j, k]))
+                    * speed
+                    * here
+                )
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
                 moved = (carried - mixed / face_x[f, j, k]) * _afloat(face_x[f, j, k], film)
                 out[offset + a - first, 2, j, k] = moved + GRAVITY * drop / dx + rough
@@ -193,21 +201,31 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                 # Water enters through the west side with no velocity across.
                 v_w = _upwind_downstream(c_w, v[i1, j, k], v[i2, j, k], here) if i > 0 else 0.0
                 v_e = _upwind_downstream(c_e, v[i2, j, k], here, v[i3, j, k])
-                carried = (c_e * (v_e - here) - c_w * (v_w - here)) / dx + (c_n * (v_n - here) - c_s * (v_s - here)) / dy
+                carried = (c_e * (v_e - here) - c_w * (v_w - here)) / dx + (
+                    c_n * (v_n - here) - c_s * (v_s - here)
+                ) / dy
                 nu_s, nu_n = viscosity[i, j - 1, k], viscosity[i, j, k]
                 t_n = 2.0 * nu_n * cell[i, j, k] * (v[i, j + 1, k] - here) / dy
                 t_s = 2.0 * nu_s * cell[i, j - 1, k] * (here - v[i, j - 1, k]) / dy
                 nu_w = 0.25 * (nu_s + nu_n + viscosity[i2, j - 1, k] + viscosity[i2, j, k])
                 nu_e = 0.25 * (nu_s + nu_n + viscosity[i3, j - 1, k] + viscosity[i3, j, k])
                 t_w = nu_w * corner[i, j, k] * ((u[i, j, k] - u[i, j - 1, k]) / dy + (here - v[i2, j, k]) / dx)
-                t_e = nu_e * corner[i + 1, j, k] * ((u[i + 1, j, k] - u[i + 1, j - 1, k]) / dy + (v[i3, j, k] - here) / dx)
+                t_e = (
+                    nu_e
+                    * corner[i + 1, j, k]
+                    * ((u[i + 1, j, k] - u[i + 1, j - 1, k]) / dy + (v[i3, j, k] - here) / dx)
+                )
                 mixed = (t_e - t_w) / dx + (t_n - t_s) / dy
                 along = 0.25 * (u[i, j, k] + u[i + 1, j, k] + u[i, j - 1, k] + u[i + 1, j - 1, k])
                 speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
                 rough = (
-                    (drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k])
-                    / (cell[i, j, k] + cell[i, j - 1, k])
-                ) * speed * here
+                    (
+                        (drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k])
+                        / (cell[i, j, k] + cell[i, j - 1, k])
+                    )
+                    * speed
+                    * here
+                )
                 slope = (level[i, j, k] - level[i, j - 1, k]) / dy
                 moved = (carried - mixed / face_y[i, j, k]) * _afloat(face_y[i, j, k], film)
                 out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + rough
@@ -259,8 +277,8 @@ def velocities(state, first, stop, cell, west, south, north):
 
 @compiled
 def rates(state, bed, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
-    """R(state), (nx, 3, ny, m), strip by strip so that what is between fits the cache; drag and viscosity (nx, ny, m)."""
-    nx, _, ny, m = state.shape
+    """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache; drag, viscosity (nx, ny, m)."""
+    nx = state.shape[0]
     out = np.empty_like(state)
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
@@ -272,8 +290,6 @@ def rates(state, bed, drag, viscosity, west, south, north, outlet, outlet_level,
         lo, hi = first - a, stop - a
         continuity(out, first, lo, hi, wet[4], wet[5], dx, dy)
         momentum_y(out, first, lo, hi, level, u, v, wet, drag[a:b], viscosity[a:b], film, dx, dy)
-        momentum_x(
-            out, first, lo, hi, level, u, v, wet, drag[a:b], viscosity[a:b], outlet, outlet_level, film, dx, dy
-        )
+        momentum_x(out, first, lo, hi, level, u, v, wet, drag[a:b], viscosity[a:b], outlet, outlet_level, film, dx, dy)
         out[first:stop, 1, 0] = state[first:stop, 1, 0]
     return out

@@ -48,7 +48,9 @@ class _Tangents:
 
 
 def leaves(places: Array, size: int) -> list[np.ndarray]:
-    """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the last."""
+    """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the
+    last.
+    """
 
     def cut(index: np.ndarray, parts: int, upwards: bool) -> list[np.ndarray]:
         if parts == 1:
@@ -65,7 +67,7 @@ def leaves(places: Array, size: int) -> list[np.ndarray]:
 
 
 def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Solved:
-    """Steady states of all places; the result of a member does not depend on who else is asked for beyond `tolerance`."""
+    """Steady states of all places; a member's does not depend on who else is asked for, beyond `tolerance`."""
     whole = problem_of(places)
     (nx, ny), m = whole.shape, len(places)
     state = np.full((nx, 3, ny, m), np.nan)
@@ -96,9 +98,7 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Sol
     return Solved(state, status, reason, iterations)
 
 
-def _warm_start(
-    places: Array, centre: int, solved: np.ndarray, state: Array, known: list[_Tangents]
-) -> Array | None:
+def _warm_start(places: Array, centre: int, solved: np.ndarray, state: Array, known: list[_Tangents]) -> Array | None:
     """From the nearest solved member, along the nearest tangents."""
     if solved.size == 0 or not known:
         return None
@@ -135,10 +135,11 @@ def _solve_centre(
     """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
     problem = take(whole, np.array([centre]))
     spent = 0
-    for attempt in (_quick, _by_newton, _from_cold):
-        if warm is None and attempt is not _from_cold:
-            continue
-        solution, shared, band = attempt(problem, warm, tolerance)
+    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
+    if warm is not None:
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance), *attempts]
+    for attempt in attempts:
+        solution, shared, band = attempt()
         spent += int(solution.iterations[0])
         if solution.converged[0] and shared is not None:
             return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
@@ -165,7 +166,7 @@ def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float
     return _checked(problem, solution, shared, band, tolerance)
 
 
-def _from_cold(problem: Problem, warm: Array, tolerance: float) -> Attempt:
+def _from_cold(problem: Problem, tolerance: float) -> Attempt:
     return _by_newton(problem, backwater(problem), tolerance, time_step=10.0)
 
 
@@ -192,7 +193,9 @@ def _lead(
     spent: int,
 ) -> _Lead:
     ny = problem_of(place[None]).shape[1]
-    slopes = tuple(_widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared))
+    slopes = tuple(
+        _widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared)
+    )
     state = _widen(solution.state, ny, band)
     return _Lead(state, SOLVED_BY_NEWTON, "", spent, _Tangents(place, slopes), shared, band)
 

@@ -1,6 +1,7 @@
 """config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
 
-A chunk is what one task solves: neighbours in the prior, the same set whatever the number of jobs, so that results are too.
+A chunk is what one task solves: neighbours in the prior, the same set whatever the number of jobs, so that the
+results are too.
 """
 
 import time
@@ -40,9 +41,7 @@ class Progress:
     resumed: int
 
 
-def simulate(
-    case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]
-) -> None:
+def simulate(case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
     Errors: StorageError when another run holds the folder or the disk is full (what was written stays).

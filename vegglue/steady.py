@@ -1,17 +1,20 @@
 """Steady states: Newton with pseudo-time for the first member of a neighbourhood, its factors shared by the others.
 
-Newton solves (D/dt + J) delta = -R, D the storage of each unknown, dt growing until it no longer matters (Kelley and Keyes
-1998, doi:10.1137/S0036142996304796). Neighbours iterate x <- x - M^-1 R(x) with the factors M of their centre, accelerated by
-Anderson's mixing (Walker and Ni 2011, doi:10.1137/10078356X). However a member was reached, it is accepted on its own
-residual only: the largest correction M^-1 R, in m/s and m, is below the tolerance.
+Newton solves (D/dt + J) delta = -R, D the storage of each unknown, dt growing until it no longer matters (Kelley and
+Keyes 1998, doi:10.1137/S0036142996304796). Neighbours iterate x <- x - M^-1 R(x) with the factors M of their centre,
+accelerated by Anderson's mixing (Walker and Ni 2011, doi:10.1137/10078356X). However a member was reached, it is
+accepted on its own residual only: the largest correction M^-1 R, in m/s and m, is below the tolerance.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue import blocks
 from vegglue.flow import LEVEL, Array, Problem, residual, take
+
+Single = NDArray[np.float32]
 
 STEP = 1e-6
 LANES = 15
@@ -28,15 +31,15 @@ FRESH = 5e-2
 class Factors:
     """The eliminated Jacobian of one member: J^-1 costs three products a column."""
 
-    columns: Array
-    far: Array
+    columns: Single
+    far: Single
 
     def solve(self, right: Array) -> Array:
         """J^-1 right, (nx, 3, ny, m)."""
         nx, _, ny, m = right.shape
         work = right.astype(np.float32).reshape(nx, 3 * ny, m)
         blocks.solve(self.columns, self.far, work)
-        return work.reshape(right.shape)
+        return work.reshape(right.shape).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Solution:
     converged: np.ndarray
 
 
-def jacobian(problem: Problem, state: Array) -> tuple[Array, Array]:
+def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
     """J = dR/dstate of one member by coloured differences: blocks (nx, 3, n, n) and far diagonal (nx, n), n = 3 ny.
 
     Single precision is enough: the factors only lead to the root, the residual in double precision says where it is.
@@ -73,7 +76,7 @@ def factors(problem: Problem, state: Array) -> Factors:
     return _eliminate(*jacobian(problem, state))
 
 
-def _storage(problem: Problem, state: Array) -> Array:
+def _storage(problem: Problem, state: Array) -> Single:
     """dh/dz_s of the film at each level, 1 for velocities: (nx, n)."""
     nx, _, ny, _ = state.shape
     above = state[:, LEVEL, :, 0] - problem.bed
@@ -82,7 +85,7 @@ def _storage(problem: Problem, state: Array) -> Array:
     return storage.reshape(nx, 3 * ny)
 
 
-def _eliminate(columns: Array, far: Array) -> Factors:
+def _eliminate(columns: Single, far: Single) -> Factors:
     """Factors in the place of the blocks."""
     blocks.factor(columns, far)
     return Factors(columns, far)
@@ -125,7 +128,7 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
 
 
 def _bounded_step(
-    rates: Array, columns_far: tuple[Array, Array], storage: Array, time_step: float
+    rates: Array, columns_far: tuple[Single, Single], storage: Single, time_step: float
 ) -> tuple[Array, float]:
     """-(D/dt + J)^-1 R with dt cut until no entry is longer than LONGEST; the last one tried if none is."""
     columns, far = columns_far
@@ -148,13 +151,15 @@ class _Memory:
     """The last DEPTH changes of every member's correction, for Anderson's mixing; filled in place, slot by slot."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
-        self.turns, self.sums = np.zeros((DEPTH, *shape), np.float32), np.zeros((DEPTH, *shape), np.float32)
+        self.turns: Single = np.zeros((DEPTH, *shape), np.float32)
+        self.sums: Single = np.zeros((DEPTH, *shape), np.float32)
         self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
         self.last: tuple[Array, Array] | None = None
         self.count = 0
 
     def keep(self, members: np.ndarray) -> None:
-        self.turns, self.sums = _columns(self.turns, members), _columns(self.sums, members)
+        self.turns = np.ascontiguousarray(self.turns[..., members])
+        self.sums = np.ascontiguousarray(self.sums[..., members])
         self.gram = _columns(self.gram, members)
         if self.last is not None:
             self.last = _columns(self.last[0], members), _columns(self.last[1], members)
