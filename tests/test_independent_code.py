@@ -1,0 +1,117 @@
+"""Against flows that other codes computed. Their files lie in a folder `shared` beside the repository, else: skipped.
+
+open-a: an explicit finite-volume code, truth given. delft3d: Delft3D-FLOW 6.04 on the channel of the paper.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from channels import centres, make_problem, solved, trapezoid
+
+from vegglue import kernels
+from vegglue.flow import LEVEL, Plants, faces
+from vegglue.sensor import read_sensors
+from vegglue.site import Grid
+
+CASES = Path(__file__).parents[2] / "shared" / "cases"
+CELL = (0.5, 0.375)
+pytestmark = pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository")
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def patch_cells(x, y, patches):
+    """Column, row and patch number of the cells whose centre lies in a patch, {x: (from, to), y: (from, to)}."""
+    found = [
+        np.stack([*np.nonzero(((x > p["x"][0]) & (x < p["x"][1]))[:, None] & ((y > p["y"][0]) & (y < p["y"][1])))])
+        for p in patches
+    ]
+    number = np.repeat(np.arange(len(patches)), [cells.shape[1] for cells in found])
+    return *np.concatenate(found, axis=1), number
+
+
+def test_true_parameters_reproduce_the_holdout():
+    """Root mean square difference at 105 stations: measured 0.0107 m/s, floor 0.005, banks 0.0135.
+
+    From these cells to half their size the other code changes by 0.006 m/s itself (inside) and 0.016 (banks).
+    """
+    folder = CASES / "open-a"
+    place, truth = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
+    truth, run = truth["truth"], place["holdout"]["hold"]
+    cells = (200, 24)
+    grid = Grid(centres(100.0, cells[0]), centres(9.0, cells[1]) - 4.5, *CELL)
+    bed, banks = trapezoid(100.0, 4.5, cells)
+    column, row, number = patch_cells(grid.x, grid.y, place["patches"])
+    stems = np.array([patch["stems_per_m2"] for patch in place["patches"]])[number][:, None]
+    plants = Plants(column, row, truth["phi"] * stems / 22.0, 0.0 * stems + truth["hd"], 0.0 * stems + 60.0)
+    changes = {
+        "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+        "coefficient": np.array([[truth["nb"]], [truth["ks"]]]),
+        "friction_class": banks,
+        "plants": plants,
+        "viscosity": np.array([truth["nu"]]),
+        "film": 0.002,
+    }
+    problem = make_problem(bed, CELL, run["discharge_m3_s"], run["downstream_level_m"], **changes)
+    station = pd.read_csv(folder / "holdout.csv").assign(kind="velocity")
+    read = read_sensors(problem, solved(problem, 1e-8), grid, station, ()).prediction[0]
+    difference, floor = (read - station["u"]).to_numpy(), (station["y"].abs() < 1.5).to_numpy()
+    print(f"open-a holdout: root mean square difference {rms(difference):.4f} m/s", end=" ")
+    print(f"(floor {rms(difference[floor]):.4f}, banks {rms(difference[~floor]):.4f})")
+    assert rms(difference) <= 0.012
+
+
+SEVEN = [{"x": (55.0 + 8.0 * n, 59.0 + 8.0 * n), "y": (6.0, 7.5) if n % 2 == 0 else (7.5, 9.0)} for n in range(7)]
+FIRST_ROW = 8
+
+
+def papers_channel(case):
+    """171 m of the paper's channel, 9 m of its width, with the resistance of one of Delft3D's two cases."""
+    bed, classes = trapezoid(171.0, 4.5, (342, 24))
+    column, row, _ = patch_cells(centres(171.0, 342), centres(15.0, 40)[FIRST_ROW : FIRST_ROW + 24], SEVEN)
+    if case == "manning":
+        classes[column, row] = 2
+        changes = {"law": np.zeros(3, np.int64), "coefficient": np.array([[0.10], [0.12], [0.40]])}
+    else:
+        one = np.ones((column.size, 1))
+        changes = {
+            "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+            "coefficient": np.array([[0.10], [2.7]]),
+            "plants": Plants(column, row, 40.0 * one, 0.8 * one, 60.0 * one),
+        }
+    changes |= {"friction_class": classes, "viscosity": np.array([0.01]), "film": 0.002}
+    return make_problem(bed, CELL, 2.66, 1.1 - 0.171, **changes)
+
+
+@pytest.mark.parametrize("case", ["manning", "paper_laws"])
+def test_delft3d(case):
+    """u in the wet cells of six sections: within 0.015 m/s root mean square, measured 0.0090 and 0.0098.
+
+    What differs: roughness on cell faces there, the smaller of two depths on a face, land where 12 h < 1.0129 k_s, another
+    inflow and advection scheme. TELEMAC-2D and Delft3D differ by 0.002 (beside a patch) to 0.006 m/s (in it).
+    """
+    theirs = pd.read_csv(CASES / "delft3d" / f"{case}.csv")
+    problem = papers_channel(case)
+    state = solved(problem, 1e-8)
+    now = faces(problem, state)
+    u, level = 0.5 * (now.u[1:] + now.u[:-1])[..., 0], state[:, LEVEL, :, 0]
+    cells = np.rint(theirs["x"] / 0.5 - 0.5).astype(int), np.rint(theirs["y"] / 0.375 - 0.5).astype(int) - FIRST_ROW
+    assert np.abs(problem.bed[cells] - theirs["bed"]).max() < 2e-3
+    apart = theirs.assign(u=u[cells] - theirs["u"], level=level[cells] - theirs["level"])
+    apart["floor"] = (theirs["y"] - 7.5).abs() < 1.5
+    table = {}
+    for x in (30.0, 57.0, 65.0, 73.0, 100.0, 150.0):
+        here = apart[(apart["x"] - x).abs() < 0.3]
+        floor, bank = here[here["floor"]]["u"], here[~here["floor"]]["u"]
+        table[x] = (rms(here["u"]), rms(floor), rms(bank), here["u"].abs().max(), here["level"].mean())
+    print(f"\n{case}: less Delft3D-FLOW; u [m/s]: root mean square, floor, banks, largest; level [m]: mean")
+    print(pd.DataFrame(table, index=["u", "floor", "banks", "largest", "level"]).T.round(4).to_string())
+    overall = rms([row[0] for row in table.values()])
+    print(f"six sections: {overall:.4f} m/s; all wet cells: {rms(apart['u']):.4f} m/s")
+    assert overall < 0.015
+    assert apart["level"].abs().mean() < 0.01
