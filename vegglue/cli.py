@@ -31,10 +31,12 @@ console = Console(highlight=False, soft_wrap=True)
 
 Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
 Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
-Jobs = Annotated[int, typer.Option(help="Processes at once; -1 for one on every core. Results do not depend on it.")]
+Jobs = Annotated[
+    int, typer.Option(min=-1, help="Processes at once; -1 for one on every core. Results do not depend on it.")
+]
 Members = Annotated[
     int | None,
-    typer.Option(help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),
+    typer.Option(min=1, help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),
 ]
 
 
@@ -72,6 +74,8 @@ def check(config: Config, runs: Runs = Path("runs")) -> None:
 @app.command(name="simulate")
 def simulate_command(config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs")) -> None:
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
+    if jobs == 0:
+        raise InputError("--jobs: expected the number of processes, or -1 for one on every core, got 0.")
     case, observations = _read(config, members)
     path = _folder(runs, case) / "ensemble.h5"
     if _is_current(path, case):
