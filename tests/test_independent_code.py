@@ -38,7 +38,7 @@ def patch_cells(x, y, patches):
 def test_true_parameters_reproduce_the_holdout():
     """Root mean square difference at 105 stations: measured 0.0107 m/s, floor 0.005, banks 0.0135.
 
-    From these cells to half their size the other code changes by 0.006 m/s itself (inside) and 0.016 (banks).
+    On cells as coarse as these the other code is 0.006 m/s (inside) and 0.016 (banks) from its own result.
     """
     folder = CASES / "open-a"
     place, truth = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
@@ -92,8 +92,8 @@ def papers_channel(case):
 def test_delft3d(case):
     """u in the wet cells of six sections: within 0.015 m/s root mean square, measured 0.0090 and 0.0098.
 
-    What differs: roughness on cell faces there, the smaller of two depths on a face, land where 12 h < 1.0129 k_s, another
-    inflow and advection scheme. TELEMAC-2D and Delft3D differ by 0.002 (beside a patch) to 0.006 m/s (in it).
+    What differs: roughness on cell faces there, the smaller of two depths on a face, land where 12 h < 1.0129 k_s,
+    another inflow and advection scheme. TELEMAC-2D and Delft3D differ by 0.002 beside a patch and 0.006 m/s in it.
     """
     theirs = pd.read_csv(CASES / "delft3d" / f"{case}.csv")
     problem = papers_channel(case)
