@@ -52,7 +52,8 @@ class EnsembleWriter:
             raise ValueError(f"chunk {chunk}: expected the rows {sorted(ROWS)}, got {sorted(rows)}")
         with _told_as_storage_error(self.path):
             for name, values in rows.items():
-                group[name][members[order]] = _fitted(values, group[name])[order]
+                if group[name].size:  # h5py cannot select members of nothing: a case without stations
+                    group[name][members[order]] = _fitted(values, group[name])[order]
             self._sync()  # the rows must be on disk before they are called finished
             self.file["progress/finished"][chunk] = 1
             self._sync()
