@@ -1,0 +1,56 @@
+"""The short reach of the README as a user would have it: its files on disk, and the command line in a process of its own."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg", "COLUMNS": "200"}
+COARSE = ("cell: [1.0, 0.5]", "cell: [1.25, 0.75]")  # solves several members in a hundredth of a second
+
+
+def block(language: str) -> str:
+    """The first code block of the README in a language."""
+    found = re.search(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert found, f"README.md has no {language} block"
+    return found[1]
+
+
+def write_reach(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The config and the measurements of the README in a folder, with some text replaced; returns the config."""
+    text = block("yaml")
+    for old, new in changes:
+        assert old in text, f"the example of the README has no {old!r}"
+        text = text.replace(old, new)
+    (folder / "velocities.csv").write_text(block("csv"), encoding="utf-8")
+    (folder / "brook.yaml").write_text(text, encoding="utf-8")
+    return folder / "brook.yaml"
+
+
+def command(*arguments: str | int | Path) -> list[str]:
+    return [sys.executable, "-m", "vegglue", *map(str, arguments)]
+
+
+def vegglue(folder: Path, *arguments: str | int | Path, succeed: bool = True) -> subprocess.CompletedProcess[str]:
+    """What `vegglue ...` said and how it ended, run in a folder."""
+    done = subprocess.run(
+        command(*arguments), cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert not succeed or done.returncode == 0, done.stderr
+    return done
+
+
+def begin(folder: Path, *arguments: str | int | Path) -> "subprocess.Popen[str]":
+    """`vegglue ...` on its way, its output to be read line by line, in a process group of its own as from a terminal."""
+    return subprocess.Popen(
+        command(*arguments),
+        cwd=folder,
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
