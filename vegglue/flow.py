@@ -67,6 +67,14 @@ class Problem:
         return self.bed.shape[0], self.bed.shape[1]
 
     @property
+    def reach(self) -> Array:
+        """Half the range of the bed within each cell, (nx, ny) [m], at least four films."""
+        nx, ny = self.shape
+        rise_x = np.gradient(self.bed, axis=0) if nx > 1 else np.zeros_like(self.bed)
+        rise_y = np.gradient(self.bed, axis=1) if ny > 1 else np.zeros_like(self.bed)
+        return np.maximum(0.5 * (np.abs(rise_x) + np.abs(rise_y)), 4.0 * self.film)
+
+    @property
     def members(self) -> int:
         return self.outlet_level.size
 
@@ -159,10 +167,17 @@ def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
     return fluxes["west"], fluxes["south"], fluxes["north"]
 
 
+def storage(problem: Problem, level: Array) -> Array:
+    """dh/dz_s of every cell [-], (nx, ny, m): the share of it that is wet."""
+    above = level - problem.bed[:, :, None] - 0.1 * problem.film
+    reach = problem.reach[:, :, None]
+    return np.clip(0.5 * (above + reach) / reach, 0.0, 1.0)
+
+
 def faces(problem: Problem, state: Array) -> Faces:
     """Depths, velocities and fluxes of a state (nx, 3, ny, m), boundaries included."""
     level = np.ascontiguousarray(state[:, LEVEL])
-    cell, face_x, face_y, corner = kernels.depths(level, problem.bed, problem.outlet_level, problem.film)
+    cell, face_x, face_y, corner = kernels.depths(level, problem.bed, problem.reach, problem.outlet_level, problem.film)
     u, v = kernels.velocities(state, 0, problem.shape[0], cell, *_side_fluxes(problem, cell))
     return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
 
@@ -188,11 +203,12 @@ def drag(problem: Problem, depth: Array) -> Array:
 
 def residual(problem: Problem, state: Array) -> Array:
     """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
-    depth = kernels.cell_depth(state, problem.bed, problem.film)
+    depth = kernels.cell_depth(state, problem.bed, problem.reach, problem.film)
     viscosity = np.broadcast_to(problem.viscosity, depth.shape)
     return kernels.rates(
         state,
         problem.bed,
+        problem.reach,
         drag(problem, depth),
         np.ascontiguousarray(viscosity),
         *_side_fluxes(problem, depth),

@@ -22,14 +22,17 @@ compiled = njit(cache=True, fastmath={"contract", "nsz", "arcp", "reassoc"}, err
 
 
 @compiled
-def _film(depth: float, film: float) -> float:
-    """h > 0 [m], smooth: d + f^2/d + .. above the waterline, 1.05 f on it, f / 10 on dry land, where the water table
-    runs on.
+def _depth(above: float, reach: float, film: float) -> float:
+    """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = `reach`.
 
-    h = (d + r) / 2 + f (1 - d/r) / 20 with r = sqrt(d^2 + 4 f^2).
+    h - f/10 is the mean of max(a - s, 0) over s in (-w, w), a = above - f/10: a cell wets from its lowest corner (the
+    idea of Defina 2000, doi:10.1029/2000WR900167), and h has a derivative everywhere. The f/10 that stays on dry land
+    lets the water table run on below it.
     """
-    root = math.sqrt(depth * depth + 4.0 * film * film)
-    return 0.5 * (depth + root) + 0.05 * film * (1.0 - depth / root)
+    dry = 0.1 * film
+    lifted = above - dry
+    share = min(max(0.5 * (lifted + reach) / reach, 0.0), 1.0)
+    return dry + reach * share * share + max(lifted - reach, 0.0)
 
 
 @compiled
@@ -43,41 +46,40 @@ def _afloat(depth: float, film: float) -> float:
 
 
 @compiled
-def depths(level, bed, outlet_level, film):
-    """Depth [m] at cells, on faces and at corners; on faces and corners the mean of level minus bed is what is wet."""
+def depths(level, bed, reach, outlet_level, film):
+    """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed.
+
+    reach (nx, ny): half the range of the bed within a cell [m].
+    """
     nx, ny, m = level.shape
     cell = np.empty((nx, ny, m))
     face_x = np.empty((nx + 1, ny, m))
     face_y = np.empty((nx, ny + 1, m))
     corner = np.zeros((nx + 1, ny + 1, m))
     for i in range(nx):
+        w = max(i - 1, 0)
         for j in range(ny):
+            s = max(j - 1, 0)
+            reach_x = 0.5 * (reach[i, j] + reach[w, j])
+            reach_y = 0.5 * (reach[i, j] + reach[i, s])
             for k in range(m):
-                d = level[i, j, k] - bed[i, j]
-                west = d if i == 0 else 0.5 * (d + level[i - 1, j, k] - bed[i - 1, j])
-                cell[i, j, k] = _film(d, film)
-                face_x[i, j, k] = _film(west, film)
-            if j > 0:
-                for k in range(m):
-                    south = 0.5 * (level[i, j, k] - bed[i, j] + level[i, j - 1, k] - bed[i, j - 1])
-                    face_y[i, j, k] = _film(south, film)
-            if i > 0 and j > 0:
-                for k in range(m):
-                    mean = 0.25 * (
-                        (level[i, j, k] - bed[i, j])
-                        + (level[i, j - 1, k] - bed[i, j - 1])
-                        + (level[i - 1, j, k] - bed[i - 1, j])
-                        + (level[i - 1, j - 1, k] - bed[i - 1, j - 1])
-                    )
-                    corner[i, j, k] = _film(mean, film)
+                here = level[i, j, k] - bed[i, j]
+                west = level[w, j, k] - bed[w, j]
+                south = level[i, s, k] - bed[i, s]
+                diagonal = level[w, s, k] - bed[w, s]
+                cell[i, j, k] = _depth(here, reach[i, j], film)
+                face_x[i, j, k] = _depth(0.5 * (here + west), reach_x, film)
+                face_y[i, j, k] = _depth(0.5 * (here + south), reach_y, film)
+                corner[i, j, k] = _depth(0.25 * (here + west + south + diagonal), 0.5 * (reach_x + reach_y), film)
         for k in range(m):
-            face_y[i, 0, k] = cell[i, 0, k]
             face_y[i, ny, k] = cell[i, ny - 1, k]
+            corner[i, 0, k] = 0.0
+    corner[0] = 0.0
     last, before = nx - 1, max(nx - 2, 0)
     for j in range(ny):
         for k in range(m):
             edge = bed[last, j] + 0.5 * (bed[last, j] - bed[before, j])
-            face_x[nx, j, k] = _film(outlet_level[k] - edge, film)
+            face_x[nx, j, k] = _depth(outlet_level[k] - edge, reach[last, j], film)
     return cell, face_x, face_y, corner
 
 
@@ -243,14 +245,14 @@ def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy):
 
 
 @compiled
-def cell_depth(state, bed, film):
+def cell_depth(state, bed, reach, film):
     """h (nx, ny, m) at cell centres [m] of a state (nx, 3, ny, m)."""
     nx, _, ny, m = state.shape
     depth = np.empty((nx, ny, m))
     for i in range(nx):
         for j in range(ny):
             for k in range(m):
-                depth[i, j, k] = _film(state[i, 0, j, k] - bed[i, j], film)
+                depth[i, j, k] = _depth(state[i, 0, j, k] - bed[i, j], reach[i, j], film)
     return depth
 
 
@@ -276,15 +278,15 @@ def velocities(state, first, stop, cell, west, south, north):
 
 
 @compiled
-def rates(state, bed, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
-    """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache; drag, viscosity (nx, ny, m)."""
+def rates(state, bed, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
+    """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
     nx = state.shape[0]
     out = np.empty_like(state)
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
-        cell, face_x, face_y, corner = depths(level, bed[a:b], outlet_level, film)
+        cell, face_x, face_y, corner = depths(level, bed[a:b], reach[a:b], outlet_level, film)
         u, v = velocities(state, a, b, cell, west, south, north)
         wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
         lo, hi = first - a, stop - a

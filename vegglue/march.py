@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue import sweeps
-from vegglue.flow import LEVEL, Array, Faces, Problem, drag, faces, residual
+from vegglue.flow import LEVEL, Array, Faces, Problem, drag, faces, residual, storage
 from vegglue.steady import newton
 
 FALL_BACK_STEP = 0.5
@@ -30,11 +30,12 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
     """The change of a state over one step."""
     now = faces(problem, state)
     rough = drag(problem, now.cell)
-    storage = _storage(problem, state)
+    # Never below a thousandth, so that dry land keeps a water table.
+    wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
     along, across = _damping(problem, now, rough)
     change = -residual(problem, state)
-    sweeps.sweep_x(change, now.face_x, storage, 1.0 / time_step + along, problem.outlet, time_step, theta, problem.dx)
-    sweeps.sweep_y(change, now.face_y, storage, 1.0 / time_step + across, time_step, theta, problem.dy)
+    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, problem.outlet, time_step, theta, problem.dx)
+    sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
 
 
@@ -61,12 +62,6 @@ def settle(problem: Problem, start: Array, tolerance: float) -> Marched:
     rate = float(np.abs(advance(problem, state, FALL_BACK_STEP, 1.0)).max()) / FALL_BACK_STEP
     span = FALL_BACK_TRIES * FALL_BACK_SPAN
     return Marched(state, False, FALL_BACK_TRIES * per_try, f"still changing by {rate:.1e} per second after {span:g} s")
-
-
-def _storage(problem: Problem, state: Array) -> Array:
-    """dh/dz_s of every cell, (nx, ny, m), never below a thousandth so that dry land keeps a water table."""
-    above = state[:, LEVEL] - problem.bed[:, :, None]
-    return np.maximum(0.5 * (1.0 + above / np.sqrt(above**2 + 4.0 * problem.film**2)), 1e-3)
 
 
 def _damping(problem: Problem, now: Faces, rough: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue import blocks
-from vegglue.flow import LEVEL, Array, Problem, residual, take
+from vegglue.flow import LEVEL, Array, Problem, residual, storage, take
 
 Single = NDArray[np.float32]
 
@@ -76,13 +76,12 @@ def factors(problem: Problem, state: Array) -> Factors:
     return _eliminate(*jacobian(problem, state))
 
 
-def _storage(problem: Problem, state: Array) -> Single:
-    """dh/dz_s of the film at each level, 1 for velocities: (nx, n)."""
+def _stored(problem: Problem, state: Array) -> Single:
+    """dh/dz_s of each level, 1 for velocities: (nx, n)."""
     nx, _, ny, _ = state.shape
-    above = state[:, LEVEL, :, 0] - problem.bed
-    storage = np.ones((nx, 3, ny), np.float32)
-    storage[:, LEVEL] = 0.5 * (1.0 + above / np.sqrt(above**2 + 4.0 * problem.film**2))
-    return storage.reshape(nx, 3 * ny)
+    stored = np.ones((nx, 3, ny), np.float32)
+    stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
+    return stored.reshape(nx, 3 * ny)
 
 
 def _eliminate(columns: Single, far: Single) -> Factors:
@@ -95,8 +94,8 @@ def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, tim
     """One member (m = 1) from a start that may be far away."""
     state, size = start, np.inf
     for iteration in range(1, most + 1):
-        rates, columns_far, storage = residual(problem, state), jacobian(problem, state), _storage(problem, state)
-        step, time_step = _bounded_step(rates, columns_far, storage, time_step)
+        rates, columns_far, stored = residual(problem, state), jacobian(problem, state), _stored(problem, state)
+        step, time_step = _bounded_step(rates, columns_far, stored, time_step)
         size = float(np.abs(step).max())
         if not size < LONGEST:
             return _alone(state, size, iteration, False)
@@ -128,14 +127,14 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
 
 
 def _bounded_step(
-    rates: Array, columns_far: tuple[Single, Single], storage: Single, time_step: float
+    rates: Array, columns_far: tuple[Single, Single], stored: Single, time_step: float
 ) -> tuple[Array, float]:
     """-(D/dt + J)^-1 R with dt cut until no entry is longer than LONGEST; the last one tried if none is."""
     columns, far = columns_far
     diagonal = np.arange(far.shape[1])
     for _ in range(12):
         shifted = columns.copy()
-        shifted[:, 1, diagonal, diagonal] += storage / np.float32(time_step)
+        shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
         step = -_eliminate(shifted, far).solve(rates)
         if np.abs(step).max() < LONGEST:
             break
