@@ -7,7 +7,7 @@ import pytest
 from channels import GRAVITY, filled, make_problem, order, shown
 
 from vegglue import kernels
-from vegglue.flow import ACROSS, ALONG, LEVEL, faces, residual
+from vegglue.flow import ACROSS, ALONG, LEVEL, faces, residual, storage
 
 VISCOSITY, CHEZY, REACH = 0.3, 20.0, (12.0, 9.0)
 
@@ -129,30 +129,79 @@ def test_water_flowing_back_is_carried_from_downstream():
     assert 0.9 < order(errors) < 1.2
 
 
+WIGGLES = [("along", 0), ("along", 1), ("across", 0), ("across", 1)]
+
+
+@pytest.mark.parametrize("drift", [0.5, -0.5], ids=["northward", "southward"])
+@pytest.mark.parametrize(("velocity", "axis"), WIGGLES)
+def test_advection_damps_wiggles(velocity, axis, drift):
+    """From the right side: a wiggle from cell to cell loses energy, whichever way it is carried."""
+    problem = make_problem(np.zeros((20, 18)), (1.0, 1.0), 1.0, 1.0, (kernels.CHEZY, 1e9), film=1e-9)
+    calm = filled(problem, 1.0)
+    calm[:, ALONG], calm[:, ACROSS, 1:] = 1.0, drift
+    wiggle = np.zeros_like(calm)
+    wiggle[:, ALONG if velocity == "along" else ACROSS] = 1e-3 * (-1.0) ** np.indices((20, 18))[axis][..., None]
+    wiggle[:, ACROSS, 0] = 0.0
+    growth = wiggle * (residual(problem, calm) - residual(problem, calm + wiggle))
+    assert growth[5:-5, :, 5:-5].sum() < -1e-6
+
+
 def film_depth(above, film):
-    """The depth that the model gives to a level so far above (or below) the bed."""
+    """The depth that the model gives, over an even bed, to a level so far above (or below) it."""
     problem = make_problem(np.zeros((6, 4)), (1.0, 1.0), 0.0, above, film=film)
     now = faces(problem, filled(problem, above))
     inner = (now.cell, now.face_x, now.face_y, now.corner[1:-1, 1:-1])
-    assert all(np.ptp(part) < 1e-15 for part in inner)
-    assert all(part.flat[0] == pytest.approx(now.cell.flat[0], rel=1e-14) for part in inner)
+    assert all(part == pytest.approx(now.cell.flat[0], rel=1e-14) for part in inner)
     return float(now.cell.flat[0])
 
 
 def test_film_adds_nothing_to_water_and_stays_on_land():
-    """h = d + f^2 / d in deep water, 1.05 f on the waterline, f / 10 on dry land."""
+    """h = d in water, f / 10 on dry land, where the cell wets from 4 f below its level to 4 f above."""
     film = 0.002
-    assert film_depth(1.0, film) == pytest.approx(1.0 + film**2, abs=1e-9)
-    assert film_depth(0.1, film) - 0.1 == pytest.approx(film**2 / 0.1, rel=0.02)
-    assert film_depth(0.0, film) == pytest.approx(1.05 * film, rel=1e-12)
-    assert film_depth(-1.0, film) == pytest.approx(0.1 * film, rel=0.03)
-    assert film_depth(-10.0, film) == pytest.approx(0.1 * film, rel=0.003)
+    for above in (0.009, 0.1, 1.0):
+        assert film_depth(above, film) == pytest.approx(above, rel=1e-12)
+    for below in (-0.008, -0.1, -10.0):
+        assert film_depth(below, film) == pytest.approx(0.1 * film, rel=1e-12)
+    bumps = np.linspace(-4.0 * film, 4.0 * film, 100001)
+    for above in (-0.006, -0.001, 0.0, 0.0002, 0.003, 0.007):
+        water = np.maximum(above - 0.1 * film - bumps, 0.0).mean()
+        assert film_depth(above, film) == pytest.approx(0.1 * film + water, abs=1e-7)
 
 
-def test_film_grows_with_the_level():
-    depths = [film_depth(above, 0.002) for above in np.linspace(-0.1, 0.1, 81)]
-    assert (np.diff(depths) > 0.0).all()
-    assert min(depths) > 0.0
+def test_film_never_shrinks_as_the_level_rises():
+    depths = np.array([film_depth(above, 0.002) for above in np.linspace(-0.1, 0.1, 81)])
+    assert (np.diff(depths) >= 0.0).all()
+    assert (np.diff(depths)[40:] > 0.0).all()
+    assert depths.min() > 0.0
+
+
+@pytest.mark.parametrize("slopes", [(0.0, 0.5), (0.3, 0.0), (0.2, -0.2)])
+def test_a_cell_on_a_slope_holds_the_water_on_its_slope(slopes):
+    """Cells that the waterline crosses: on a plane bed along or across, h is the mean depth of water in the cell.
+
+    On a slant, the bed is taken as even between its lowest and its highest corner: off by up to a 24th of its rise.
+    """
+    x, y = np.meshgrid(np.arange(12) + 0.5, np.arange(10) + 0.5, indexing="ij")
+    bed = slopes[0] * x + slopes[1] * y
+    level = float(bed.mean())
+    problem = make_problem(bed, (1.0, 1.0), 0.0, level, film=1e-7)
+    offset = (np.arange(400) + 0.5) / 400 - 0.5
+    inside = slopes[0] * offset[:, None] + slopes[1] * offset[None]
+    exact = np.array([[np.maximum(level - z - inside, 0.0).mean() for z in column] for column in bed])
+    error = np.abs(faces(problem, filled(problem, level)).cell[..., 0] - exact).max()
+    assert error < (1e-5 if 0.0 in slopes else 0.042 * (abs(slopes[0]) + abs(slopes[1])))
+
+
+def test_storage_is_the_derivative_of_depth():
+    """dh/dz_s is the share of a cell that is wet: 0 on land, 1 in water, between them where the waterline crosses."""
+    bed = 0.3 * np.random.default_rng(8).standard_normal((20, 16))
+    problem = make_problem(bed, (1.0, 1.0), 0.0, 0.1, film=0.002)
+    lower, upper = (faces(problem, filled(problem, 0.1 + step)).cell for step in (-1e-6, 1e-6))
+    share = storage(problem, np.full((20, 16, 1), 0.1))
+    assert share == pytest.approx((upper - lower) / 2e-6, abs=1e-4)
+    assert share.min() == 0.0
+    assert share.max() == 1.0
+    assert ((share > 0.05) & (share < 0.95)).any()
 
 
 @pytest.mark.parametrize(("above", "share"), [(0.2, 1.0), (0.0195, 1.0), (0.0015, None), (-0.5, 0.0)])

@@ -118,7 +118,7 @@ def test_a_member_alone_is_the_member_in_a_batch():
 def test_members_do_not_depend_on_their_company():
     """An ensemble and a few of its members asked for alone; both against Newton from a cold start, where it is wet.
 
-    Members are solved in the band of rows that may be wet, without what the film carries beyond (measured 3e-5 m/s).
+    Members are solved in the band of rows that may be wet, without what the film carries beyond (measured 1e-6 m/s).
     """
     places = np.random.default_rng(4).random((36, 2))
     chosen = np.array([1, 17, 35])
@@ -134,7 +134,7 @@ def test_members_do_not_depend_on_their_company():
         difference = np.abs(few.state[..., member] - exact)
         print(f"from Newton: {difference[:, LEVEL][wet].max():.1e} m, {difference[:, ALONG][wet].max():.1e} m/s")
         assert difference[:, LEVEL][wet].max() < 5e-6
-        assert difference[:, ALONG][wet].max() < 5e-5
+        assert difference[:, ALONG][wet].max() < 2e-5
 
 
 def readings(problem, state):
@@ -251,7 +251,7 @@ def on_dry_land(problem, state):
 
 @pytest.mark.parametrize("film", [0.01, 0.002])
 def test_the_film_carries_next_to_nothing(film):
-    """Of 2 m3/s through a channel a third dry: measured 8e-6 (film of 1 cm) and 5e-7 (2 mm)."""
+    """Of 2 m3/s through a channel a third dry: measured 5e-6 (film of 1 cm) and 4e-7 (2 mm)."""
     problem = river(film=film)
     state = solved(problem)
     assert (problem.bed > state[:, LEVEL, :, 0]).mean() > 0.3
