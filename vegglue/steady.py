@@ -24,7 +24,7 @@ LONGEST = 0.25
 # Near enough [m, m/s] for chord steps to do the rest.
 CLOSE = 2e-2
 # Factors of a state further than this [m, m/s] from the root are renewed before neighbours lean on them.
-FRESH = 5e-2
+FRESH = 0.3
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
     state, spent, largest = near, 0, np.inf
     for _ in range(rounds):
         shared = factors(problem, state)
-        end = chord(problem, state, shared, tolerance, most=10)
+        end = chord(problem, state, shared, tolerance, most=14)
         spent += int(end.iterations[0])
         moved = float(np.abs(end.state - state).max())
         end = replace(end, iterations=np.array([spent]))
@@ -185,7 +185,7 @@ def _columns(values: Array, members: np.ndarray) -> Array:
 
 
 def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> Solution:
-    """All members from their starts with one factorisation; those that stall or stray keep their best state."""
+    """All members from their starts with one factorisation; those that stall are left where they got to."""
     members = problem.members
     final = start.copy()
     iterations, converged = np.zeros(members, dtype=np.int64), np.zeros(members, dtype=bool)
@@ -198,12 +198,13 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
         now = active[running]
         iterations[now] = iteration
         done = running & (size < tolerance)
-        better = running & (size < best[active])
-        best[active[better]] = size[better]
-        final[..., active[better]] = (state + step)[..., better]
+        best[now] = np.minimum(best[now], size[running])
         converged[active[done]] = True
+        if done.any():
+            final[..., active[done]] = state[..., done] + step[..., done]
         running = running & ~done & (size < 4.0 * LONGEST)
-        if not running.any():
+        if not running.any() or iteration == most:
+            final[..., active[running]] = state[..., running] + step[..., running]
             break
         if running.sum() <= active.size // 2:
             keep = np.flatnonzero(running)
