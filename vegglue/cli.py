@@ -174,9 +174,10 @@ def main() -> None:
     except StorageError as error:
         print(error, file=sys.stderr)
         sys.exit(3)
-    except KeyboardInterrupt:
-        print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as ended:
+        if ended.code == 130:  # typer has made this of Ctrl-C
+            print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
+        raise
 
 
 if __name__ == "__main__":
