@@ -68,11 +68,12 @@ class Problem:
 
     @property
     def reach(self) -> Array:
-        """Half the range of the bed within each cell, (nx, ny) [m], at least four films."""
-        nx, ny = self.shape
-        rise_x = np.gradient(self.bed, axis=0) if nx > 1 else np.zeros_like(self.bed)
-        rise_y = np.gradient(self.bed, axis=1) if ny > 1 else np.zeros_like(self.bed)
-        return np.maximum(0.5 * (np.abs(rise_x) + np.abs(rise_y)), 4.0 * self.film)
+        """Half the range of the bed across the flow within each cell, (nx, ny) [m], at least four films.
+
+        Along x the surface falls with the bed, so that a slope there does not make a cell deep and shallow at once.
+        """
+        rise = np.gradient(self.bed, axis=1) if self.shape[1] > 1 else np.zeros_like(self.bed)
+        return np.maximum(0.5 * np.abs(rise), 4.0 * self.film)
 
     @property
     def members(self) -> int:
@@ -185,7 +186,13 @@ def faces(problem: Problem, state: Array) -> Faces:
 def drag(problem: Problem, depth: Array) -> Array:
     """Friction k = g / (C^2 h) [1/m] at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m]."""
     rate = kernels.class_drag(
-        depth, problem.friction_class, problem.law, problem.coefficient, problem.log_argument_minimum
+        depth,
+        problem.reach,
+        problem.friction_class,
+        problem.law,
+        problem.coefficient,
+        problem.log_argument_minimum,
+        problem.film,
     )
     plants = problem.plants
     kernels.plant_drag(

@@ -15,6 +15,9 @@ KARMAN = 0.4
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest.
 REST_SPEED = 1e-3
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
+LOG_SLOPE = 18.0 / math.log(10.0)
+GAUSS_PLACE = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
+GAUSS_WEIGHT = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 # Columns computed together, and those beside them they look at.
 STRIP, HALO = 40, 3
 
@@ -84,28 +87,51 @@ def depths(level, bed, reach, outlet_level, film):
 
 
 @compiled
-def class_drag(depth, friction_class, law, coefficient, log_argument_minimum):
-    """k = g / (C^2 h) [1/m] of the class laws: C = h^(1/6)/n, C = 18 log10(max(12 h/k_s, floor)), or C given."""
+def _chezy(law: int, coefficient: float, depth: float, log_argument_minimum: float) -> float:
+    """C [m^1/2/s]: h^(1/6)/n (Manning), 18 log10(max(12 h/k_s, floor)) (Keulegan 1938), or as given."""
+    if law == MANNING:
+        return depth ** (1.0 / 6.0) / coefficient
+    if law == KEULEGAN:
+        return LOG_SLOPE * math.log(max(12.0 * depth / coefficient, log_argument_minimum))
+    return coefficient
+
+
+@compiled
+def _conveyance(law: int, coefficient: float, depth: float, reach: float, dry: float, floor: float) -> float:
+    """Mean of C h^(3/2) over a cell whose bed rises evenly by 2 w: three Gauss points on its wet part, and the film's.
+
+    As in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324: one slope of the surface drives each depth.
+    """
+    mean = depth - dry
+    above = mean if mean > reach else 2.0 * math.sqrt(reach * mean) - reach
+    lowest, highest = max(above - reach, 0.0), above + reach
+    total = _chezy(law, coefficient, dry, floor) * dry * math.sqrt(dry)
+    for q in range(3):
+        h = lowest + (highest - lowest) * GAUSS_PLACE[q]
+        if h > 0.0:
+            weight = GAUSS_WEIGHT[q] * 0.5 * (highest - lowest) / reach
+            total += weight * _chezy(law, coefficient, h, floor) * h * math.sqrt(h)
+    return total
+
+
+@compiled
+def class_drag(depth, reach, friction_class, law, coefficient, log_argument_minimum, film):
+    """k = g / (C^2 h) [1/m] of the class laws; on a slope g h^2 / <C h^(3/2)>^2, the same for one depth throughout."""
     nx, ny, m = depth.shape
     drag = np.empty((nx, ny, m))
-    floor = 18.0 * math.log10(log_argument_minimum)
+    dry = 0.1 * film
     for i in range(nx):
         for j in range(ny):
             c = friction_class[i, j]
-            kind = law[c]
-            if kind == MANNING:
-                for k in range(m):
-                    h = depth[i, j, k]
-                    drag[i, j, k] = GRAVITY * coefficient[c, k] ** 2 / (h * np.cbrt(h))
-            elif kind == KEULEGAN:
-                for k in range(m):
-                    h = depth[i, j, k]
-                    ratio = 12.0 * h / coefficient[c, k]
-                    chezy = 18.0 * math.log10(ratio) if ratio > log_argument_minimum else floor
+            steep = reach[i, j] > 4.0001 * film
+            for k in range(m):
+                h = depth[i, j, k]
+                if steep:
+                    carried = _conveyance(law[c], coefficient[c, k], h, reach[i, j], dry, log_argument_minimum)
+                    drag[i, j, k] = GRAVITY * (h / carried) ** 2
+                else:
+                    chezy = _chezy(law[c], coefficient[c, k], h, log_argument_minimum)
                     drag[i, j, k] = GRAVITY / (chezy * chezy * h)
-            else:
-                for k in range(m):
-                    drag[i, j, k] = GRAVITY / (coefficient[c, k] ** 2 * depth[i, j, k])
     return drag
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from vegglue import sweeps
 from vegglue.flow import LEVEL, Array, Faces, Problem, drag, faces, residual, storage
+from vegglue.kernels import REST_SPEED
 from vegglue.steady import newton
 
 FALL_BACK_STEP = 0.5
@@ -67,7 +68,7 @@ def settle(problem: Problem, start: Array, tolerance: float) -> Marched:
 def _damping(problem: Problem, now: Faces, rough: Array) -> tuple[Array, Array]:
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    cell = 2.0 * rough * np.hypot(u, v) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
+    cell = 2.0 * rough * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
     cell += 4.0 * problem.viscosity * (1.0 / problem.dx**2 + 1.0 / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
