@@ -235,6 +235,8 @@ def _band(problem: Problem, start: Array) -> tuple[int, int]:
     """Rows start..stop-1 to solve: those that may be wet, with a margin; whole sides through which water enters."""
     above = (start[:, LEVEL] - problem.bed[:, :, None]).max(axis=(0, 2))
     wet = np.flatnonzero(above > -MARGIN)
+    if not wet.size:
+        return 0, problem.shape[1]
     sides = {inflow.side for inflow in problem.inflows}
     south = 0 if "south" in sides else max(int(wet[0]) - 1, 0)
     north = problem.shape[1] if "north" in sides else min(int(wet[-1]) + 2, problem.shape[1])
