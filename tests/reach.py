@@ -1,10 +1,14 @@
-"""The short reach of the README as a user would have it: its files on disk, and the command line in a process of its own."""
+"""The short reach of the README as a user would have it: its files on disk, and the command line."""
 
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
+
+from vegglue.cli import main
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -43,8 +47,16 @@ def vegglue(folder: Path, *arguments: str | int | Path, succeed: bool = True) ->
     return done
 
 
+def said_to(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str]:
+    """How `vegglue ...` ended in this process, and its standard error: much sooner than in one of its own."""
+    monkeypatch.setattr(sys, "argv", ["vegglue", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0), capsys.readouterr().err
+
+
 def begin(folder: Path, *arguments: str | int | Path) -> "subprocess.Popen[str]":
-    """`vegglue ...` on its way, its output to be read line by line, in a process group of its own as from a terminal."""
+    """`vegglue ...` on its way, its output to be read line by line; a process group of its own, as from a terminal."""
     return subprocess.Popen(
         command(*arguments),
         cwd=folder,

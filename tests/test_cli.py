@@ -1,7 +1,6 @@
 """The line end to end through the real command line, on the example of the README; and what it says to mistakes."""
 
 import re
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -9,9 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from reach import COARSE, README, ROOT, block, vegglue, write_reach
+from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
 
-from vegglue.cli import main
 from vegglue.config import case_hash, load_case, simulation_hash
 from vegglue.neighbourhood import SIZE
 from vegglue.simulate import LEAVES_IN_A_CHUNK
@@ -133,14 +131,6 @@ def yaml_part(key: str) -> str:
     found = re.search(rf"^{key}:.*\n(?:  .*\n)*", block("yaml"), re.MULTILINE)
     assert found
     return found[0]
-
-
-def said_to(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str]:
-    """Exit code and standard error of the command in this process."""
-    monkeypatch.setattr(sys, "argv", ["vegglue", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0), capsys.readouterr().err
 
 
 @pytest.mark.parametrize("step", STEPS)
