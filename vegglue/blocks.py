@@ -136,3 +136,20 @@ def minimise(gram, right):
             matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
         weights[:, k] = np.linalg.solve(matrix, np.ascontiguousarray(right[:, k]))
     return weights
+
+
+@compiled
+def solve_transposed(blocks, far, right):
+    """x with J' x = right, in place: the products of `solve`, transposed and in the opposite order."""
+    nx, n, m = right.shape
+    for i in range(1, nx):
+        right[i] -= np.dot(blocks[i - 1, 2].T, right[i - 1])
+    for i in range(nx - 1, -1, -1):
+        part = right[i]
+        if i < nx - 1:
+            part -= np.dot(blocks[i + 1, 0].T, right[i + 1])
+        if i < nx - 2:
+            for r in range(n):
+                for k in range(m):
+                    part[r, k] -= far[i + 2, r] * right[i + 2, r, k]
+        right[i] = np.dot(blocks[i, 1].T, part)

@@ -1,0 +1,80 @@
+"""Tangents against differences of solved states, adjoints against tangents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from channels import river
+
+from vegglue.flow import ALONG, residual
+from vegglue.start import backwater
+from vegglue.steady import factors, newton
+from vegglue.tangent import adjoints, along, tangents
+
+STEP = 1e-5
+
+
+def with_manning(factor):
+    problem = river()
+    coefficient = problem.coefficient.copy()
+    coefficient[0] *= factor
+    return replace(problem, coefficient=coefficient)
+
+
+def with_phi(factor):
+    problem = river()
+    return replace(problem, plants=replace(problem.plants, phi=problem.plants.phi * factor))
+
+
+def with_discharge(factor):
+    problem = river()
+    return replace(problem, inflows=tuple(replace(i, discharge=i.discharge * factor) for i in problem.inflows))
+
+
+def with_level(factor):
+    problem = river()
+    return replace(problem, outlet_level=problem.outlet_level * factor)
+
+
+CAUSES = (with_manning, with_phi, with_discharge, with_level)
+
+
+@pytest.fixture(scope="module")
+def solved():
+    problem = river()
+    state = newton(problem, backwater(problem), 1e-10).state
+    return problem, state, factors(problem, state)
+
+
+def difference(cause, of):
+    return (of(cause(1.0 + STEP)) - of(cause(1.0 - STEP))) / (2.0 * STEP)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_tangent_equals_difference_of_solved_states(solved, cause):
+    """Relative to the largest answer in the water: 1e-4 asked for."""
+    problem, state, shared = solved
+    tangent = tangents(problem, state, shared, difference(cause, lambda changed: residual(changed, state)))
+    solved_again = difference(cause, lambda changed: newton(changed, state, 1e-11, time_step=1e4).state)
+    deep = (state[:, 0, :, 0] - problem.bed) > 0.3
+    error = np.abs(tangent - solved_again)[:, ALONG, :, 0][deep].max() / np.abs(solved_again[:, ALONG, :, 0][deep]).max()
+    assert error < 1e-4
+
+
+def test_refinement_meets_the_equation(solved):
+    problem, state, shared = solved
+    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    left = causes + along(problem, state, tangents(problem, state, shared, causes))
+    assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-5 * np.abs(causes).max(axis=(0, 1, 2))).all()
+
+
+def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):
+    """l . dR = -g . dx for a mean velocity in the wake of the patch; the adjoint is of single precision."""
+    problem, state, shared = solved
+    weights = np.zeros_like(state)
+    weights[40, ALONG, 8:16] = 0.125
+    adjoint = adjoints(shared, weights)
+    for cause in CAUSES:
+        rates = difference(cause, lambda changed: residual(changed, state))
+        told = float((weights * tangents(problem, state, shared, rates)).sum())
+        assert -float((adjoint * rates).sum()) == pytest.approx(told, rel=5e-3)
