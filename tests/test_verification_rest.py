@@ -56,7 +56,7 @@ def test_a_tilted_lake_is_not_at_rest():
 def test_a_disturbed_lake_comes_to_rest():
     """A hump of water between islands runs out over the outlet, and the lake lies still at the outlet's level.
 
-    On faces between cells deeper than 10 cm. What is left feeds the water table under the stones, e times less every 2,200 s.
+    On faces between cells deeper than 10 cm. The rest feeds the water table under the stones, e times less in 2,200 s.
     """
     problem = lake(0.1)
     state = filled(problem, 0.1)

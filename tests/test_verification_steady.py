@@ -294,6 +294,14 @@ def test_side_inflows_conserve_mass():
     assert read_sensors(problem, state, grid, station, ()).mass_error[0] < 1e-9
 
 
+def test_inflow_is_spread_by_conveyance():
+    """q is proportional to h^(5/3) across the inflow, and the whole of it is the discharge."""
+    problem = river()
+    now = faces(problem, solved(problem))
+    share = now.cell[0] ** (5.0 / 3.0)
+    assert now.flux_x[0] == pytest.approx(2.0 * share / (share.sum() * 0.375), rel=1e-9)
+
+
 def test_side_inflow_pushes_the_main_flow_aside():
     """Where the south joins, water moves north everywhere but at the far wall."""
     problem = joined()
