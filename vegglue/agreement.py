@@ -97,6 +97,8 @@ def _sides(case: Case) -> Iterator[Refusal]:
     for name, inflow in case.inflows.items():
         yield from _inside(("inflows", name, "range"), inflow.range, _side(case, inflow))
     yield from _inside(("outlet", "range"), case.outlet.range, case.grid.y)
+    if case.simulate.fields is not None:
+        yield from _inside(("simulate", "fields", "x"), case.simulate.fields.x, case.grid.x)
 
 
 def _side(case: Case, inflow: Inflow) -> Interval:

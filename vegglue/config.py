@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,9 @@ PATHS = ("file", "raster", "points")
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
 # What a finished ensemble does not depend on.
-NOT_SIMULATED = ("name", "title", "infer", "survey", "reference", "canopy_correction")
+NOT_SIMULATED = dict.fromkeys(("name", "title", "infer", "survey", "reference", "canopy_correction"), True) | {
+    "simulate": {"field_budget"}
+}
 
 Tree = dict[str, Any]
 
@@ -56,7 +58,7 @@ def case_hash(case: Case) -> str:
 
 def simulation_hash(case: Case) -> str:
     """Like case_hash, of only what an ensemble depends on: unchanged by likelihood, title or reference values."""
-    return _hash({key: value for key, value in _dump(case).items() if key not in NOT_SIMULATED})
+    return _hash(_dump(case, NOT_SIMULATED))
 
 
 def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
@@ -164,8 +166,8 @@ def _depth(tree: Any, place: Place) -> int:
     return len(place)
 
 
-def _dump(case: Case) -> Tree:
-    return case.model_dump(by_alias=True, exclude_none=True)
+def _dump(case: Case, without: Mapping[str, Any] | None = None) -> Tree:
+    return case.model_dump(by_alias=True, exclude_none=True, exclude=without)
 
 
 def _plain(tree: Any, of_file: Callable[[Path], Any]) -> Any:

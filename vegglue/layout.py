@@ -1,7 +1,7 @@
 """How a frozen value is laid out in a file: dimensions and unit stand in the annotation of each field."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -23,19 +23,21 @@ class Stored:
 
 @dataclass(frozen=True)
 class Variable:
-    """One dataset: names of its dimensions, values, [unit]."""
+    """One dataset: names of its dimensions, values, [unit], and the shape of the blocks it is compressed in, if any."""
 
     dims: tuple[str, ...]
     values: Any
     unit: str = "-"
+    compressed: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)
 class Group:
-    """What belongs together in a file: coordinates by dimension, and variables on them."""
+    """What belongs together in a file: coordinates by dimension, variables on them, and [units] of coordinates."""
 
     coordinates: Mapping[str, Any]
     variables: Mapping[str, Variable]
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def stored_fields(kind: type) -> dict[str, Stored]:

@@ -245,9 +245,15 @@ class Numerics(Part):
     tolerance: Positive = Field(default=1e-6, description="largest correction a solved member still asks for [m, m/s]")
 
 
+class KeptFields(Part):
+    x: Interval = Field(description="range along x, over the whole width of the grid [m]")
+
+
 class Simulate(Part):
     members: Annotated[int, Field(strict=True, gt=0)] = Field(default=4096, description="size of the ensemble")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(default=1, description="seed of the Sobol' sequence")
+    fields: KeptFields | None = Field(default=None, description="where level, u and v of all members are kept")
+    field_budget: Positive = Field(default=200.0, description="most they may take before compression [MB]")
 
 
 class Infer(Part):

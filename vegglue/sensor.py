@@ -4,22 +4,31 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from vegglue.flow import Array, FlowFields, Problem, faces
+from vegglue.flow import Array, Faces, FlowFields, Problem, faces
 from vegglue.site import Grid
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Of m members: prediction (m, station) [m/s, m], flow (m, section) [m3/s], largest |Q/Q_in - 1| (m,) [-]."""
+    """Of m members: prediction (m, station) [m/s, m], flow (m, section) [m3/s], largest |Q/Q_in - 1| (m,) [-], and
+    level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a cell is wet.
+    """
 
     prediction: Array
     section_flow: Array
     mass_error: Array
+    fields: NDArray[np.float32]
 
 
 def read_sensors(
-    problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, sections: tuple[tuple[str, float], ...]
+    problem: Problem,
+    state: Array,
+    grid: Grid,
+    station: pd.DataFrame,
+    sections: tuple[tuple[str, float], ...],
+    kept: slice = slice(0, 0),
 ) -> Readings:
     """Depth-averaged u or level, bilinear between cell centres; discharge through the face nearest to each section."""
     now = faces(problem, state)
@@ -32,16 +41,25 @@ def read_sensors(
     edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
     nearest = [int(np.argmin(np.abs(edges - x))) for _, x in sections]
     error = np.abs(flow / _entered(problem) - 1.0).max(axis=0)
-    return Readings(prediction.T, flow[nearest].T, error)
+    wet = now.cell[kept] > 0.1 * problem.film
+    fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
+    return Readings(prediction.T, flow[nearest].T, error, np.moveaxis(fields, -1, 0))
 
 
 def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
     """The first member at cell centres, NaN where shallower than the film."""
     now = faces(problem, state)
-    depth = now.level[..., 0] - problem.bed
-    wet = lambda values: np.where(depth > problem.film, values[..., 0], np.nan)  # noqa: E731
-    u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    return FlowFields(grid.x, grid.y, problem.bed, wet(now.cell), wet(now.level), wet(u), wet(v))
+    centres = _at_centres(now, slice(0, grid.x.size))[..., 0]
+    level, u, v = np.where(centres[0] - problem.bed > problem.film, centres, np.nan)
+    depth = np.where(np.isnan(level), np.nan, now.cell[..., 0])
+    return FlowFields(grid.x, grid.y, problem.bed, depth, level, u, v)
+
+
+def _at_centres(now: Faces, columns: slice) -> Array:
+    """Level, u and v of some columns, (3, columns, ny, m)."""
+    u = 0.5 * (now.u[columns] + now.u[columns.start + 1 : columns.stop + 1])
+    v = 0.5 * (now.v[columns, 1:] + now.v[columns, :-1])
+    return np.stack([now.level[columns], u, v])
 
 
 def _entered(problem: Problem) -> Array:
@@ -66,14 +84,15 @@ def _from_sides(problem: Problem, nx: int) -> Array:
 
 def _bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
     """field (nx, ny, m) at points, (points, m); beyond the outermost centres the value of the outermost."""
-    i, along = _between(x, grid.x[0], grid.dx, grid.x.size)
-    j, across = _between(y, grid.y[0], grid.dy, grid.y.size)
+    i, along = between(x, grid.x[0], grid.dx, grid.x.size)
+    j, across = between(y, grid.y[0], grid.dy, grid.y.size)
     south = (1.0 - along)[:, None] * field[i, j] + along[:, None] * field[i + 1, j]
     north = (1.0 - along)[:, None] * field[i, j + 1] + along[:, None] * field[i + 1, j + 1]
     return (1.0 - across)[:, None] * south + across[:, None] * north
 
 
-def _between(points: Array, first: float, step: float, size: int) -> tuple[np.ndarray, Array]:
+def between(points: Array, first: float, step: float, size: int) -> tuple[np.ndarray, Array]:
+    """Of `size` centres a step apart: the one below each point, and the share of the next one in what it reads [-]."""
     place = np.clip((points - first) / step, 0.0, size - 1.0)
     lower = np.minimum(place.astype(np.int64), size - 2)
     return lower, place - lower
