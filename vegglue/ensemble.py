@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
+from vegglue.fields import Window
 from vegglue.layout import Group, Stored, Variable, stored_fields, table_group
 
 VALUE_UNIT = "m/s for velocity, m for level"
@@ -28,6 +29,7 @@ class Header:
     config_hash: str
     seed: int
     version: str
+    window: Window | None = None  # where fields are kept
 
     @property
     def members(self) -> int:

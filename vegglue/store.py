@@ -18,11 +18,13 @@ import numpy as np
 
 from vegglue.ensemble import ROWS, Ensemble, Header, ensemble_from, unsolved
 from vegglue.errors import InputError, StorageError
+from vegglue.fields import Fields, fields_from, fields_group
 from vegglue.layout import Group
 from vegglue.lock import hold_lock
 from vegglue.posterior import Posterior, attributes, groups, posterior_from
+from vegglue.unfinished import Unfinished, is_reserved, put, reserve, stored, unfinished_fields
 
-ENSEMBLE_FORMAT, POSTERIOR_FORMAT = "vegglue ensemble 1", "vegglue posterior 1"
+ENSEMBLE_FORMAT, FIELDS_FORMAT, POSTERIOR_FORMAT = "vegglue ensemble 1", "vegglue fields 1", "vegglue posterior 1"
 
 Result = TypeVar("Result")
 
@@ -34,27 +36,35 @@ class EnsembleWriter:
     file: h5py.File
     path: Path
     set_aside: Path | None  # where an unfinished run of another config was moved to
+    unfinished: Unfinished | None  # fields, if any are kept
 
     @property
     def done(self) -> set[int]:
         """Chunks that need not be solved again."""
         return set(np.flatnonzero(self.file["progress/finished"][:]).tolist())
 
-    def append(self, chunk: int, members: np.ndarray, rows: Mapping[str, np.ndarray]) -> None:
-        """Write one chunk: rows[name] has one entry for each of `members` (indices into the ensemble), name in ROWS.
+    def append(
+        self, chunk: int, members: np.ndarray, rows: Mapping[str, np.ndarray], fields: np.ndarray | None = None
+    ) -> None:
+        """Write one chunk: rows[name] has one entry for each of `members` (indices into the ensemble), name in ROWS;
+        so have fields (member, experiment, quantity, x, y) if the header has a window.
 
         Errors: StorageError when it cannot be written; chunks appended before stay readable.
         """
         members = np.asarray(members)
         order = np.argsort(members)
         group = self.file["members"]
+        if self.unfinished is not None and fields is None:
+            raise ValueError(f"chunk {chunk}: expected fields, got none")
         if set(rows) != set(ROWS):
             raise ValueError(f"chunk {chunk}: expected the rows {sorted(ROWS)}, got {sorted(rows)}")
         with _told_as_storage_error(self.path):
             for name, values in rows.items():
                 if group[name].size:  # h5py cannot select members of nothing: a case without stations
                     group[name][members[order]] = _fitted(values, group[name])[order]
-            self._sync()  # the rows must be on disk before they are called finished
+            if self.unfinished is not None and fields is not None:
+                put(self.unfinished, members, fields)
+            self._sync()  # rows and fields must be on disk before they are called finished
             self.file["progress/finished"][chunk] = 1
             self._sync()
 
@@ -66,23 +76,24 @@ class EnsembleWriter:
 @contextmanager
 def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
     """Open `path`.part for appending, resuming what an earlier run of the same header left; rename it to `path` when
-    the block ends with every chunk appended.
+    the block ends with every chunk appended. Fields wait in `fields.part` beside it and become `fields.h5` just before.
 
     A part file of another config, seed or version, or a broken one, is moved to `path`.part.old, never mixed in.
     Errors: StorageError when another run holds the folder or the disk is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = _part(path)
+    part, unfinished = _part(path), unfinished_fields(path.parent, header)
     with hold_lock(path.parent):
-        set_aside = _set_aside(part) if part.exists() and not _resumable(part, header) else None
+        resumable = (unfinished is None or is_reserved(unfinished)) and _resumable(part, header)
+        set_aside = _set_aside(part) if part.exists() and not resumable else None
         if not part.exists():
-            _write_whole(part, unsolved(header), _attributes(header))
+            _lay_out(part, unfinished, header)
         with _opened(part, "r+") as file:
-            writer = EnsembleWriter(file, part, set_aside)
+            writer = EnsembleWriter(file, part, set_aside, unfinished)
             yield writer
             complete = len(writer.done) == header.chunks
         if complete:
-            os.replace(part, path)
+            _finish(path, unfinished, header)
 
 
 def read_ensemble(path: Path, expected_hash: str | None = None) -> Ensemble:
@@ -94,6 +105,14 @@ def read_ensemble(path: Path, expected_hash: str | None = None) -> Ensemble:
     if not path.exists() and _part(path).exists():
         raise InputError(f"{path}: found only a part of the members; run `vegglue simulate CONFIG` to solve the rest.")
     return _read(path, expected_hash, "simulate", ensemble_from)
+
+
+def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
+    """Read the fields of a finished ensemble, whole; errors as those of read_ensemble."""
+    if not path.exists():
+        remedy = "say in `simulate.fields` where they are to be kept and run `vegglue simulate CONFIG`"
+        raise InputError(f"{path}: expected fields of the members, found no file; {remedy}.")
+    return _read(path, expected_hash, "simulate", fields_from)
 
 
 def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: str) -> None:
@@ -145,6 +164,26 @@ def _part(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def _lay_out(part: Path, unfinished: Unfinished | None, header: Header) -> None:
+    """All room a run will need, the fields first: a part of an ensemble without its fields cannot be."""
+    if unfinished is not None:
+        with _told_as_storage_error(unfinished.path):
+            reserve(unfinished)
+    _write_whole(part, unsolved(header), _attributes(header))
+
+
+def _finish(path: Path, unfinished: Unfinished | None, header: Header) -> None:
+    """Fields before the ensemble, which stands for both: a run killed in between only has this to do again."""
+    if unfinished is None:
+        os.replace(_part(path), path)
+        return
+    group = fields_group(unfinished.window, header.experiments, stored(unfinished))
+    own = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
+    _write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own)
+    os.replace(_part(path), path)
+    unfinished.path.unlink()
+
+
 def _resumable(part: Path, header: Header) -> bool:
     """Whether the part file holds members of exactly this run."""
     try:
@@ -177,16 +216,21 @@ def _write_group(file: h5py.File, name: str, content: Group) -> None:
     if clash:
         raise InputError(f"parameters: {clash} are names of dimensions of the group {name}; rename them.")
     for dim, values in content.coordinates.items():
-        _dataset(group, dim, values).make_scale(dim)
+        scale = _dataset(group, dim, values)
+        scale.make_scale(dim)
+        if dim in content.units:
+            scale.attrs["units"] = content.units[dim]
     for key, variable in content.variables.items():
-        dataset = _dataset(group, key, variable.values)
+        dataset = _dataset(group, key, variable.values, variable.compressed)
         dataset.attrs["units"] = variable.unit
         for axis, dim in enumerate(variable.dims):
             dataset.dims[axis].attach_scale(group[dim])
 
 
-def _dataset(group: h5py.Group, name: str, values: Any) -> h5py.Dataset:
+def _dataset(group: h5py.Group, name: str, values: Any, compressed: tuple[int, ...] | None = None) -> h5py.Dataset:
     values = np.asarray(values)
+    if compressed is not None:
+        return group.create_dataset(name, data=values, chunks=compressed, compression="gzip", shuffle=True)
     if values.dtype.kind == "S":
         return group.create_dataset(name, data=values.astype(h5py.string_dtype("utf-8", values.dtype.itemsize)))
     if values.dtype.kind in "OUT":
