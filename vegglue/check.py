@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.agreement import values
+from vegglue.fields import excess
 from vegglue.observations import Observations
 from vegglue.outline import corners, distance_to_outline
 from vegglue.prior import quantile
@@ -26,6 +27,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
     checks = (
         _ensemble(case, observations),
+        _kept_fields(case, site),
         _patches(case, site),
         _friction(case, site),
         _idle_parameters(case, site),
@@ -89,6 +91,11 @@ def _ensemble(case: Case, observations: Observations) -> Iterator[str]:
             yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."
     for row in table[~table["used"].astype(bool)].to_dict("records"):
         yield f"The {_station(row)} is not used: {row['reason']}."
+
+
+def _kept_fields(case: Case, site: Site) -> Iterator[str]:
+    if sentence := excess(case, site.grid):
+        yield f"It will not be simulated as it is: {sentence}"
 
 
 def _station(row: Mapping[Hashable, Any]) -> str:

@@ -23,7 +23,7 @@ from vegglue.report import write_report
 from vegglue.schema import Case
 from vegglue.simulate import Progress, simulate, solve_flow
 from vegglue.site import build_site
-from vegglue.store import read_ensemble, read_posterior, write_posterior
+from vegglue.store import read_ensemble, read_posterior, stored_hash, write_posterior
 from vegglue.survey import read_survey, rigid_cylinder
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -131,11 +131,12 @@ def _folder(runs: Path, case: Case) -> Path:
 
 
 def _is_current(path: Path, case: Case) -> bool:
+    wanted = simulation_hash(case)
     try:
-        read_ensemble(path, simulation_hash(case))
+        read_ensemble(path, wanted)
     except (InputError, StorageError):
         return False
-    return True
+    return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
 
 
 @contextmanager

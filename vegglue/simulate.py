@@ -4,6 +4,7 @@ A chunk is what one task solves: neighbours in the prior, the same set whatever 
 results are too.
 """
 
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from threadpoolctl import threadpool_limits
 from vegglue import __version__
 from vegglue.config import resolved_yaml, simulation_hash
 from vegglue.ensemble import FAILED, Header
+from vegglue.errors import InputError
+from vegglue.fields import QUANTITIES, Window, excess, window_of
 from vegglue.flow import FlowFields, Problem
 from vegglue.neighbourhood import SIZE, leaves, solve_members
 from vegglue.observations import Observations
@@ -44,20 +47,24 @@ class Progress:
 def simulate(case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
-    Errors: StorageError when another run holds the folder or the disk is full (what was written stays).
+    Errors: InputError when the fields to be kept exceed their budget; StorageError when another run holds the folder or
+    the disk is full (what was written stays).
     """
     site = build_site(case)
+    if sentence := excess(case, site.grid):
+        raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
     theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
     places = unit_places(case, theta)
     chunks = leaves(places, SIZE * LEAVES_IN_A_CHUNK)
-    header = make_header(case, observations, theta, len(chunks))
+    header = make_header(case, observations, theta, len(chunks), window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed = resumed, 0
         report(Progress(solved, len(places), failed, resumed))
         for index, rows in _solve_all(case, site, observations, places, chunks, todo, jobs):
-            writer.append(index, chunks[index], rows)
+            fields = rows.pop("fields")
+            writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + int((rows["status"] == FAILED).sum())
             report(Progress(solved, len(places), failed, resumed))
 
@@ -83,9 +90,13 @@ def _solve_numbered(
 
 
 def solve_chunk(case: Case, site: Site, observations: Observations, places: np.ndarray) -> Rows:
-    """The rows of the ensemble file for members at `places` of the unit cube, every experiment of the case."""
+    """The rows of the ensemble file for members at `places` of the unit cube, every experiment of the case, and as
+    `fields` (member, experiment, quantity, x, y) what is kept of their flow.
+    """
     station, sections = observations.table, section_places(observations)
-    members = len(places)
+    members, window = len(places), window_of(case, site.grid)
+    kept = window.columns if window else slice(0, 0)
+    fields_shape = (members, len(case.experiments), len(QUANTITIES), kept.stop - kept.start, site.grid.y.size)
     rows: Rows = {
         "prediction": np.full((members, len(station)), np.nan),
         "section_flow": np.full((members, len(case.experiments), len(sections)), np.nan),
@@ -94,15 +105,17 @@ def solve_chunk(case: Case, site: Site, observations: Observations, places: np.n
         "reason": np.full(members, "", object),
         "iterations": np.zeros(members, np.int32),
         "seconds": np.zeros(members),
+        "fields": np.full(fields_shape, np.nan, np.float32),
     }
     for number, experiment in enumerate(case.experiments):
         began = time.perf_counter()
         build = partial(_problem_at, case, site, experiment)
         solved = solve_members(build, places, case.numerics.tolerance)
         here = (station["experiment"] == experiment).to_numpy()
-        readings = read_sensors(build(places), solved.state, site.grid, station[here], sections)
+        readings = read_sensors(build(places), solved.state, site.grid, station[here], sections, kept)
         rows["prediction"][:, here] = readings.prediction
         rows["section_flow"][:, number] = readings.section_flow
+        rows["fields"][:, number] = readings.fields
         rows["mass_error"] = np.maximum(rows["mass_error"], readings.mass_error)
         rows["status"] = np.maximum(rows["status"], solved.status.astype(np.int8))
         rows["iterations"] += solved.iterations.astype(np.int32)
@@ -110,7 +123,8 @@ def solve_chunk(case: Case, site: Site, observations: Observations, places: np.n
         for member, reason in enumerate(solved.reason):
             if reason:
                 rows["reason"][member] = f"{rows['reason'][member]} {experiment}: {reason}".strip()
-    rows["prediction"][rows["status"] == FAILED] = np.nan
+    for name in ("prediction", "fields"):
+        rows[name][rows["status"] == FAILED] = np.nan
     return rows
 
 
@@ -131,7 +145,9 @@ def _problem_at(case: Case, site: Site, experiment: str, places: np.ndarray) -> 
     return build_problem(case, site, experiment, parameters_at(case, places))
 
 
-def make_header(case: Case, observations: Observations, theta: dict[str, np.ndarray], chunks: int) -> Header:
+def make_header(
+    case: Case, observations: Observations, theta: dict[str, np.ndarray], chunks: int, window: Window | None
+) -> Header:
     return Header(
         parameters=theta,
         units={name: parameter.unit for name, parameter in case.parameters.items()},
@@ -143,6 +159,7 @@ def make_header(case: Case, observations: Observations, theta: dict[str, np.ndar
         config_hash=simulation_hash(case),
         seed=case.simulate.seed,
         version=__version__,
+        window=window,
     )
 
 
