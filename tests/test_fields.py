@@ -23,7 +23,7 @@ from vegglue.config import load_case, simulation_hash
 from vegglue.ensemble import FAILED, Ensemble, Header
 from vegglue.errors import InputError, StorageError
 from vegglue.fields import Fields, Window, fields_group, megabytes, predict_at, window_of
-from vegglue.flow import ALONG, LEVEL
+from vegglue.flow import ACROSS, ALONG, LEVEL
 from vegglue.observations import read_observations
 from vegglue.schema import Case
 from vegglue.sensor import read_sensors
@@ -301,18 +301,23 @@ def test_fields_are_the_flow_of_their_member(finished: Finished) -> None:
         assert np.abs(kept[wet]).max() > 0.01
 
 
-def test_a_cell_is_dry_when_no_part_of_it_is_wet() -> None:
-    """A bank that rises by 0.4 m from one row to the next, and water that ends within the third."""
+def test_what_is_kept_is_at_centres_and_dry_where_no_part_of_a_cell_is_wet() -> None:
+    """A bank that rises by 0.4 m from one row to the next; water just over the lowest corner of the third, 0.6 m."""
     bed = np.repeat(0.4 * np.arange(6.0)[None], 5, axis=0)
-    problem = make_problem(bed, (1.0, 1.0), 0.1, 0.7)
+    problem = make_problem(bed, (1.0, 1.0), 0.1, 0.62, film=0.01)
     state = np.zeros((5, 3, 6, 1))
-    state[:, LEVEL], state[:, ALONG] = 0.7, 0.3
+    state[:, LEVEL] = 0.62
+    state[:, ALONG, :, 0], state[:, ACROSS, :, 0] = 0.1 * np.arange(5)[:, None], 0.2 * np.arange(6)
     station = pd.DataFrame({"kind": ["velocity"], "x": [2.5], "y": [1.5]})
     grid = Grid(np.arange(5) + 0.5, np.arange(6) + 0.5, 1.0, 1.0)
     kept = read_sensors(problem, state, grid, station, (), slice(1, 4)).fields
     assert (kept.shape, kept.dtype) == ((1, 3, 3, 6), np.float32)
     assert np.isfinite(kept).all(axis=(0, 1, 2)).tolist() == [True, True, True, False, False, False]
     assert np.isnan(kept[..., 3:]).all()
+    level, u, v = kept[0, :, :, :3]
+    assert (level == np.float32(0.62)).all()
+    assert u == pytest.approx(np.repeat([[0.05], [0.15], [0.25]], 3, axis=1))
+    assert v == pytest.approx(np.tile([0.1, 0.3, 0.5], (3, 1)))
 
 
 @pytest.mark.parametrize("bounds", [(8.0, 20.0), (0.0, 30.0), (0.0, 0.1), (29.9, 30.0), (9.375, 10.625), (10.0, 10.01)])
