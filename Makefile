@@ -1,12 +1,13 @@
 # Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests.
 PYTHON ?= python3
 JOBS ?= -1
-DEMO_MEMBERS ?= 1024
+DEMO_MEMBERS ?= 256
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 VEGGLUE := $(BIN)/vegglue
 CASES := d0 d3a d3b d3b_paper
+DEMO_CASES := d0 d3a d3b
 SOURCES := $(wildcard vegglue/*.py vegglue/*.j2)
 SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
@@ -25,7 +26,7 @@ $(READY): pyproject.toml
 	touch $@
 
 demo: $(READY)  # the paper's cases with $(DEMO_MEMBERS) members each, to finished reports
-	@for case in $(CASES); do \
+	@for case in $(DEMO_CASES); do \
 	  $(VEGGLUE) simulate configs/$$case.yaml --members $(DEMO_MEMBERS) --jobs $(JOBS) --runs runs/demo && \
 	  $(VEGGLUE) infer configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo && \
 	  $(VEGGLUE) report configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo || exit $$?; \

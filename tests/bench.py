@@ -12,11 +12,11 @@ import numpy as np
 
 from vegglue.config import load_case
 from vegglue.march import advance
-from vegglue.neighbourhood import SIZE, leaves
+from vegglue.neighbourhood import leaves
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
-from vegglue.simulate import LEAVES_IN_A_CHUNK, simulate, solve_chunk, unit_places
+from vegglue.simulate import chunk_size, simulate, solve_chunk, unit_places
 from vegglue.site import build_site
 from vegglue.start import backwater
 
@@ -58,7 +58,7 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
     """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
     site, observations = build_site(case), read_observations(case)
     places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    chunk = places[leaves(places, SIZE * LEAVES_IN_A_CHUNK)[7]]
+    chunk = places[leaves(places, chunk_size(len(places)))[7]]
     solve_chunk(case, site, observations, chunk[:2])
     profile = cProfile.Profile()
     began = time.perf_counter()

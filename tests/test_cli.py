@@ -12,7 +12,6 @@ from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
 
 from vegglue.config import case_hash, load_case, simulation_hash
 from vegglue.neighbourhood import SIZE
-from vegglue.simulate import LEAVES_IN_A_CHUNK
 from vegglue.store import read_ensemble, read_posterior, stored_hash
 
 MEMBERS = 128
@@ -116,7 +115,7 @@ def test_an_ensemble_without_measurements_can_be_simulated(
 ) -> None:
     config = write_reach(tmp_path, COARSE, (yaml_part("observations"), ""))
     monkeypatch.chdir(tmp_path)
-    several = SIZE * LEAVES_IN_A_CHUNK + 1  # two chunks
+    several = 4 * SIZE + 1  # more than one chunk
     assert said_to(monkeypatch, capsys, "simulate", config, "--members", several, "--jobs", 1) == (0, "")
     ensemble = read_ensemble(tmp_path / "runs/brook/ensemble.h5")
     assert ensemble.prediction.shape == (several, 0)

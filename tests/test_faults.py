@@ -17,13 +17,12 @@ from reach import COARSE, begin, said_to, vegglue, write_reach
 from vegglue.config import load_case
 from vegglue.ensemble import Ensemble
 from vegglue.errors import StorageError
-from vegglue.neighbourhood import SIZE
 from vegglue.observations import read_observations
-from vegglue.simulate import LEAVES_IN_A_CHUNK, simulate
+from vegglue.simulate import chunk_size, simulate
 from vegglue.store import read_ensemble
 
-CHUNK = SIZE * LEAVES_IN_A_CHUNK
 CHUNKS = 4
+CHUNK = chunk_size(512)
 ENSEMBLE = Path("runs/brook/ensemble.h5")
 PART = Path("runs/brook/ensemble.h5.part")
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
@@ -220,7 +219,7 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_what_was_there(tmp_path: 
 
 
 def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    config = write_reach(tmp_path, COARSE, ("members: 1024", f"members: {2 * CHUNK}"))
+    config = write_reach(tmp_path, COARSE, ("members: 1024", f"members: {CHUNKS * CHUNK}"))
     case = load_case(config)
     observations, path = read_observations(case), tmp_path / ENSEMBLE
     chunks = []
@@ -236,7 +235,7 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
     assert [progress.solved for progress in chunks] == [0, CHUNK]
     again = []
     simulate(case, observations, path, 1, again.append)
-    assert (again[0].resumed, again[-1].solved) == (CHUNK, 2 * CHUNK)
+    assert (again[0].resumed, again[-1].solved) == (CHUNK, CHUNKS * CHUNK)
     assert (read_ensemble(path).status == 0).all()
 
 

@@ -15,11 +15,11 @@ from vegglue.neighbourhood import SIZE, leaves
 from vegglue.observations import Observations, read_observations
 from vegglue.prior import sample_prior
 from vegglue.schema import Case
-from vegglue.simulate import LEAVES_IN_A_CHUNK, parameters_at, simulate, solve_chunk, unit_places
+from vegglue.simulate import LARGEST_CHUNK, parameters_at, simulate, solve_chunk, unit_places
 from vegglue.site import Site, build_site
 from vegglue.store import read_ensemble
 
-CHUNK = SIZE * LEAVES_IN_A_CHUNK
+CHUNK = LARGEST_CHUNK
 # The outlet level becomes a parameter; far below the bed, no steady state is found.
 OUTLET = (
     ("level: 0.95", "level: outlet"),
@@ -68,7 +68,7 @@ def test_leaves_are_neighbours_and_follow_each_other() -> None:
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: int) -> None:
     """What is handed to the processes, and in which order, for any number of them."""
-    case, _, observations = reach_at(tmp_path, ("members: 1024", f"members: {3 * CHUNK}"))
+    case, _, observations = reach_at(tmp_path, ("members: 1024", f"members: {5 * CHUNK}"))
     handed: list[np.ndarray] = []
 
     def record(*given: Any) -> Iterator[Any]:
@@ -78,9 +78,9 @@ def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: p
 
     monkeypatch.setattr("vegglue.simulate._solve_all", record)
     simulate(case, observations, tmp_path / "ensemble.h5", jobs, lambda progress: None)
-    places = places_of(case, 3 * CHUNK)
+    places = places_of(case, 5 * CHUNK)
     expected = [places[leaf] for leaf in leaves(places, CHUNK)]
-    assert len(handed) == 3
+    assert len(handed) == 5
     for ours, theirs in zip(handed, expected, strict=True):
         np.testing.assert_array_equal(ours, theirs)
 

@@ -87,7 +87,7 @@ def simulate_command(config: Config, members: Members = None, jobs: Jobs = -1, r
     status = ensemble.status
     console.print(
         f"{path}: {len(status):,} members, {int((status == 1).sum())} by marching, {int((status == 2).sum())} failed, "
-        f"largest mass error {ensemble.mass_error.max():.1e}"
+        f"largest mass error {ensemble.mass_error[status != 2].max(initial=0.0):.1e}"
     )
 
 

@@ -21,7 +21,8 @@ GAUSS_WEIGHT = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 # Columns computed together, and those beside them they look at.
 STRIP, HALO = 40, 3
 
-compiled = njit(cache=True, fastmath={"contract", "nsz", "arcp", "reassoc"}, error_model="numpy")
+# No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
+compiled = njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
 
 
 @compiled
@@ -39,11 +40,11 @@ def _depth(above: float, reach: float, film: float) -> float:
 
 
 @compiled
-def _afloat(depth: float, film: float) -> float:
+def _afloat(depth: float, half_per_film: float) -> float:
     """Share of advection and mixing kept, 1 - O((2 f / h)^4): none in the film on dry land, where friction rules
     alone.
     """
-    ratio = (0.5 * depth / film) ** 2
+    ratio = (depth * half_per_film) ** 2
     ratio *= ratio
     return ratio / (1.0 + ratio)
 
@@ -97,15 +98,14 @@ def _chezy(law: int, coefficient: float, depth: float, log_argument_minimum: flo
 
 
 @compiled
-def _conveyance(law: int, coefficient: float, depth: float, reach: float, dry: float, floor: float) -> float:
-    """Mean of C h^(3/2) over a cell whose bed rises evenly by 2 w: three Gauss points on its wet part, and the film's.
+def _conveyance(law: int, coefficient: float, mean: float, reach: float, floor: float) -> float:
+    """Mean of C h^(3/2) over a cell of mean depth `mean` whose bed rises evenly by 2 w: three Gauss points where wet.
 
     As in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324: one slope of the surface drives each depth.
     """
-    mean = depth - dry
     above = mean if mean > reach else 2.0 * math.sqrt(reach * mean) - reach
     lowest, highest = max(above - reach, 0.0), above + reach
-    total = _chezy(law, coefficient, dry, floor) * dry * math.sqrt(dry)
+    total = 0.0
     for q in range(3):
         h = lowest + (highest - lowest) * GAUSS_PLACE[q]
         if h > 0.0:
@@ -120,6 +120,10 @@ def class_drag(depth, reach, friction_class, law, coefficient, log_argument_mini
     nx, ny, m = depth.shape
     drag = np.empty((nx, ny, m))
     dry = 0.1 * film
+    of_film = np.empty(coefficient.shape)
+    for c in range(law.size):
+        for k in range(m):
+            of_film[c, k] = _chezy(law[c], coefficient[c, k], dry, log_argument_minimum) * dry * math.sqrt(dry)
     for i in range(nx):
         for j in range(ny):
             c = friction_class[i, j]
@@ -127,8 +131,8 @@ def class_drag(depth, reach, friction_class, law, coefficient, log_argument_mini
             for k in range(m):
                 h = depth[i, j, k]
                 if steep:
-                    carried = _conveyance(law[c], coefficient[c, k], h, reach[i, j], dry, log_argument_minimum)
-                    drag[i, j, k] = GRAVITY * (h / carried) ** 2
+                    carried = _conveyance(law[c], coefficient[c, k], h - dry, reach[i, j], log_argument_minimum)
+                    drag[i, j, k] = GRAVITY * (h / (carried + of_film[c, k])) ** 2
                 else:
                     chezy = _chezy(law[c], coefficient[c, k], h, log_argument_minimum)
                     drag[i, j, k] = GRAVITY / (chezy * chezy * h)
@@ -166,6 +170,7 @@ def _upwind_downstream(flux: float, far_left: float, left: float, right: float) 
 @compiled
 def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy):
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
+    per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
     for f in range(first + 1, stop + 1):
@@ -186,32 +191,31 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 u_e = _upwind_downstream(c_e, u[f - 1, j, k], here, u[f2, j, k])
                 u_s = _upwind(c_s, u[f, j1, k], u[f, j2, k], here, u[f, j3, k])
                 u_n = _upwind(c_n, u[f, j2, k], here, u[f, j3, k], u[f, j4, k])
-                carried = (c_e * (u_e - here) - c_w * (u_w - here)) / dx + (
+                carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_x + (
                     c_n * (u_n - here) - c_s * (u_s - here)
-                ) / dy
+                ) * per_y
                 nu_a, nu_b = viscosity[a, j, k], viscosity[b, j, k]
-                t_e = 2.0 * nu_b * cell[b, j, k] * (u[f2, j, k] - here) / dx
-                t_w = 2.0 * nu_a * cell[a, j, k] * (here - u[f - 1, j, k]) / dx
+                t_e = 2.0 * nu_b * cell[b, j, k] * (u[f2, j, k] - here) * per_x
+                t_w = 2.0 * nu_a * cell[a, j, k] * (here - u[f - 1, j, k]) * per_x
                 nu_s = 0.25 * (nu_a + nu_b + viscosity[a, j2, k] + viscosity[b, j2, k])
                 nu_n = 0.25 * (nu_a + nu_b + viscosity[a, j3, k] + viscosity[b, j3, k])
-                t_s = nu_s * corner[f, j, k] * ((here - u[f, j2, k]) / dy + (v[b, j, k] - v[a, j, k]) / dx)
-                t_n = nu_n * corner[f, j + 1, k] * ((u[f, j3, k] - here) / dy + (v[b, j + 1, k] - v[a, j + 1, k]) / dx)
-                mixed = (t_e - t_w) / dx + (t_n - t_s) / dy
+                t_s = nu_s * corner[f, j, k] * ((here - u[f, j2, k]) * per_y + (v[b, j, k] - v[a, j, k]) * per_x)
+                turn_n = (u[f, j3, k] - here) * per_y + (v[b, j + 1, k] - v[a, j + 1, k]) * per_x
+                t_n = nu_n * corner[f, j + 1, k] * turn_n
+                mixed = (t_e - t_w) * per_x + (t_n - t_s) * per_y
                 across = 0.25 * (v[a, j, k] + v[a, j + 1, k] + v[b, j, k] + v[b, j + 1, k])
                 speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
-                rough = (
-                    ((drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]) / (cell[a, j, k] + cell[b, j, k]))
-                    * speed
-                    * here
-                )
+                stress = drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]
+                rough = stress / (cell[a, j, k] + cell[b, j, k]) * speed * here
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
-                moved = (carried - mixed / face_x[f, j, k]) * _afloat(face_x[f, j, k], film)
-                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop / dx + rough
+                moved = (carried - mixed / face_x[f, j, k]) * _afloat(face_x[f, j, k], half_per_film)
+                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_x + rough
 
 
 @compiled
 def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film, dx, dy):
     """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
+    per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
     for i in range(first, stop):
@@ -229,45 +233,37 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                 # Water enters through the west side with no velocity across.
                 v_w = _upwind_downstream(c_w, v[i1, j, k], v[i2, j, k], here) if i > 0 else 0.0
                 v_e = _upwind_downstream(c_e, v[i2, j, k], here, v[i3, j, k])
-                carried = (c_e * (v_e - here) - c_w * (v_w - here)) / dx + (
+                carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_x + (
                     c_n * (v_n - here) - c_s * (v_s - here)
-                ) / dy
+                ) * per_y
                 nu_s, nu_n = viscosity[i, j - 1, k], viscosity[i, j, k]
-                t_n = 2.0 * nu_n * cell[i, j, k] * (v[i, j + 1, k] - here) / dy
-                t_s = 2.0 * nu_s * cell[i, j - 1, k] * (here - v[i, j - 1, k]) / dy
+                t_n = 2.0 * nu_n * cell[i, j, k] * (v[i, j + 1, k] - here) * per_y
+                t_s = 2.0 * nu_s * cell[i, j - 1, k] * (here - v[i, j - 1, k]) * per_y
                 nu_w = 0.25 * (nu_s + nu_n + viscosity[i2, j - 1, k] + viscosity[i2, j, k])
                 nu_e = 0.25 * (nu_s + nu_n + viscosity[i3, j - 1, k] + viscosity[i3, j, k])
-                t_w = nu_w * corner[i, j, k] * ((u[i, j, k] - u[i, j - 1, k]) / dy + (here - v[i2, j, k]) / dx)
-                t_e = (
-                    nu_e
-                    * corner[i + 1, j, k]
-                    * ((u[i + 1, j, k] - u[i + 1, j - 1, k]) / dy + (v[i3, j, k] - here) / dx)
-                )
-                mixed = (t_e - t_w) / dx + (t_n - t_s) / dy
+                t_w = nu_w * corner[i, j, k] * ((u[i, j, k] - u[i, j - 1, k]) * per_y + (here - v[i2, j, k]) * per_x)
+                turn_e = (u[i + 1, j, k] - u[i + 1, j - 1, k]) * per_y + (v[i3, j, k] - here) * per_x
+                t_e = nu_e * corner[i + 1, j, k] * turn_e
+                mixed = (t_e - t_w) * per_x + (t_n - t_s) * per_y
                 along = 0.25 * (u[i, j, k] + u[i + 1, j, k] + u[i, j - 1, k] + u[i + 1, j - 1, k])
                 speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
-                rough = (
-                    (
-                        (drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k])
-                        / (cell[i, j, k] + cell[i, j - 1, k])
-                    )
-                    * speed
-                    * here
-                )
-                slope = (level[i, j, k] - level[i, j - 1, k]) / dy
-                moved = (carried - mixed / face_y[i, j, k]) * _afloat(face_y[i, j, k], film)
+                stress = drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k]
+                rough = stress / (cell[i, j, k] + cell[i, j - 1, k]) * speed * here
+                slope = (level[i, j, k] - level[i, j - 1, k]) * per_y
+                moved = (carried - mixed / face_y[i, j, k]) * _afloat(face_y[i, j, k], half_per_film)
                 out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + rough
 
 
 @compiled
 def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy):
     """Rate R_level = d(hu)/dx + d(hv)/dy [m/s] of columns first .. stop - 1, into out[offset ..]."""
+    per_x, per_y = 1.0 / dx, 1.0 / dy
     _, _, ny, m = out.shape
     for i in range(first, stop):
         for j in range(ny):
             for k in range(m):
-                along = (flux_x[i + 1, j, k] - flux_x[i, j, k]) / dx
-                out[offset + i - first, 0, j, k] = along + (flux_y[i, j + 1, k] - flux_y[i, j, k]) / dy
+                along = (flux_x[i + 1, j, k] - flux_x[i, j, k]) * per_x
+                out[offset + i - first, 0, j, k] = along + (flux_y[i, j + 1, k] - flux_y[i, j, k]) * per_y
 
 
 @compiled

@@ -54,7 +54,8 @@ def settle(problem: Problem, start: Array, tolerance: float) -> Marched:
     """March one member until Newton can finish it; its steady state is judged as any other, by its residual."""
     state, per_try = start, round(FALL_BACK_SPAN / FALL_BACK_STEP)
     for tried in range(1, FALL_BACK_TRIES + 1):
-        state = march(problem, state, FALL_BACK_STEP, per_try)
+        with np.errstate(over="ignore", invalid="ignore"):  # a march that runs away is told by its end
+            state = march(problem, state, FALL_BACK_STEP, per_try)
         if not np.isfinite(state).all():
             return Marched(state, False, tried * per_try, f"not finite within {tried * FALL_BACK_SPAN:g} s of marching")
         polished = newton(problem, state, tolerance, most=25, time_step=50.0)

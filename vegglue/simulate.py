@@ -5,6 +5,8 @@ results are too.
 """
 
 import os
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -30,7 +32,8 @@ from vegglue.sensor import flow_fields, read_sensors
 from vegglue.site import Site, build_site
 from vegglue.store import ensemble_writer
 
-LEAVES_IN_A_CHUNK = 8
+# Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.
+LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 Rows = dict[str, np.ndarray]
 
 
@@ -50,12 +53,14 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
     Errors: InputError when the fields to be kept exceed their budget; StorageError when another run holds the folder or
     the disk is full (what was written stays).
     """
+    if not case.parameters:
+        raise InputError(f"{os.path.relpath(case.source)}: `parameters` expected a prior or more, got none: add one.")
     site = build_site(case)
     if sentence := excess(case, site.grid):
         raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
     theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
     places = unit_places(case, theta)
-    chunks = leaves(places, SIZE * LEAVES_IN_A_CHUNK)
+    chunks = leaves(places, chunk_size(len(places)))
     header = make_header(case, observations, theta, len(chunks), window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
@@ -69,6 +74,11 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
             report(Progress(solved, len(places), failed, resumed))
 
 
+def chunk_size(members: int) -> int:
+    """Members solved by one task at most; it depends on nothing but the size of the ensemble."""
+    return min(max(-(-members // FEWEST_CHUNKS), SIZE), LARGEST_CHUNK)
+
+
 def _solve_all(
     case: Case,
     site: Site,
@@ -79,7 +89,23 @@ def _solve_all(
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
     tasks = (delayed(_solve_numbered)(index, case, site, observations, places[chunks[index]]) for index in todo)
-    yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)(tasks)
+    pool = Parallel(
+        n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve
+    )
+    yield from pool(tasks)
+
+
+def _serve() -> None:
+    """A worker leaves Ctrl-C to the run it serves, and does not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    run = os.getppid()
+
+    def follow() -> None:
+        while os.getppid() == run:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
 
 
 def _solve_numbered(
