@@ -9,6 +9,7 @@ cell.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class Problem:
     def shape(self) -> tuple[int, int]:
         return self.bed.shape[0], self.bed.shape[1]
 
-    @property
+    @cached_property
     def reach(self) -> Array:
         """Half the range of the bed across the flow within each cell, (nx, ny) [m], at least four films.
 
