@@ -36,6 +36,9 @@ def values(case: Case) -> Iterator[tuple[Place, Value | None, bool]]:
             yield ("experiments", name, "discharge", inflow), discharge, True
         yield ("experiments", name, "level"), experiment.level, False
     yield ("eddy_viscosity",), case.eddy_viscosity, True
+    for name, working in case.effects.items():
+        for key, value in working.values.items():
+            yield ("effects", name, "values", key), value, False
 
 
 def _unknown(place: Place, word: str, known: Iterable[str], what: str) -> Iterator[Refusal]:
@@ -68,6 +71,9 @@ def _names(case: Case) -> Iterator[Refusal]:
         place = ("observations", i, "experiment")
         if observation.experiment is not None:
             yield from _unknown(place, observation.experiment, case.experiments, "experiment")
+    for name, working in case.effects.items():
+        for word in working.experiments or ():
+            yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
     if case.canopy_correction is not None:
         yield from _unknown(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
 
@@ -120,6 +126,7 @@ def _files(case: Case) -> Iterator[Refusal]:
     named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
     named += [(("observations", i, "file"), observation.file) for i, observation in enumerate(case.observations)]
     named += [(("survey", "file"), case.survey.file)] if case.survey else []
+    named += [(("effect_file",), case.effect_file)]
     for place, file in named:
         if file is not None and not file.is_file():
             yield Refusal(

@@ -17,7 +17,7 @@ from vegglue.refusal import Place, Refusal, dotted, first_refusal
 from vegglue.schema import Case
 
 # Keys whose value is a path, relative to the file it is written in.
-PATHS = ("file", "raster", "points")
+PATHS = ("file", "raster", "points", "effect_file")
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
 # What a finished ensemble does not depend on.

@@ -8,13 +8,16 @@ centres, v on the south face of each cell (row 0 unused: walls and side inflows 
 cell.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue import kernels
+from vegglue.acting import closures, push, stages_of, stand_values
+from vegglue.effect import Acting, Ground
+from vegglue.ground import rows
 
 Array = NDArray[np.float64]
 LEVEL, ACROSS, ALONG = 0, 1, 2
@@ -22,13 +25,17 @@ LEVEL, ACROSS, ALONG = 0, 1, 2
 
 @dataclass(frozen=True)
 class Inflow:
-    """Discharge [m3/s] of each member through the cells start..stop-1 of one side ('west', 'south' or 'north')."""
+    """Discharge [m3/s] of each member through the cells start..stop-1 of one side ('west', 'south' or 'north').
+
+    spread: what conveyance is multiplied by in each cell, (cell, m) or (cell, 1) [-].
+    """
 
     side: str
     start: int
     stop: int
     discharge: Array
     by_conveyance: bool = True
+    spread: Array = field(default_factory=lambda: np.ones((1, 1)))
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,9 @@ class Plants:
 class Problem:
     """One experiment for m members on one grid: bed (nx, ny) [m], friction classes, plants, boundaries, viscosity
     [m2/s].
+
+    lift (nx, ny, m) or empty: by how much members' beds lie higher [m]; source (nx, ny, m) or empty: water that enters
+    from above or below, without momentum [m/s]; acting: effects at work in the flow and its readings.
     """
 
     dx: float
@@ -62,6 +72,10 @@ class Problem:
     film: float = 0.01
     log_argument_minimum: float = 1.3
     phi_proportional: bool = False
+    lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    source: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    acting: tuple[Acting, ...] = ()
+    ground: Ground | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -122,8 +136,20 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
             plants, phi=pick(plants.phi), canopy_height=pick(plants.canopy_height), bare_chezy=pick(plants.bare_chezy)
         ),
         viscosity=pick(problem.viscosity),
-        inflows=tuple(replace(inflow, discharge=pick(inflow.discharge)) for inflow in problem.inflows),
+        inflows=tuple(
+            replace(
+                inflow,
+                discharge=pick(inflow.discharge),
+                spread=pick(inflow.spread) if inflow.spread.shape[-1] > 1 else inflow.spread,
+            )
+            for inflow in problem.inflows
+        ),
         outlet_level=pick(problem.outlet_level),
+        lift=pick(problem.lift) if problem.lift.size else problem.lift,
+        source=pick(problem.source) if problem.source.size else problem.source,
+        acting=tuple(
+            replace(one, values={name: pick(value) for name, value in one.values.items()}) for one in problem.acting
+        ),
     )
 
 
@@ -138,12 +164,8 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         plants.canopy_height[inside],
         plants.bare_chezy[inside],
     )
-    rows = north - south
     inflows = tuple(
-        replace(inflow, start=max(inflow.start - south, 0), stop=min(inflow.stop - south, rows))
-        if inflow.side == "west"
-        else inflow
-        for inflow in problem.inflows
+        _cropped(inflow, south, north) if inflow.side == "west" else inflow for inflow in problem.inflows
     )
     return replace(
         problem,
@@ -152,7 +174,16 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         plants=kept,
         inflows=inflows,
         outlet=problem.outlet[south:north],
+        lift=np.ascontiguousarray(problem.lift[:, south:north]),
+        source=np.ascontiguousarray(problem.source[:, south:north]),
+        ground=None if problem.ground is None else rows(problem.ground, south, north),
     )
+
+
+def _cropped(inflow: Inflow, south: int, north: int) -> Inflow:
+    start, stop = max(inflow.start, south), min(inflow.stop, north)
+    spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
+    return replace(inflow, start=start - south, stop=stop - south, spread=spread)
 
 
 def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
@@ -164,7 +195,7 @@ def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
         part = slice(inflow.start, inflow.stop)
         width = problem.dy if inflow.side == "west" else problem.dx
         there = beside[inflow.side][part]
-        weight = there ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(there)
+        weight = (there ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(there)) * inflow.spread
         fluxes[inflow.side][part] += inflow.discharge * weight / (weight.sum(axis=0) * width)
     return fluxes["west"], fluxes["south"], fluxes["north"]
 
@@ -172,6 +203,8 @@ def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
 def storage(problem: Problem, level: Array) -> Array:
     """dh/dz_s of every cell [-], (nx, ny, m): the share of it that is wet."""
     above = level - problem.bed[:, :, None] - 0.1 * problem.film
+    if problem.lift.size:
+        above = above - problem.lift
     reach = problem.reach[:, :, None]
     return np.clip(0.5 * (above + reach) / reach, 0.0, 1.0)
 
@@ -179,14 +212,16 @@ def storage(problem: Problem, level: Array) -> Array:
 def faces(problem: Problem, state: Array) -> Faces:
     """Depths, velocities and fluxes of a state (nx, 3, ny, m), boundaries included."""
     level = np.ascontiguousarray(state[:, LEVEL])
-    cell, face_x, face_y, corner = kernels.depths(level, problem.bed, problem.reach, problem.outlet_level, problem.film)
+    cell, face_x, face_y, corner = kernels.depths(
+        level, problem.bed, problem.lift, problem.reach, problem.outlet_level, problem.film
+    )
     u, v = kernels.velocities(state, 0, problem.shape[0], cell, *_side_fluxes(problem, cell))
     return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
 
 
-def drag(problem: Problem, depth: Array) -> Array:
-    """Friction k = g / (C^2 h) [1/m] at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m]."""
-    rate = kernels.class_drag(
+def bed_drag(problem: Problem, depth: Array) -> Array:
+    """k = g / (C^2 h) [1/m] of the class laws at cell centres; depth (nx, ny, m) [m]."""
+    return kernels.class_drag(
         depth,
         problem.reach,
         problem.friction_class,
@@ -195,30 +230,58 @@ def drag(problem: Problem, depth: Array) -> Array:
         problem.log_argument_minimum,
         problem.film,
     )
-    plants = problem.plants
+
+
+def drag(problem: Problem, depth: Array, plants: tuple[Array, Array] | None = None) -> Array:
+    """Friction k = g / (C^2 h) [1/m] at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m].
+
+    plants: phi and canopy height (cell, m) when they are not those of the problem.
+    """
+    rate = bed_drag(problem, depth)
+    _plant(problem, rate, depth, plants or (problem.plants.phi, problem.plants.canopy_height))
+    return rate
+
+
+def _plant(problem: Problem, rate: Array, depth: Array, plants: tuple[Array, Array]) -> None:
     kernels.plant_drag(
         rate,
         depth,
-        plants.column,
-        plants.row,
-        plants.phi,
-        plants.canopy_height,
-        plants.bare_chezy,
+        problem.plants.column,
+        problem.plants.row,
+        *plants,
+        problem.plants.bare_chezy,
         problem.phi_proportional,
     )
-    return rate
+
+
+def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, dict[str, Array]]:
+    """Friction rate [1/m] and viscosity [m2/s] (nx, ny, m), momentum fluxes and forces by name, effects included."""
+    stages = stages_of(problem.acting)
+    plants = (problem.plants.phi, problem.plants.canopy_height)
+    if "plants" in stages and problem.ground is not None:
+        column, row = problem.plants.column, problem.plants.row
+        plants = stand_values(problem.acting, problem.ground, column, row, plants, state, depth)
+    rate = bed_drag(problem, depth)
+    if problem.ground is None or not stages & {"resistance", "exchange", "force"}:
+        _plant(problem, rate, depth, plants)
+        return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
+    of_bed = rate.copy()
+    _plant(problem, rate, depth, plants)
+    found = closures(problem.acting, problem.ground, state, depth, (rate, of_bed), problem.viscosity)
+    return found.rate, found.viscosity, found.momentum
 
 
 def residual(problem: Problem, state: Array) -> Array:
     """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
-    depth = kernels.cell_depth(state, problem.bed, problem.reach, problem.film)
-    viscosity = np.broadcast_to(problem.viscosity, depth.shape)
-    return kernels.rates(
+    depth = kernels.cell_depth(state, problem.bed, problem.lift, problem.reach, problem.film)
+    rate, viscosity, momentum = closed(problem, state, depth)
+    out = kernels.rates(
         state,
         problem.bed,
+        problem.lift,
         problem.reach,
-        drag(problem, depth),
-        np.ascontiguousarray(viscosity),
+        rate,
+        viscosity,
         *_side_fluxes(problem, depth),
         problem.outlet,
         problem.outlet_level,
@@ -226,3 +289,10 @@ def residual(problem: Problem, state: Array) -> Array:
         problem.dx,
         problem.dy,
     )
+    if problem.source.size:
+        # What enters from the side has to be brought to speed.
+        out[:, LEVEL] -= problem.source
+        out[:, ALONG] += problem.source / depth * state[:, ALONG]
+    if momentum:
+        push(out, momentum, depth, problem.film, problem.dx, problem.dy)
+    return out

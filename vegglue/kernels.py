@@ -50,11 +50,14 @@ def _afloat(depth: float, half_per_film: float) -> float:
 
 
 @compiled
-def depths(level, bed, reach, outlet_level, film):
+def depths(level, bed, lift, reach, outlet_level, film):
     """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed.
 
-    reach (nx, ny): half the range of the bed within a cell [m].
+    reach (nx, ny): half the range of the bed within a cell [m]; lift (nx, ny, m): by how much members' beds lie higher
+    [m], or empty.
     """
+    if lift.size:
+        level = level - lift
     nx, ny, m = level.shape
     cell = np.empty((nx, ny, m))
     face_x = np.empty((nx + 1, ny, m))
@@ -83,7 +86,8 @@ def depths(level, bed, reach, outlet_level, film):
     for j in range(ny):
         for k in range(m):
             edge = bed[last, j] + 0.5 * (bed[last, j] - bed[before, j])
-            face_x[nx, j, k] = _depth(outlet_level[k] - edge, reach[last, j], film)
+            above = outlet_level[k] - edge - (lift[last, j, k] if lift.size else 0.0)
+            face_x[nx, j, k] = _depth(above, reach[last, j], film)
     return cell, face_x, face_y, corner
 
 
@@ -267,12 +271,16 @@ def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy):
 
 
 @compiled
-def cell_depth(state, bed, reach, film):
+def cell_depth(state, bed, lift, reach, film):
     """h (nx, ny, m) at cell centres [m] of a state (nx, 3, ny, m)."""
     nx, _, ny, m = state.shape
     depth = np.empty((nx, ny, m))
     for i in range(nx):
         for j in range(ny):
+            if lift.size:
+                for k in range(m):
+                    depth[i, j, k] = _depth(state[i, 0, j, k] - bed[i, j] - lift[i, j, k], reach[i, j], film)
+                continue
             for k in range(m):
                 depth[i, j, k] = _depth(state[i, 0, j, k] - bed[i, j], reach[i, j], film)
     return depth
@@ -300,7 +308,7 @@ def velocities(state, first, stop, cell, west, south, north):
 
 
 @compiled
-def rates(state, bed, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
+def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, dx, dy):
     """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
     nx = state.shape[0]
     out = np.empty_like(state)
@@ -308,7 +316,7 @@ def rates(state, bed, reach, drag, viscosity, west, south, north, outlet, outlet
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
-        cell, face_x, face_y, corner = depths(level, bed[a:b], reach[a:b], outlet_level, film)
+        cell, face_x, face_y, corner = depths(level, bed[a:b], lift[a:b], reach[a:b], outlet_level, film)
         u, v = velocities(state, a, b, cell, west, south, north)
         wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
         lo, hi = first - a, stop - a

@@ -1,17 +1,17 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from vegglue import kernels
-from vegglue.flow import Array, Inflow, Plants, Problem
-from vegglue.schema import Case, Experiment, Stand, StandOverride, Value
+from vegglue.effect import Array, Boundary, Ground
+from vegglue.flow import Inflow, Plants, Problem
+from vegglue.ground import ground_of
+from vegglue.schema import Case, Experiment, Stand, StandOverride
 from vegglue.schema import Inflow as InflowPart
 from vegglue.site import Site
+from vegglue.workings import Theta, acting_in, bounded, lifted, value_of
 
 LAWS = {"manning": (kernels.MANNING, "n"), "keulegan": (kernels.KEULEGAN, "k_s"), "chezy": (kernels.CHEZY, "c")}
-Theta = Mapping[str, Array]
 
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
@@ -19,32 +19,57 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     members = len(next(iter(theta.values()))) if theta else 1
     setting = case.experiments[experiment]
     classes = [case.friction.classes[name] for name in site.class_names]
+    acting = acting_in(case, experiment, theta, members)
+    ground = ground_of(case, site, experiment) if acting else None
+    boundary = bounded(acting, _boundary(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
         bed=site.bed,
         friction_class=site.friction_class,
         law=np.array([LAWS[item.law][0] for item in classes], dtype=np.int64),
-        coefficient=np.array([_value(getattr(item, LAWS[item.law][1]), theta, members) for item in classes]),
+        coefficient=np.array([value_of(getattr(item, LAWS[item.law][1]), theta, members) for item in classes]),
         plants=_plants(case, site, setting, theta, members),
-        viscosity=_value(case.eddy_viscosity, theta, members),
+        viscosity=value_of(case.eddy_viscosity, theta, members),
         inflows=tuple(
-            _inflow(inflow, site, _value(setting.discharge[name], theta, members))
-            for name, inflow in case.inflows.items()
+            _inflow(inflow, site, discharge, spread)
+            for inflow, discharge, spread in zip(
+                case.inflows.values(), boundary.discharge, boundary.spread, strict=True
+            )
         ),
         outlet=_within(case.outlet.range, site.grid.y),
-        outlet_level=_value(setting.level, theta, members),
+        outlet_level=boundary.level,
         film=case.numerics.film_depth,
         log_argument_minimum=case.numerics.bank_argument_minimum,
         phi_proportional=case.numerics.emergent == "proportional",
+        lift=lifted(acting, ground) if ground else np.zeros((0, 0, 0)),
+        source=_source(boundary.lateral, ground) if ground else np.zeros((0, 0, 0)),
+        acting=acting,
+        ground=ground,
     )
 
 
-def _value(value: Value, theta: Theta, members: int) -> Array:
-    """A number for all members, or the parameter of that name, (members,)."""
-    if isinstance(value, str):
-        return np.array(theta[value], dtype=np.float64)
-    return np.full(members, float(value))
+def _boundary(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> Boundary:
+    """What the case says of inflows and outlet; spread and place have as many cells as the longest side."""
+    cells = [_inflow_cells(inflow, site).size for inflow in case.inflows.values()]
+    place = np.zeros((len(cells), max(cells), 1))
+    for inflow, size in enumerate(cells):
+        place[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+    return Boundary(
+        discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
+        level=value_of(setting.level, theta, members),
+        spread=np.ones((len(cells), max(cells), 1)),
+        lateral=np.zeros(members),
+        place=place,
+    )
+
+
+def _source(lateral: Array, ground: Ground) -> Array:
+    """Lateral inflow spread over the floor, (nx, ny, m) [m/s]; empty without one."""
+    if not lateral.any():
+        return np.zeros((0, 0, 0))
+    floor = 1.0 - ground.bank
+    return np.ascontiguousarray(floor * lateral / (floor.sum() * ground.dx * ground.dy))
 
 
 def _plants(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> Plants:
@@ -68,14 +93,19 @@ def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: 
 
     def own(name: str) -> Array:
         other = getattr(override, name) if override is not None else None
-        return _value(getattr(stand, name) if other is None else other, theta, members)
+        return value_of(getattr(stand, name) if other is None else other, theta, members)
 
     return own("phi"), own("canopy_height"), own("bare_chezy")
 
 
-def _inflow(inflow: InflowPart, site: Site, discharge: Array) -> Inflow:
-    cells = np.flatnonzero(_within(inflow.range, site.grid.y if inflow.side == "west" else site.grid.x))
-    return Inflow(inflow.side, int(cells[0]), int(cells[-1]) + 1, discharge, inflow.spread == "conveyance")
+def _inflow(inflow: InflowPart, site: Site, discharge: Array, spread: Array) -> Inflow:
+    cells = _inflow_cells(inflow, site)
+    start, stop = int(cells[0]), int(cells[-1]) + 1
+    return Inflow(inflow.side, start, stop, discharge, inflow.spread == "conveyance", spread[: stop - start])
+
+
+def _inflow_cells(inflow: InflowPart, site: Site) -> np.ndarray:
+    return np.flatnonzero(_within(inflow.range, site.grid.y if inflow.side == "west" else site.grid.x))
 
 
 def _within(part: tuple[float, float] | None, centres: Array) -> np.ndarray:

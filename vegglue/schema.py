@@ -202,6 +202,16 @@ class Parameter(Part):
         return self
 
 
+class Working(Part):
+    """An effect at work in a case; its key names it, and the effect too unless `effect` does."""
+
+    effect: str | None = Field(default=None, description="name of the effect in the library, if the key is another")
+    values: dict[str, Value] = Field(description="its amplitude and, as far as they are not left alone, its shapes")
+    experiments: tuple[str, ...] | None = Field(default=None, description="where it acts, everywhere when left out")
+    sections: tuple[str, ...] = Field(default=(), description="sensor effects: sections it is limited to")
+    devices: tuple[str, ...] = Field(default=(), description="sensor effects: devices it is limited to")
+
+
 class Offset(Part):
     x: Number = Field(default=0.0, description="added to x of the file [m]")
     y: Number = Field(default=0.0, description="added to y of the file [m]")
@@ -291,6 +301,8 @@ class Case(Part):
     outlet: Outlet = Field(default_factory=Outlet, description="where it leaves: the east side")
     experiments: dict[str, Experiment] = Field(min_length=1, description="flows that share parameters")
     eddy_viscosity: Value = Field(default=0.01, description="[m2/s]")
+    effects: dict[str, Working] = Field(default_factory=dict, description="physical effects at work, see `effects`")
+    effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
     survey: Survey | None = Field(default=None, description="plant survey")

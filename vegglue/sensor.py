@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from vegglue.flow import Array, Faces, FlowFields, Problem, faces
+from vegglue.effect import Reading, across, applied
+from vegglue.flow import Array, Faces, FlowFields, Problem, closed, faces
 from vegglue.site import Grid
 
 
@@ -37,6 +38,8 @@ def read_sensors(
     velocity = (station["kind"] == "velocity").to_numpy()
     for field, rows in ((u, velocity), (now.level, ~velocity)):
         prediction[rows] = _bilinear(field, grid, station["x"].to_numpy()[rows], station["y"].to_numpy()[rows])
+    if any(one.effect.stage == "sensor" for one in problem.acting):
+        prediction = _shown(problem, state, now, u, prediction, grid, station)
     flow = now.flux_x.sum(axis=1) * problem.dy
     edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
     nearest = [int(np.argmin(np.abs(edges - x))) for _, x in sections]
@@ -44,6 +47,28 @@ def read_sensors(
     wet = now.cell[kept] > 0.1 * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
     return Readings(prediction.T, flow[nearest].T, error, np.moveaxis(fields, -1, 0))
+
+
+def _shown(
+    problem: Problem, state: Array, now: Faces, u: Array, value: Array, grid: Grid, station: pd.DataFrame
+) -> Array:
+    """What instruments make of it: the effects of the stage sensor, each where it acts."""
+    x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
+    canopy = np.zeros_like(now.cell)
+    canopy[problem.plants.column, problem.plants.row] = problem.plants.canopy_height
+    fields = {"depth": now.cell, "u": u, "rate": closed(problem, state, now.cell)[0], "u_y": across(u, grid.dy)}
+    fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
+    there = {name: _bilinear(field, grid, x, y) for name, field in fields.items()}
+    velocity = (station["kind"] == "velocity").to_numpy(float)[:, None]
+    for one in problem.acting:
+        rows = np.ones(len(station), dtype=bool)
+        if one.sections:
+            rows &= station["section"].isin(one.sections).to_numpy()
+        if one.devices:
+            rows &= station["device"].isin(one.devices).to_numpy()
+        reading = Reading(value=value, velocity=velocity, x=x[:, None], y=y[:, None], **there)
+        value = np.where(rows[:, None], applied((one,), "sensor", reading, {"value": value})["value"], value)
+    return value
 
 
 def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
@@ -66,6 +91,8 @@ def _entered(problem: Problem) -> Array:
     """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s]."""
     nx = problem.shape[0]
     entered = np.zeros((nx + 1, problem.members))
+    if problem.source.size:
+        entered[1:] += problem.source.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
     for inflow in problem.inflows:
         if inflow.side == "west":
             entered += inflow.discharge

@@ -37,7 +37,14 @@ def _column(problem: Problem, i: int) -> Problem:
     none = np.zeros(0, dtype=np.int64)
     empty = np.zeros((0, problem.members))
     plants = replace(problem.plants, column=none, row=none, phi=empty, canopy_height=empty, bare_chezy=empty)
-    return replace(problem, bed=problem.bed[i : i + 1], friction_class=problem.friction_class[i : i + 1], plants=plants)
+    return replace(
+        problem,
+        bed=problem.bed[i : i + 1],
+        friction_class=problem.friction_class[i : i + 1],
+        plants=plants,
+        lift=problem.lift[i : i + 1],
+        acting=(),
+    )
 
 
 def _passing(problem: Problem) -> Array:

@@ -1,0 +1,157 @@
+"""Effects at work in a flow: what they make of plants, friction, viscosity and momentum at cell centres.
+
+Nothing here knows a face of the grid but `push`, which hands momentum over to the faces.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.effect import Acting, Array, Cells, Ground, Stand, applied
+from vegglue.ground import part
+
+LEVEL, ACROSS, ALONG = 0, 1, 2
+# Columns worked on together, so that what lies between fits the cache.
+STRIP = 40
+
+
+@dataclass(frozen=True)
+class Closures:
+    """Friction rate k [1/m] and viscosity [m2/s], (nx, ny, m); momentum fluxes h T [m3/s2] and forces [m/s2] by name,
+    as far as there are any.
+    """
+
+    rate: Array
+    viscosity: Array
+    momentum: dict[str, Array]
+
+
+def stages_of(acting: tuple[Acting, ...]) -> set[str]:
+    return {one.effect.stage for one in acting}
+
+
+def stand_values(
+    acting: tuple[Acting, ...],
+    ground: Ground,
+    column: NDArray[np.int64],
+    row: NDArray[np.int64],
+    plants: tuple[Array, Array],
+    state: Array,
+    depth: Array,
+) -> tuple[Array, Array]:
+    """phi and canopy height (cell, m) of vegetated cells after the effects of the stage plants."""
+    phi, canopy_height = plants
+    before = np.maximum(column - 1, 0)
+    u = 0.5 * (state[column, ALONG, row] + state[before, ALONG, row])
+    north = np.minimum(row + 1, state.shape[2] - 1)
+    v = 0.5 * (state[column, ACROSS, row] + np.where((row + 1 < state.shape[2])[:, None], state[column, ACROSS, north], 0))
+    stand = Stand(
+        phi=phi,
+        canopy_height=canopy_height,
+        depth=depth[column, row],
+        speed=np.sqrt(u**2 + v**2 + 1e-6),
+        front=ground.front[column, row],
+        edge=ground.edge[column, row],
+        x=ground.x[column, 0],
+        y=ground.y[0, row],
+    )
+    now = applied(acting, "plants", stand, {"phi": phi, "canopy_height": canopy_height})
+    return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])
+
+
+def closures(
+    acting: tuple[Acting, ...], ground: Ground, state: Array, depth: Array, rates: tuple[Array, Array], viscosity: Array
+) -> Closures:
+    """All that the stages resistance, exchange and force hand on; rates: of friction, and the part of the bed."""
+    rate, bed_rate = rates
+    nx = state.shape[0]
+    found: dict[str, Array] = {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
+    for first in range(0, nx, STRIP):
+        stop = min(first + STRIP, nx)
+        wide = slice(max(first - 1, 0), min(stop + 1, nx))
+        inner = slice(first - wide.start, stop - wide.start)
+        cells = _cells(part(ground, wide, slice(None)), state, depth, rate, bed_rate, viscosity, wide)
+        values = applied(acting, "resistance", cells, {"rate": cells.rate})
+        cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
+        values |= applied(acting, "exchange", cells, {"viscosity": viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
+        values |= applied(acting, "force", cells, {"x": ZERO, "y": ZERO})
+        for name, value in values.items():
+            if value is ZERO:
+                continue
+            if name not in found:
+                found[name] = np.zeros_like(rate)
+            found[name][first:stop] = np.broadcast_to(value, cells.depth.shape)[inner]
+    momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
+    return Closures(found["rate"], found["viscosity"], momentum)
+
+
+ZERO = np.zeros(1)
+
+
+def _cells(
+    ground: Ground, state: Array, depth: Array, rate: Array, bed_rate: Array, viscosity: Array, columns: slice
+) -> Cells:
+    here = state[columns]
+    before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
+    v = 0.5 * here[:, ACROSS]
+    v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
+    return Cells(
+        ground=ground,
+        depth=depth[columns],
+        level=here[:, LEVEL],
+        u=0.5 * (here[:, ALONG] + before),
+        v=v,
+        rate=rate[columns],
+        bed_rate=bed_rate[columns],
+        viscosity=viscosity,
+    )
+
+
+def push(out: Array, momentum: dict[str, Array], depth: Array, film: float, dx: float, dy: float) -> None:
+    """R_u -= f - (1/h) div(h T) on east faces and R_v alike on south faces, h of a face the mean of its cells.
+
+    Faded out in the film on dry land like advection.
+    """
+    x, y = _thrust(momentum, depth, dx, dy)
+    if x is not None:
+        pair = depth[1:] + depth[:-1]
+        along = (x[1:] + x[:-1]) / pair
+        if "xx" in momentum:
+            along -= 2.0 * np.diff(momentum["xx"], axis=0) / (dx * pair)
+        out[:-1, ALONG] -= along * _afloat(0.5 * pair, film)
+        out[-1, ALONG] -= x[-1] / depth[-1] * _afloat(depth[-1], film)
+    if y is not None:
+        pair = depth[:, 1:] + depth[:, :-1]
+        across = (y[:, 1:] + y[:, :-1]) / pair
+        if "yy" in momentum:
+            across -= 2.0 * np.diff(momentum["yy"], axis=1) / (dy * pair)
+        out[:, ACROSS, 1:] -= across * _afloat(0.5 * pair, film)
+
+
+def _thrust(momentum: dict[str, Array], depth: Array, dx: float, dy: float) -> tuple[Array | None, Array | None]:
+    """h f - d(h T_xy) at cell centres [m2/s2], along x and y."""
+    x = depth * momentum["x"] if "x" in momentum else None
+    y = depth * momentum["y"] if "y" in momentum else None
+    if "xy" in momentum:
+        x = (0.0 if x is None else x) - _slope(momentum["xy"], dy, 1)
+        y = (0.0 if y is None else y) - _slope(momentum["xy"], dx, 0)
+    if x is None and "xx" in momentum:
+        x = np.zeros_like(depth)
+    if y is None and "yy" in momentum:
+        y = np.zeros_like(depth)
+    return x, y
+
+
+def _slope(values: Array, step: float, axis: int) -> Array:
+    """Central differences; nothing is carried beyond the sides of the grid."""
+    if axis == 1:
+        beside = np.zeros((values.shape[0], values.shape[1] + 2, values.shape[2]))
+        beside[:, 1:-1] = values
+        return (beside[:, 2:] - beside[:, :-2]) / (2.0 * step)
+    return np.gradient(values, step, axis=0) if values.shape[0] > 1 else np.zeros_like(values)
+
+
+def _afloat(depth: Array, film: float) -> Array:
+    ratio = (0.5 * depth / film) ** 4
+    return ratio / (1.0 + ratio)

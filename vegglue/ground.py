@@ -1,0 +1,93 @@
+"""The lie of the land as effects see it: the channel axis and floor, the banks, and how far patches are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.effect import Array, Ground
+from vegglue.schema import Case
+from vegglue.site import Site
+
+# Steeper across than this [-], a cell is no longer floor.
+BREAK = 0.2
+
+
+def ground_of(case: Case, site: Site, experiment: str) -> Ground:
+    """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
+    grid, bed = site.grid, site.bed
+    side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
+    floor = _floor(bed, side_slope)
+    axis, half_width = _extent(floor, grid.y, grid.dy)
+    patch = np.where(np.isin(site.patch, _present(case, experiment)), site.patch, -1)
+    front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
+    return Ground(
+        x=grid.x[:, None, None],
+        y=grid.y[None, :, None],
+        dx=grid.dx,
+        dy=grid.dy,
+        bed=bed[..., None],
+        offset=((grid.y[None] - axis[:, None]) / half_width[:, None])[..., None],
+        half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
+        side_slope=side_slope[..., None],
+        bank=(~floor).astype(float)[..., None],
+        planted=(patch >= 0).astype(float)[..., None],
+        front=front[..., None],
+        edge=edge[..., None],
+        wake=wake[..., None],
+        patch=patch[..., None],
+    )
+
+
+def rows(ground: Ground, south: int, north: int) -> Ground:
+    """Rows south..north-1 of it."""
+    return part(ground, slice(None), slice(south, north))
+
+
+def part(ground: Ground, columns: slice, rows: slice) -> Ground:
+    """Some columns and rows of it."""
+    cut = {
+        name: getattr(ground, name)[columns, rows]
+        for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
+    }
+    return Ground(x=ground.x[columns], y=ground.y[:, rows], dx=ground.dx, dy=ground.dy, **cut)
+
+
+def _present(case: Case, experiment: str) -> list[int]:
+    plants = case.experiments[experiment].plants
+    return [
+        index
+        for index, patch in enumerate(case.plants.patches)
+        if plants is True or (plants and patch.name in plants)
+    ]
+
+
+def _floor(bed: Array, side_slope: Array) -> NDArray[np.bool_]:
+    """From the lowest cell of each cross-section outward, up to the first steep one."""
+    steep = side_slope > BREAK
+    columns, lowest = np.arange(bed.shape[1])[None, :], bed.argmin(axis=1)[:, None]
+    left = np.logical_or.accumulate((steep & (columns <= lowest))[:, ::-1], axis=1)[:, ::-1]
+    right = np.logical_or.accumulate(steep & (columns >= lowest), axis=1)
+    return ~np.where(columns < lowest, left, right)
+
+
+def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:
+    """Axis and half width of the floor of each cross-section [m]; at least one cell."""
+    first, last = floor.argmax(axis=1), floor.shape[1] - 1 - floor[:, ::-1].argmax(axis=1)
+    low, high = y[first] - 0.5 * dy, y[last] + 0.5 * dy
+    return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy)
+
+
+def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: float) -> tuple[Array, Array, Array]:
+    """Distances [m] from the front of a patch, from the nearest side of one, and downstream of one."""
+    front, edge, wake = (np.full(patch.shape, np.inf) for _ in range(3))
+    for index in np.unique(patch[patch >= 0]):
+        column, row = np.nonzero(patch == index)
+        west, east = x[column.min()] - 0.5 * dx, x[column.max()] + 0.5 * dx
+        south, north = y[row.min()] - 0.5 * dy, y[row.max()] + 0.5 * dy
+        front[column, row] = x[column] - west
+        beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
+        here = slice(column.min(), column.max() + 1)
+        edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
+        behind = np.where(x > east, x - east, np.inf)[:, None]
+        spans = ((y > south) & (y < north))[None]
+        wake = np.where(spans & (behind < wake), behind, wake)
+    return front, edge, wake
