@@ -45,7 +45,8 @@ def stand_values(
     before = np.maximum(column - 1, 0)
     u = 0.5 * (state[column, ALONG, row] + state[before, ALONG, row])
     north = np.minimum(row + 1, state.shape[2] - 1)
-    v = 0.5 * (state[column, ACROSS, row] + np.where((row + 1 < state.shape[2])[:, None], state[column, ACROSS, north], 0))
+    beyond = np.where((row + 1 < state.shape[2])[:, None], state[column, ACROSS, north], 0.0)
+    v = 0.5 * (state[column, ACROSS, row] + beyond)
     stand = Stand(
         phi=phi,
         canopy_height=canopy_height,
