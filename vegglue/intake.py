@@ -80,7 +80,8 @@ PHI: Tree = {
 def _canopy(guess: float) -> Tree:
     return {
         "distribution": "normal", "mean": guess, "sd": round(BY_EYE * guess, 4), "low": round(0.4 * guess, 4),
-        "high": round(1.8 * guess, 4), "unit": "m", "symbol": "h_d", "meaning": "height of the canopy, estimated by eye",
+        "high": round(1.8 * guess, 4), "unit": "m", "symbol": "h_d",
+        "meaning": "height of the canopy, estimated by eye",
     }  # fmt: skip
 
 

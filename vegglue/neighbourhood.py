@@ -93,7 +93,7 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Sol
             iterations[pending] += followers.iterations
             there = followers.converged
             status[pending[there]] = SOLVED_BY_NEWTON
-            state[..., pending[there]] = _widen(followers.state[..., there], ny, lead.band)
+            state[..., pending[there]] = widen(followers.state[..., there], ny, lead.band)
             pending = pending[~there]
     return Solved(state, status, reason, iterations)
 
@@ -134,31 +134,44 @@ def _solve_centre(
 ) -> _Lead:
     """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
     problem = take(whole, np.array([centre]))
-    spent = 0
-    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
-    if warm is not None:
-        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance), *attempts]
-    for attempt in attempts:
-        solution, shared, band = attempt()
-        spent += int(solution.iterations[0])
-        if solution.converged[0] and shared is not None:
-            return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
+    solution, shared, band = settled(problem, warm, tolerance)
+    spent = int(solution.iterations[0])
+    if shared is not None:
+        return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
     return _marched(problem, spent, tolerance)
 
 
 Attempt = tuple[Solution, Factors | None, tuple[int, int]]
 
 
+def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
+    """One member: its state in the band of rows that may be wet, the factors there, and that band.
+
+    warm (nx, 3, ny, 1): a state nearby, if one is known. Without factors, no attempt has converged.
+    """
+    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
+    if warm is not None:
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance), *attempts]
+    spent = 0
+    for attempt in attempts:
+        solution, shared, band = attempt()
+        spent += int(solution.iterations[0])
+        solution = replace(solution, iterations=np.array([spent]))
+        if solution.converged[0] and shared is not None:
+            return solution, shared, band
+    return solution, None, band
+
+
 def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
     band = _band(problem, warm)
-    solution, shared = finish(crop(problem, *band), _inside(warm, band), tolerance)
+    solution, shared = finish(crop(problem, *band), inside(warm, band), tolerance)
     return _checked(problem, solution, shared, band, tolerance)
 
 
 def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float = 200.0) -> Attempt:
     band = _band(problem, warm)
     part = crop(problem, *band)
-    near = newton(part, _inside(warm, band), CLOSE, time_step=time_step)
+    near = newton(part, inside(warm, band), CLOSE, time_step=time_step)
     if not near.converged[0]:
         return near, None, band
     solution, shared = finish(part, near.state, tolerance)
@@ -177,9 +190,9 @@ def _checked(
     part = crop(problem, *band)
     if not (solution.converged[0] and _overflows(part, solution.state, band, problem.shape[1])[0]):
         return solution, shared, band
-    wider = _widen(solution.state, problem.shape[1], band)
+    wider = widen(solution.state, problem.shape[1], band)
     band = _band(problem, wider)
-    solution, shared = finish(crop(problem, *band), _inside(wider, band), tolerance)
+    solution, shared = finish(crop(problem, *band), inside(wider, band), tolerance)
     return solution, shared, band
 
 
@@ -194,9 +207,9 @@ def _lead(
 ) -> _Lead:
     ny = problem_of(place[None]).shape[1]
     slopes = tuple(
-        _widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared)
+        widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared)
     )
-    state = _widen(solution.state, ny, band)
+    state = widen(solution.state, ny, band)
     return _Lead(state, SOLVED_BY_NEWTON, "", spent, _Tangents(place, slopes), shared, band)
 
 
@@ -226,7 +239,7 @@ def _chord_in_band(problem: Problem, start: Array, lead: _Lead, tolerance: float
     """Followers in the band of their centre; one that outgrows it counts as not converged."""
     assert lead.factors is not None
     part = crop(problem, *lead.band)
-    solution = chord(part, _inside(start, lead.band), lead.factors, tolerance)
+    solution = chord(part, inside(start, lead.band), lead.factors, tolerance)
     overflowing = _overflows(part, solution.state, lead.band, problem.shape[1])
     return replace(solution, converged=solution.converged & ~overflowing)
 
@@ -251,17 +264,18 @@ def _overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> n
     return south | north
 
 
-def _inside(state: Array, band: tuple[int, int]) -> Array:
-    inside = np.ascontiguousarray(state[:, :, band[0] : band[1]])
-    inside[:, ACROSS, 0] = 0.0
-    return inside
+def inside(state: Array, band: tuple[int, int]) -> Array:
+    """The rows of a band, (nx, 3, rows, m)."""
+    rows = np.array(state[:, :, band[0] : band[1]])
+    rows[:, ACROSS, 0] = 0.0
+    return rows
 
 
-def _widen(inside: Array, rows: int, band: tuple[int, int]) -> Array:
+def widen(part: Array, rows: int, band: tuple[int, int]) -> Array:
     """The band put back into all rows; beyond it the level runs on flat and nothing moves."""
-    nx, _, _, m = inside.shape
+    nx, _, _, m = part.shape
     wide = np.zeros((nx, 3, rows, m))
-    wide[:, :, band[0] : band[1]] = inside
-    wide[:, LEVEL, : band[0]] = inside[:, LEVEL, :1]
-    wide[:, LEVEL, band[1] :] = inside[:, LEVEL, -1:]
+    wide[:, :, band[0] : band[1]] = part
+    wide[:, LEVEL, : band[0]] = part[:, LEVEL, :1]
+    wide[:, LEVEL, band[1] :] = part[:, LEVEL, -1:]
     return wide

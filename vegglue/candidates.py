@@ -1,0 +1,111 @@
+"""What a case could lack: every effect of the library where it may act, as a case with one parameter more."""
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.effect import Effect
+from vegglue.effects import library
+from vegglue.schema import Case, Parameter, Working
+
+# Combinations of shapes that a search tries at most.
+MOST_SHAPES = 12
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect and where it would act; empty tuples mean everywhere. shapes: values a search tries, by name."""
+
+    effect: Effect
+    experiments: tuple[str, ...] = ()
+    sections: tuple[str, ...] = ()
+    devices: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """discharge_error[high]: the effect, and where it acts if not everywhere."""
+        where = (*self.experiments, *self.sections, *self.devices)
+        return f"{self.effect.name}[{','.join(where)}]" if where else self.effect.name
+
+    @property
+    def key(self) -> str:
+        """The same as a word, for a config."""
+        return "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices])
+
+    @property
+    def parameter(self) -> str:
+        return f"{self.key}_{self.effect.amplitude.name}"
+
+    def settings(self) -> list[dict[str, float]]:
+        """Values of the shapes to try: their grids, or their defaults."""
+        grids = [shape.grid or (shape.default,) for shape in self.effect.shapes]
+        names = [shape.name for shape in self.effect.shapes]
+        combinations = [dict(zip(names, values, strict=True)) for values in itertools.product(*grids)]
+        every = -(-len(combinations) // MOST_SHAPES)
+        return combinations[::every]
+
+
+def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
+    """All effects of the library that could act in the case and do not yet, once for each place they may act in."""
+    found = []
+    used = station[station["used"].to_numpy(bool)]
+    velocity = used[used["kind"] == "velocity"]
+    places: Mapping[str, list[str]] = {
+        "experiment": list(case.experiments),
+        "section": [str(name) for name in velocity["section"].unique()],
+        "device": [str(name) for name in used["device"].unique() if str(name)],
+    }
+    for effect in library(case.effect_file).values():
+        if effect.stage == "plants" and not case.plants.patches:
+            continue
+        if effect.each == "case":
+            found.append(Candidate(effect))
+            continue
+        for place in places[effect.each]:
+            found.append(Candidate(effect, **{f"{effect.each}s": (place,)}))
+    return [one for one in found if one.key not in case.effects]
+
+
+def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float], name: str | None = None) -> Case:
+    """The case with one effect more; its amplitude is a parameter, its shapes are numbers."""
+    effect, parameter = candidate.effect, candidate.parameter
+    working = Working(
+        effect=effect.name if candidate.key != effect.name else None,
+        values={effect.amplitude.name: parameter, **shapes},
+        experiments=candidate.experiments or None,
+        sections=candidate.sections,
+        devices=candidate.devices,
+    )
+    return case.model_copy(
+        update={
+            "name": name or case.name,
+            "effects": {**case.effects, candidate.key: working},
+            "parameters": {**case.parameters, parameter: prior_of(effect)},
+        }
+    )
+
+
+def prior_of(effect: Effect) -> Parameter:
+    """Normal around off, as wide as plausible, within the support."""
+    amplitude = effect.amplitude
+    return Parameter(
+        distribution="normal",
+        mean=amplitude.off,
+        sd=amplitude.scale,
+        low=amplitude.low,
+        high=amplitude.high,
+        unit=amplitude.unit,
+        symbol="",
+        meaning=amplitude.meaning,
+    )
+
+
+def start_of(effect: Effect, gain: float) -> float:
+    """The amplitude whose power above off is `gain`, kept within the support and off its ends."""
+    amplitude = effect.amplitude
+    size = float(np.sign(gain) * np.abs(gain) ** (1.0 / amplitude.power))
+    margin = 0.01 * min(amplitude.scale, amplitude.high - amplitude.low)
+    return float(np.clip(amplitude.off + size, amplitude.low + margin, amplitude.high - margin))

@@ -1,0 +1,250 @@
+"""A model and its exact derivatives at one place of the prior: what diagnosis, refinement and design stand on.
+
+Places are z = Phi^-1(F(theta)), in which every prior is a standard normal: the misfit of a prior is |z|^2.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from scipy.special import ndtr, ndtri
+
+from vegglue.effect import Amplitude, Array
+from vegglue.flow import Problem, crop, residual
+from vegglue.neighbourhood import settled, widen
+from vegglue.observations import Observations
+from vegglue.prior import probability, quantile
+from vegglue.problem import build_problem
+from vegglue.schema import Case
+from vegglue.sensor import read_sensors
+from vegglue.site import Site, build_site
+from vegglue.steady import Factors, chord
+from vegglue.tangent import adjoints, tangents
+
+# Step of differences in z, small against the prior and large against rounding.
+STEP = 1e-3
+# Relative exactness of tangents.
+EXACT = 1e-5
+# Places further than this from the middle of the prior are not told apart from its bounds.
+FURTHEST = 6.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """A case on its grid, read at stations: a function from z (p,) to predictions (n,)."""
+
+    case: Case
+    site: Site
+    station: pd.DataFrame
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.case.parameters)
+
+
+@dataclass(frozen=True)
+class Flowing:
+    """One experiment at a place: its state (nx, 3, rows, 1) in a band of rows, factors, and slopes d state / dz_j
+    (nx, 3, rows, p).
+    """
+
+    state: Array
+    band: tuple[int, int]
+    factors: Factors
+    slopes: Array
+
+
+@dataclass(frozen=True)
+class Point:
+    """The model at z (p,): predictions (n,), slopes d prediction / dz (n, p), and the flow of each experiment."""
+
+    z: Array
+    prediction: Array
+    slope: Array
+    flows: dict[str, Flowing]
+
+
+def model_of(case: Case, observations: Observations) -> Model:
+    return Model(case, build_site(case), observations.table)
+
+
+def theta_at(case: Case, z: Array) -> dict[str, Array]:
+    """theta_j = F_j^-1(Phi(z_j)), one array (m,) a parameter; z (m, p)."""
+    places = ndtr(np.clip(np.atleast_2d(z), -FURTHEST, FURTHEST))
+    return {name: quantile(prior, places[:, j]) for j, (name, prior) in enumerate(case.parameters.items())}
+
+
+def z_at(case: Case, theta: dict[str, Array]) -> Array:
+    """The inverse of `theta_at`, (m, p)."""
+    columns = [probability(prior, theta[name]) for name, prior in case.parameters.items()]
+    return np.clip(ndtri(np.column_stack(columns)), -FURTHEST, FURTHEST)
+
+
+def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None:
+    """The model and its slopes at z; None when a flow finds no rest. near: a point to start from."""
+    prediction, slope = np.full(len(model.station), np.nan), np.full((len(model.station), z.size), np.nan)
+    flows = {}
+    for experiment in model.case.experiments:
+        flow = _flow(model, experiment, z, near)
+        if flow is None:
+            return None
+        flows[experiment] = flow
+        rows = _rows(model, experiment)
+        prediction[rows], slope[rows] = _read_slopes(model, experiment, z, flow)
+    return Point(z, prediction, slope, flows)
+
+
+def predict_near(model: Model, point: Point, z: Array, lanes: int = 16) -> Array:
+    """Predictions (m, n) at places z (m, p) around a point, with its factors; NaN rows where they do not lead there."""
+    found = np.full((len(z), len(model.station)), np.nan)
+    for first in range(0, len(z), lanes):
+        part = slice(first, min(first + lanes, len(z)))
+        found[part] = _few_near(model, point, z[part])
+    return found
+
+
+def _few_near(model: Model, point: Point, z: Array) -> Array:
+    found = np.full((len(z), len(model.station)), np.nan)
+    for experiment, flow in point.flows.items():
+        rows = _rows(model, experiment)
+        problem = problem_at(model, experiment, z)
+        start = flow.state + flow.slopes @ (z - point.z).T
+        solution = chord(crop(problem, *flow.band), start, flow.factors, model.case.numerics.tolerance)
+        found[:, rows] = _read(model, experiment, problem, solution.state, flow.band)
+        found[~solution.converged] = np.nan
+    return found
+
+
+def fingerprint(model: Model, point: Point, changed: Sequence[tuple[Case, str, Amplitude]]) -> Array:
+    """d prediction / d (amplitude - off)^power at off, (n, c), for cases that each have one parameter more.
+
+    changed: the case, the name of its added parameter, and the amplitude it stands for.
+    """
+    found = np.zeros((len(model.station), len(changed)))
+    theta = theta_at(model.case, point.z)
+    for experiment, flow in point.flows.items():
+        rows = _rows(model, experiment)
+        here = [j for j, (case, _, _) in enumerate(changed) if _acts_in(case, experiment)]
+        if not here:
+            continue
+        base = crop(problem_at(model, experiment, point.z), *flow.band)
+        calm = residual(base, flow.state)
+        built, causes = [], np.empty((*flow.state.shape[:3], len(here)))
+        for lane, j in enumerate(here):
+            case, name, amplitude = changed[j]
+            step, gain = _step(amplitude)
+            problem = build_problem(case, model.site, experiment, theta | {name: np.array([amplitude.off + step])})
+            causes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
+            built.append((problem, gain))
+        answers = tangents(base, flow.state, flow.factors, causes, EXACT)
+        for lane, j in enumerate(here):
+            problem, gain = built[lane]
+            moved = flow.state + gain * answers[..., lane : lane + 1]
+            now = _read(model, experiment, problem, moved, flow.band)[0]
+            found[rows, j] = (now - point.prediction[rows]) / gain
+    return found
+
+
+def force_response(model: Model, point: Point, experiment: str) -> Array:
+    """d prediction / d f_x [m/s per m/s2] of the experiment's stations for a force along x in each cell, (n, nx, ny).
+
+    By adjoints in single precision: one solve for each station.
+    """
+    flow = point.flows[experiment]
+    rows = _rows(model, experiment)
+    weights = _reading_weights(model, experiment, flow)
+    sensitivity = adjoints(flow.factors, weights)[:, 2]
+    faces = np.moveaxis(sensitivity, -1, 0)
+    # A force in a cell pushes the faces on both sides of it by half; R_u falls by what pushes.
+    cells = 0.5 * faces
+    cells[:, 1:] += 0.5 * faces[:, :-1]
+    wide = np.zeros((rows.size, model.site.grid.x.size, model.site.grid.y.size))
+    wide[:, :, flow.band[0] : flow.band[1]] = cells
+    return wide
+
+
+def problem_at(model: Model, experiment: str, z: Array) -> Problem:
+    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
+
+
+def _acts_in(case: Case, experiment: str) -> bool:
+    last = list(case.effects.values())[-1]
+    return last.experiments is None or experiment in last.experiments
+
+
+def _step(amplitude: Amplitude) -> tuple[float, float]:
+    """A small amplitude and its power, into the support."""
+    step = (0.02 if amplitude.power == 1 else 0.2) * amplitude.scale
+    step = step if amplitude.off + step <= amplitude.high else -step
+    return step, step**amplitude.power
+
+
+def _rows(model: Model, experiment: str) -> np.ndarray:
+    return np.flatnonzero((model.station["experiment"] == experiment).to_numpy())
+
+
+def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> Flowing | None:
+    problem = problem_at(model, experiment, z)
+    ny = problem.shape[1]
+    warm = None
+    if near is not None:
+        before = near.flows[experiment]
+        warm = widen(before.state, ny, before.band)
+        if before.slopes.shape[3] == z.size:
+            warm = warm + widen(before.slopes @ (z - near.z)[:, None], ny, before.band)
+    solution, factors, band = settled(problem, warm, model.case.numerics.tolerance)
+    if factors is None:
+        return None
+    part = crop(problem, *band)
+    slopes = tangents(part, solution.state, factors, _causes(model, experiment, z, solution.state, band), EXACT)
+    return Flowing(solution.state, band, factors, slopes)
+
+
+def _causes(model: Model, experiment: str, z: Array, state: Array, band: tuple[int, int]) -> Array:
+    """dR/dz_j (nx, 3, rows, p) by central differences."""
+    steps = STEP * np.eye(z.size)
+    ahead = crop(problem_at(model, experiment, z + steps), *band)
+    behind = crop(problem_at(model, experiment, z - steps), *band)
+    many = np.repeat(state, z.size, axis=3)
+    return (residual(ahead, many) - residual(behind, many)) / (2.0 * STEP)
+
+
+def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
+    """Predictions (m, stations of the experiment) of states in a band."""
+    station = model.station.iloc[_rows(model, experiment)]
+    wide = widen(state, model.site.grid.y.size, band)
+    return read_sensors(problem, wide, model.site.grid, station, ()).prediction
+
+
+def _read_slopes(model: Model, experiment: str, z: Array, flow: Flowing) -> tuple[Array, Array]:
+    read = partial(_read, model, experiment, band=flow.band)
+    steps = STEP * np.eye(z.size)
+    here = read(problem_at(model, experiment, z), flow.state)[0]
+    ahead = read(problem_at(model, experiment, z + steps), flow.state + STEP * flow.slopes)
+    behind = read(problem_at(model, experiment, z - steps), flow.state - STEP * flow.slopes)
+    return here, (ahead - behind).T / (2.0 * STEP)
+
+
+def _reading_weights(model: Model, experiment: str, flow: Flowing) -> Array:
+    """d prediction / d state (nx, 3, rows, n): bilinear between cell centres, u of a cell the mean of its faces."""
+    station, grid = model.station.iloc[_rows(model, experiment)], model.site.grid
+    weights = np.zeros((*flow.state.shape[:3], len(station)))
+    for n, row in enumerate(station.itertuples()):
+        a = np.clip((row.x - grid.x[0]) / grid.dx, 0.0, grid.x.size - 1.0)
+        b = np.clip((row.y - grid.y[0]) / grid.dy, 0.0, grid.y.size - 1.0)
+        i, j = min(int(a), grid.x.size - 2), min(int(b), grid.y.size - 2)
+        for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            share = (a - i if di else 1.0 - a + i) * (b - j if dj else 1.0 - b + j)
+            k = j + dj - flow.band[0]
+            if not 0 <= k < weights.shape[2]:
+                continue
+            if row.kind == "level":
+                weights[i + di, 0, k, n] += share
+            else:
+                weights[i + di, 2, k, n] += 0.5 * share
+                weights[max(i + di - 1, 0), 2, k, n] += 0.5 * share
+    return weights
+
+

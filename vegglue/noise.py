@@ -1,0 +1,144 @@
+"""What a residual may be without anything missing: errors of the data, correlated along a section, and of the grid.
+
+    cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import scipy.linalg
+import scipy.optimize
+
+from vegglue.effect import Array
+from vegglue.errors import InputError
+
+# How much of the difference between a grid and one of twice its size is taken as the error of the finer one [-]:
+# 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two.
+OF_DIFFERENCE = 0.6
+# Difference of twice the log-likelihood above which stated errors count as too small (1 % of chi2 with one degree).
+TOO_SMALL = 6.6
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Errors of the used stations `rows` (n,): values (n,), standard errors (n,), places, and the covariance (n, n)."""
+
+    rows: np.ndarray
+    value: Array
+    error: Array
+    apart: Array  # |y_i - y_j| over the usual spacing, infinite between sections (n, n)
+    grid: Array  # half a difference of two grids (n,), zero when unknown
+    correlation: float
+    scale: float
+    lower: Array  # Cholesky factor of the covariance
+
+    def used(self, values: Array) -> Array:
+        """Rows of the used stations, of (station, ...)."""
+        return values[self.rows]
+
+    def residual(self, prediction: Array) -> Array:
+        """Measured minus predicted (n,) of predictions (station,)."""
+        return self.value - prediction[self.rows]
+
+    def whiten(self, values: Array) -> Array:
+        """W values: errors become independent and of size one; (n, ...)."""
+        return np.asarray(scipy.linalg.solve_triangular(self.lower, values, lower=True))
+
+
+def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) -> Noise:
+    """Independent errors as stated in the data; fallback: by kind, where a station states none.
+
+    Errors: InputError when a used station has neither.
+    """
+    used = station[station["used"].to_numpy(bool)]
+    if used.empty:
+        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check CONFIG` says why.")
+    error = used["standard_error"].to_numpy(float).copy()
+    for kind, value in (fallback or {}).items():
+        error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value
+    if not (error > 0).all():
+        first = used.iloc[int(np.flatnonzero(~(error > 0))[0])]
+        raise InputError(
+            f"observations: expected a standard error above 0 at every used station, got none at x = {first['x']:g}, "
+            f"y = {first['y']:g} m; add the column u_se or level_se, or `standard_error` to the observation."
+        )
+    zero = np.zeros(len(used))
+    rows = np.flatnonzero(station["used"].to_numpy(bool))
+    value = used["value"].to_numpy(float)
+    return _factored(Noise(rows, value, error, _apart(used), zero, 0.0, 1.0, np.diag(error)))
+
+
+def with_grid_error(noise: Noise, difference: Array) -> Noise:
+    """The same with the error of discretisation, from the difference (station,) to a grid of twice the cell size."""
+    return _factored(replace(noise, grid=OF_DIFFERENCE * difference[noise.rows]))
+
+
+def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
+    return _factored(replace(noise, correlation=correlation, scale=scale))
+
+
+def without(noise: Noise, outliers: np.ndarray) -> Noise:
+    """The same, but stations `outliers` (places among the used ones) count for next to nothing."""
+    error = noise.error.copy()
+    error[outliers] = 1e3 * noise.error[outliers]
+    return _factored(replace(noise, error=error))
+
+
+def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
+    """Correlation and scale of the errors by the likelihood of the residual `left` (n,), physics set aside.
+
+        left ~ N(0, cov(rho, s) + t^2 F F')
+
+    with F (n, k) all that calibration and missing effects could do to the predictions: what is smooth in that way is
+    not taken for noise. rho >= 0; s only when the stated errors are too small beyond doubt.
+    """
+
+    def cost(rho: float, scale: float, log_t: float) -> float:
+        covariance = _covariance(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
+        factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
+        return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
+
+    gram = explained @ explained.T
+    sizes = np.log((0.1, 1.0, 10.0))
+
+    def best(scale_free: bool) -> tuple[float, float, float]:
+        def unfold(x: Array) -> tuple[float, float, float]:
+            return float(0.98 / (1.0 + np.exp(-x[0]))), float(np.exp(x[2])) if scale_free else 1.0, float(x[1])
+
+        found = []
+        for log_t in sizes:
+            start = np.array([-1.5, log_t, 0.0][: 3 if scale_free else 2])
+            end = scipy.optimize.minimize(
+                lambda x: cost(*unfold(x)), start, method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.02}
+            )
+            found.append((float(end.fun), *unfold(end.x)[:2]))
+        return min(found)
+
+    fixed, free = best(False), best(True)
+    _, rho, scale = free if fixed[0] - free[0] > TOO_SMALL and free[2] > 1.0 else fixed
+    return with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
+
+
+def _factored(noise: Noise) -> Noise:
+    return replace(noise, lower=np.asarray(np.linalg.cholesky(_covariance(noise))))
+
+
+def _covariance(noise: Noise) -> Array:
+    related = np.eye(noise.rows.size) if noise.correlation == 0.0 else noise.correlation**noise.apart
+    covariance = noise.scale**2 * related * np.outer(noise.error, noise.error)
+    return np.asarray(covariance + 0.5 * np.outer(noise.grid, noise.grid) + np.diag(0.5 * noise.grid**2))
+
+
+def _apart(used: pd.DataFrame) -> Array:
+    """Distances along each section in units of the spacing of its stations; infinite across sections and kinds."""
+    apart = np.full((len(used), len(used)), np.inf)
+    np.fill_diagonal(apart, 0.0)
+    velocity = (used["kind"] == "velocity").to_numpy()
+    keys = (used["experiment"].astype(str) + "\n" + used["section"].astype(str)).to_numpy()
+    for key in np.unique(keys[velocity]):
+        here = np.flatnonzero(velocity & (keys == key))
+        y = used["y"].to_numpy(float)[here]
+        spacing = np.median(np.diff(np.sort(y))) if here.size > 1 else 1.0
+        apart[np.ix_(here, here)] = np.abs(y[:, None] - y[None]) / max(spacing, 1e-9)
+    return apart

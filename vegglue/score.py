@@ -1,0 +1,106 @@
+"""Which of many fingerprints a residual carries: score tests after what calibration can mimic is projected out.
+
+Everything here is whitened: residuals are sums of standard normal errors, fingerprints are counted in them. Rows of the
+prior stand below those of the data, so that a calibrated parameter is as free as its prior says.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.effect import Array
+
+DRAWS = 4000
+# Fingerprints whose projected traces have a cosine above this are the same to the data.
+ALIKE = 0.9
+
+
+@dataclass(frozen=True)
+class Projected:
+    """Fingerprints S (rows, c) and residual r (rows,) after the calibrated slopes J have been projected out.
+
+    visible: |S_perp| / |S| of each (c,) [-]; length: |S_perp| (c,), in standard errors per unit of amplitude.
+    """
+
+    basis: Array
+    residual: Array
+    fingerprints: Array
+    length: Array
+    visible: Array
+
+    @property
+    def units(self) -> Array:
+        """S_perp / |S_perp| (rows, c)."""
+        return self.fingerprints / np.maximum(self.length, 1e-300)
+
+
+def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Projected:
+    """J (n, p), r (n,), z (p,) and S (n, c), whitened: (I - P) of [r; -z] and [S; 0], P onto the columns [J; 1]."""
+    p = slopes.shape[1]
+    basis, _ = np.linalg.qr(np.vstack([slopes, np.eye(p)]))
+    left = np.concatenate([residual, -z])
+    wide = np.vstack([fingerprints, np.zeros((p, fingerprints.shape[1]))])
+    seen = wide - basis @ (basis.T @ wide)
+    length = np.linalg.norm(seen, axis=0)
+    visible = length / np.maximum(np.linalg.norm(wide, axis=0), 1e-300)
+    return Projected(basis, left - basis @ (basis.T @ left), seen, length, visible)
+
+
+def scores(projected: Projected, one_sided: np.ndarray) -> Array:
+    """T = S_perp' r / |S_perp| (c,); 0 where an effect that only has one sign would need the other."""
+    return _signed(projected.units.T @ projected.residual, one_sided)
+
+
+def null_draws(projected: Projected, one_sided: np.ndarray, seed: int) -> Array:
+    """T (draws, c) of residuals that are errors only."""
+    random = np.random.default_rng(seed)
+    noise = random.standard_normal((DRAWS, projected.residual.size))
+    return _signed(noise @ projected.units, one_sided)
+
+
+def family_p(score: float, maxima: Array) -> float:
+    """P(max_j T_j^2 >= T^2) under the null, (1 + count) / (1 + draws)."""
+    return float((1 + np.sum(maxima >= score**2)) / (1 + maxima.size))
+
+
+def rivals(projected: Projected, family: Sequence[np.ndarray], fitted: Array, seed: int) -> Array:
+    """For each family j of fingerprints: the 95 % quantile of T_max^2 - T_j^2, had j with its fitted gain been true.
+
+    family: columns of each; fitted (c,): gain to simulate with, of the column that fits best. A rival whose observed
+    difference lies below is not rejected.
+    """
+    random = np.random.default_rng(seed)
+    units, noise = projected.units, random.standard_normal((DRAWS // 4, projected.residual.size))
+    base = noise @ units
+    found = np.empty(len(family))
+    for j, columns in enumerate(family):
+        column = int(columns[np.argmax(np.abs(fitted[columns]) * projected.length[columns])])
+        shifted = base + fitted[column] * (projected.fingerprints[:, column] @ units)
+        squares = shifted**2
+        own = squares[:, columns].max(axis=1)
+        found[j] = np.quantile(squares.max(axis=1) - own, 0.95)
+    return found
+
+
+def cosines(projected: Projected) -> Array:
+    """Cosine between every two projected fingerprints (c, c) [-]."""
+    return np.asarray(projected.units.T @ projected.units)
+
+
+def groups(names: Sequence[str], cosine: Array) -> list[list[str]]:
+    """Names that the data cannot tell apart, linked where |cosine| > ALIKE."""
+    left, found = list(range(len(names))), []
+    while left:
+        group, grown = [left.pop(0)], True
+        while grown:
+            near = [j for j in left if np.abs(cosine[j, group]).max() > ALIKE]
+            grown = bool(near)
+            group += near
+            left = [j for j in left if j not in near]
+        found.append([names[j] for j in sorted(group)])
+    return found
+
+
+def _signed(values: Array, one_sided: np.ndarray) -> Array:
+    return np.where(one_sided & (values < 0), 0.0, values)
