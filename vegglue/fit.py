@@ -20,7 +20,7 @@ LONGEST = 1.5
 
 @dataclass(frozen=True)
 class Fitted:
-    """Where a search ended: the point, |W (y - f)|^2, the same with the prior's |z|^2, and the covariance of z (p, p)."""
+    """Where a search ended: a point, |W (y - f)|^2, the same with the prior's |z|^2, and the covariance of z (p, p)."""
 
     point: Point
     chi2: float
