@@ -59,7 +59,7 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
         "device": [str(name) for name in used["device"].unique() if str(name)],
     }
     for effect in library(case.effect_file).values():
-        if effect.stage == "plants" and not case.plants.patches:
+        if "search" in effect.tags or (effect.stage == "plants" and not case.plants.patches):
             continue
         if effect.each == "case":
             found.append(Candidate(effect))

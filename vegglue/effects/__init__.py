@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from vegglue.effect import Effect
-from vegglue.effects import boundary, exchange, force, plants, resistance, sensor, site
+from vegglue.effects import boundary, exchange, force, plants, resistance, sensor, site, unlisted
 from vegglue.errors import InputError
 
 SHIPPED: tuple[Effect, ...] = (
@@ -18,6 +18,7 @@ SHIPPED: tuple[Effect, ...] = (
     *exchange.EFFECTS,
     *force.EFFECTS,
     *sensor.EFFECTS,
+    *unlisted.EFFECTS,
 )
 
 

@@ -1,0 +1,32 @@
+"""What the search for "none of these" probes with: an object at a place, of no named kind."""
+
+import numpy as np
+
+from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+
+
+def unlisted_object(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
+    """k -> k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2), no less than 0."""
+    away = ((cells.ground.x - x) ** 2 + (cells.ground.y - y) ** 2) / radius**2
+    return {"rate": np.maximum(cells.rate + drag * np.exp(-away), 0.0)}
+
+
+EFFECTS = (
+    Effect(
+        name="unlisted_object",
+        stage="resistance",
+        title="Something stands in the flow (or is missing) at one place",
+        equation="k -> k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2)",
+        act=unlisted_object,
+        amplitude=Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 2.0, -5.0, 50.0),
+        shapes=(
+            Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
+            Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
+            Shape("radius", "m", "its radius r", 0.5, 0.01, 100.0),
+        ),
+        source="definition",
+        checked=True,
+        mirrored=False,
+        tags=("search",),
+    ),
+)
