@@ -8,6 +8,26 @@ def discharge_error(boundary: Boundary, relative_error: Array) -> dict[str, Arra
     return {"discharge": boundary.discharge * (1.0 + relative_error)}
 
 
+def inflow_skew(boundary: Boundary, skew: Array) -> dict[str, Array]:
+    """q -> q (1 + a s), s = -1 .. 1 across each inflow."""
+    return {"spread": boundary.spread * (1.0 + skew * boundary.place)}
+
+
+def inflow_core(boundary: Boundary, excess: Array) -> dict[str, Array]:
+    """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow."""
+    return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.place**2) / 2.0)}
+
+
+def lateral_inflow(boundary: Boundary, share: Array) -> dict[str, Array]:
+    """q_lateral + r Q."""
+    return {"lateral": boundary.lateral + share * boundary.discharge.sum(axis=0)}
+
+
+def outlet_level(boundary: Boundary, rise: Array) -> dict[str, Array]:
+    """z_out -> z_out + d."""
+    return {"level": boundary.level + rise}
+
+
 EFFECTS = (
     Effect(
         name="discharge_error",
@@ -16,6 +36,50 @@ EFFECTS = (
         equation="Q -> Q (1 + e)",
         act=discharge_error,
         amplitude=Amplitude("relative_error", "-", "true over reported discharge, less one", 0.1, -0.5, 0.5),
+        source="definition",
+        checked=True,
+        each="experiment",
+    ),
+    Effect(
+        name="inflow_skew",
+        stage="boundary",
+        title="More water enters on one side of the inflow",
+        equation="q -> q (1 + a s), s from -1 to 1 across the inflow towards larger y",
+        act=inflow_skew,
+        amplitude=Amplitude("skew", "-", "relative excess a at the end of the inflow", 0.2, -0.9, 0.9),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
+        name="inflow_core",
+        stage="boundary",
+        title="More water enters in the middle of the inflow",
+        equation="q -> q (1 + a (1 - 3 s^2)/2), s from -1 to 1 across the inflow",
+        act=inflow_core,
+        amplitude=Amplitude("excess", "-", "twice the relative excess in the middle", 0.2, -0.9, 0.9),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="lateral_inflow",
+        stage="boundary",
+        title="Water seeps in along the reach",
+        equation="dq/dx = r Q / L, spread evenly over the floor, without momentum",
+        act=lateral_inflow,
+        amplitude=Amplitude(
+            "share", "-", "discharge that enters along the reach over that at the inflow", 0.05, 0.0, 0.5
+        ),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="outlet_level_error",
+        stage="boundary",
+        title="The water at the outlet stands higher than reported",
+        equation="z_out -> z_out + d",
+        act=outlet_level,
+        amplitude=Amplitude("rise", "m", "true level less the one reported", 0.05, -0.3, 0.3),
         source="definition",
         checked=True,
         each="experiment",

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Cells, Effect
+from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+
+KARMAN = 0.4
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
@@ -10,16 +12,74 @@ def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
     return {"viscosity": np.broadcast_to(added, cells.depth.shape)}
 
 
+def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
+    """nu -> nu + lambda h u*."""
+    return {"viscosity": coefficient * cells.depth * cells.shear_velocity}
+
+
+def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
+    """nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)."""
+    strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
+    return {"viscosity": coefficient**2 * cells.ground.dx * cells.ground.dy * np.sqrt(strain)}
+
+
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
     """nu -> nu + l^2 |du/dy|."""
     return {"viscosity": length**2 * np.abs(cells.u_y)}
 
 
+def edge_mixing(cells: Cells, coefficient: Array, width: Array) -> dict[str, Array]:
+    """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch: d |du/dy| is the difference
+    of speed across the layer.
+    """
+    band = np.exp(-((cells.ground.edge / width) ** 2))
+    return {"viscosity": coefficient * width**2 * band * np.abs(cells.u_y)}
+
+
+def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_depth: Array) -> dict[str, Array]:
+    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5."""
+    shallow = mean_depth / np.maximum(cells.depth, 0.2 * mean_depth)
+    return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
+
+
+def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
+    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end."""
+    return {"viscosity": coefficient * np.exp(-cells.ground.wake / length) * cells.speed}
+
+
 def secondary_current(cells: Cells, strength: Array) -> dict[str, Array]:
     """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width."""
     eta = cells.ground.offset
-    return {"xy": strength * np.sin(np.pi * eta) * np.exp(-((eta / 1.5) ** 4)) * cells.depth * cells.u**2}
+    return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / 1.5) ** 4))) * cells.depth * cells.u**2}
 
+
+def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
+    """h T = (beta - 1) h (u^2, u v, v^2)."""
+    carried = excess * cells.depth
+    return {"xx": carried * cells.u**2, "xy": carried * cells.u * cells.v, "yy": carried * cells.v**2}
+
+
+def curvature(cells: Cells) -> Array:
+    """h / R = h (u^2 v_x - v^2 u_y + u v (v_y - u_x)) / |U|^3 [-], positive towards larger y; |U| at least 0.05 m/s,
+    and never above 1/2 (h / R / (1 + (2 h / R)^2)^(1/2)).
+    """
+    u, v = cells.u, cells.v
+    turn = u**2 * cells.v_x - v**2 * cells.u_y + u * v * (cells.v_y - cells.u_x)
+    bend = cells.depth * turn / (u**2 + v**2 + 0.0025) ** 1.5
+    return bend / np.sqrt(1.0 + 4.0 * bend**2)
+
+
+def helical_flow(cells: Cells, share: Array) -> dict[str, Array]:
+    """h T_sn = -s b h (h / R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2) / kappa at most 1/2: fast water
+    is carried to the outside of the bend.
+    """
+    a = np.minimum(np.sqrt(cells.bed_rate * cells.depth) / KARMAN, 0.5)
+    carried = share * (5.0 * a - 15.6 * a**2 + 37.5 * a**3) * cells.depth * curvature(cells)
+    along = 2.0 * carried * cells.u * cells.v
+    return {"xx": along, "xy": -carried * (cells.u**2 - cells.v**2), "yy": -along}
+
+
+BAND = "width d of the layer"
 
 EFFECTS = (
     Effect(
@@ -33,6 +93,26 @@ EFFECTS = (
         checked=True,
     ),
     Effect(
+        name="elder",
+        stage="exchange",
+        title="Turbulence made by the bed",
+        equation="nu -> nu + lambda h u*, u* = (k_bed h)^(1/2) |U|",
+        act=elder,
+        amplitude=Amplitude("coefficient", "-", "lambda, some 0.07 to 0.5", 0.2, 0.0, 5.0),
+        source="Elder (1959)",
+        doi="10.1017/S0022112059000374",
+    ),
+    Effect(
+        name="smagorinsky",
+        stage="exchange",
+        title="Eddies smaller than a cell, made by any shear",
+        equation="nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)",
+        act=smagorinsky,
+        amplitude=Amplitude("coefficient", "-", "coefficient C_s, some 0.1 to 0.2", 0.3, 0.0, 3.0, power=2),
+        source="Smagorinsky (1963)",
+        doi="10.1175/1520-0493(1963)091<0099:GCEWTP>2.3.CO;2",
+    ),
+    Effect(
         name="mixing_length",
         stage="exchange",
         title="Turbulence made by lateral shear",
@@ -43,6 +123,42 @@ EFFECTS = (
         doi="10.1002/zamm.19250050212",
     ),
     Effect(
+        name="edge_mixing",
+        stage="exchange",
+        title="A mixing layer along the sides of the plants",
+        equation="nu -> nu + c d^2 |du/dy| exp(-(e/d)^2), e the distance from the side of a patch",
+        act=edge_mixing,
+        amplitude=Amplitude("coefficient", "-", "c, viscosity over speed difference times width", 0.2, 0.0, 5.0),
+        shapes=(Shape("width", "m", BAND, 0.6, 0.05, 5.0, (0.3, 0.6, 1.2)),),
+        source="after White and Nepf (2008)",
+        doi="10.1029/2006WR005651",
+    ),
+    Effect(
+        name="coherent_structures",
+        stage="exchange",
+        title="Large horizontal eddies between deep and shallow water",
+        equation="nu -> nu + b^2 d^2 (h_m/h) |du/dy|, h at least h_m/5",
+        act=coherent_structures,
+        amplitude=Amplitude("coefficient", "-", "b, some 0.07", 0.1, 0.0, 1.0, power=2),
+        shapes=(
+            Shape("width", "m", BAND, 2.0, 0.1, 20.0),
+            Shape("mean_depth", "m", "depth h_m between both", 0.6, 0.05, 10.0),
+        ),
+        source="van Prooijen, Battjes and Uijttewaal (2005)",
+        doi="10.1061/(ASCE)0733-9429(2005)131:3(175)",
+    ),
+    Effect(
+        name="wake_mixing",
+        stage="exchange",
+        title="Eddies shed behind the plants",
+        equation="nu -> nu + c |U| exp(-s/L), s the distance downstream of a patch",
+        act=wake_mixing,
+        amplitude=Amplitude("coefficient", "m", "c, viscosity over speed at the end of the patch", 0.05, 0.0, 1.0),
+        shapes=(Shape("length", "m", "length L over which they fade", 5.0, 0.2, 100.0, (2.0, 8.0)),),
+        source="after Zong and Nepf (2012)",
+        doi="10.1017/jfm.2011.479",
+    ),
+    Effect(
         name="secondary_current",
         stage="exchange",
         title="Secondary currents: mirrored cells carry momentum across the floor",
@@ -51,5 +167,25 @@ EFFECTS = (
         amplitude=Amplitude("strength", "-", "strength k of the cells", 0.02, -0.2, 0.2),
         source="Ervine et al. (2000)",
         doi="10.1061/(ASCE)0733-9429(2000)126:9(653)",
+    ),
+    Effect(
+        name="dispersion",
+        stage="exchange",
+        title="Velocity varies over the depth, so that more momentum is carried than its mean says",
+        equation="-(1/h) div((beta - 1) h U U)",
+        act=dispersion,
+        amplitude=Amplitude("excess", "-", "beta - 1, momentum coefficient less one", 0.1, 0.0, 1.0),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="helical_flow",
+        stage="exchange",
+        title="Spiral flow in bends carries fast water outward",
+        equation="h T_sn = -s b h (h/R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2)/kappa",
+        act=helical_flow,
+        amplitude=Amplitude("share", "-", "strength s, 1 for a spiral in balance", 0.5, -3.0, 3.0),
+        source="Kalkwijk and Booij (1986), as in Delft3D",
+        doi="10.1080/00221688609499330",
     ),
 )

@@ -2,15 +2,28 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Cells, Effect
+from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
 
 AIR_OVER_WATER = 1.2e-3
+GRAVITY = 9.81
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
     """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3."""
     stress = 1.3e-3 * AIR_OVER_WATER * np.abs(speed) * speed
     return {"x": stress / np.maximum(cells.depth, 0.05)}
+
+
+def panel_current(cells: Cells, strength: Array, slope: Array, bank_ratio: Array) -> dict[str, Array]:
+    """f = -k g S u / |U| on the floor, r times that on the banks; nothing at rest."""
+    bank = cells.ground.bank
+    held = -strength * GRAVITY * slope * (1.0 - bank + bank_ratio * bank) / cells.speed
+    return {"x": held * cells.u, "y": held * cells.v}
+
+
+def turning_earth(cells: Cells, parameter: Array) -> dict[str, Array]:
+    """f_x = c v, f_y = -c u."""
+    return {"x": parameter * cells.v, "y": -parameter * cells.u}
 
 
 EFFECTS = (
@@ -23,6 +36,32 @@ EFFECTS = (
         amplitude=Amplitude("speed", "m/s", "wind speed W downstream", 5.0, -30.0, 30.0, power=2),
         source="Garratt (1977)",
         doi="10.1175/1520-0493(1977)105<0915:RODCOO>2.0.CO;2",
+        tags=("negative control",),
+    ),
+    Effect(
+        name="panel_current",
+        stage="force",
+        title="Secondary currents: the floor loses momentum that the banks gain",
+        equation="f = -k g S on the floor, -r k g S on the banks, along the flow (Gamma = k rho g h S)",
+        act=panel_current,
+        amplitude=Amplitude("strength", "-", "strength k = Gamma / (rho g h S) on the floor", 0.1, -0.8, 0.8),
+        shapes=(
+            Shape("slope", "-", "slope S that drives the flow", 0.001, 1e-6, 0.05),
+            Shape("bank_ratio", "-", "strength r on the banks over that on the floor", -1.0, -3.0, 3.0, (-1.0, 0.0)),
+        ),
+        source="Shiono and Knight (1991); values of k by Abril and Knight (2004)",
+        doi="10.1017/S0022112091001246",
+    ),
+    Effect(
+        name="turning_earth",
+        stage="force",
+        title="The turning of the earth",
+        equation="f_x = c v, f_y = -c u, to the right on the northern half of the earth",
+        act=turning_earth,
+        amplitude=Amplitude("parameter", "1/s", "Coriolis parameter c", 1e-4, -1.5e-4, 1.5e-4),
+        source="definition",
+        checked=True,
+        mirrored=False,
         tags=("negative control",),
     ),
 )

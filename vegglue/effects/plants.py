@@ -4,11 +4,87 @@ import numpy as np
 
 from vegglue.effect import Amplitude, Array, Effect, Shape, Stand
 
+WATER_VISCOSITY = 1e-6
+
 
 def streamlining(stand: Stand, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
     """phi -> phi (|U| / U_0)^chi, |U| at least 0.02 m/s."""
     return {"phi": stand.phi * (np.maximum(stand.speed, 0.02) / reference_speed) ** vogel_exponent}
 
+
+def canopy_height_error(stand: Stand, relative_error: Array) -> dict[str, Array]:
+    """h_d -> h_d (1 + e), phi in proportion."""
+    return {"phi": stand.phi * (1.0 + relative_error), "canopy_height": stand.canopy_height * (1.0 + relative_error)}
+
+
+def canopy_deflection(stand: Stand, rate: Array) -> dict[str, Array]:
+    """h_d -> h_d exp(-k |U|)."""
+    return {"canopy_height": stand.canopy_height * np.exp(-rate * stand.speed)}
+
+
+def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
+    """Effective length l_e / l and height h / l of a flexible blade, both at most 1, none below Ca = 1.
+
+    l_e/l = 1 - (1 - 0.9 Ca^(-1/3)) / (1 + Ca^(-3/2) (8 + B^(3/2)))
+    h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2))
+
+    Luhar and Nepf (2011), doi:10.4319/lo.2011.56.6.2003; from memory, not read again.
+    """
+    ca = np.maximum(cauchy, 1e-3)
+    length = 1.0 - (1.0 - 0.9 * ca ** (-1 / 3)) / (1.0 + ca**-1.5 * (8.0 + buoyancy**1.5))
+    height = 1.0 - (1.0 - ca**-0.25) / (1.0 + ca**-0.6 * (4.0 + buoyancy**0.6) + ca**-2.0 * (8.0 + buoyancy**2))
+    return np.minimum(length, 1.0), np.minimum(height, 1.0)
+
+
+def canopy_bending(
+    stand: Stand, share: Array, cauchy: Array, buoyancy: Array, reference_speed: Array
+) -> dict[str, Array]:
+    """phi -> phi (1 - s (1 - l_e/l)), h_d -> h_d (1 - s (1 - h/l)) with Ca = Ca_0 (|U| / U_0)^2."""
+    length, height = bent_blade(cauchy * (stand.speed / reference_speed) ** 2, buoyancy)
+    return {
+        "phi": stand.phi * (1.0 - share * (1.0 - length)),
+        "canopy_height": stand.canopy_height * (1.0 - share * (1.0 - height)),
+    }
+
+
+def undergrowth(stand: Stand, drag: Array, height: Array) -> dict[str, Array]:
+    """phi + phi_u min(h / h_u, 1)."""
+    return {"phi": stand.phi + drag * np.minimum(stand.depth / height, 1.0)}
+
+
+def foliage(stand: Stand, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
+    """phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.02 m/s."""
+    bent = (np.maximum(stand.speed, 0.02) / reference_speed) ** vogel_exponent
+    return {"phi": stand.phi + drag * bent * np.minimum(stand.depth / stand.canopy_height, 1.0)}
+
+
+def emergent_part(stand: Stand, share: Array) -> dict[str, Array]:
+    """phi -> phi (1 - s (1 - min(h / h_d, 1)))."""
+    return {"phi": stand.phi * (1.0 - share * (1.0 - np.minimum(stand.depth / stand.canopy_height, 1.0)))}
+
+
+def slow_stems(stand: Stand, share: Array, diameter: Array) -> dict[str, Array]:
+    """phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D / nu at least 20."""
+    reynolds = np.maximum(stand.speed * diameter / WATER_VISCOSITY, 20.0)
+    return {"phi": stand.phi * (1.0 + share * 10.0 * reynolds ** (-2 / 3))}
+
+
+def debris_screen(stand: Stand, excess: Array, length: Array) -> dict[str, Array]:
+    """phi -> phi (1 + a exp(-f / L)), f the distance from the front of the patch."""
+    return {"phi": stand.phi * (1.0 + excess * np.exp(-stand.front / length))}
+
+
+def density_trend(stand: Stand, trend: Array, length: Array) -> dict[str, Array]:
+    """phi -> phi (1 + a tanh(f / L - 1)), f the distance from the front of the patch."""
+    return {"phi": stand.phi * (1.0 + trend * np.tanh(stand.front / length - 1.0))}
+
+
+def edge_thinning(stand: Stand, share: Array, width: Array) -> dict[str, Array]:
+    """phi -> phi (1 - a exp(-e / w)), e the distance inward from the sides of the patch."""
+    return {"phi": stand.phi * (1.0 - share * np.exp(np.minimum(stand.edge, 0.0) / width))}
+
+
+REFERENCE_SPEED = Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.35, 0.05, 2.0)
 
 EFFECTS = (
     Effect(
@@ -18,8 +94,121 @@ EFFECTS = (
         equation="phi -> phi (|U| / U_0)^chi",
         act=streamlining,
         amplitude=Amplitude("vogel_exponent", "-", "Vogel exponent chi, 0 for rigid plants", 0.5, -2.0, 1.0),
-        shapes=(Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.35, 0.05, 2.0),),
+        shapes=(REFERENCE_SPEED,),
         source="Vogel (1984); Järvelä (2004)",
         doi="10.1016/j.jhydrol.2003.10.018",
+    ),
+    Effect(
+        name="canopy_height_error",
+        stage="plants",
+        title="The plants are taller than assumed",
+        equation="h_d -> h_d (1 + e), phi -> phi (1 + e)",
+        act=canopy_height_error,
+        amplitude=Amplitude("relative_error", "-", "true over assumed height, less one", 0.2, -0.6, 1.0),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="canopy_deflection",
+        stage="plants",
+        title="The canopy is pushed down as the water runs faster",
+        equation="h_d -> h_d exp(-k |U|)",
+        act=canopy_deflection,
+        amplitude=Amplitude("rate", "s/m", "share k of the height lost for each m/s", 0.5, 0.0, 3.0),
+        source="after Verschoren et al. (2016)",
+        doi="10.1007/s10652-015-9432-1",
+    ),
+    Effect(
+        name="canopy_bending",
+        stage="plants",
+        title="Plants bend like elastic blades, with less height and less drag",
+        equation="phi -> phi (1 - s (1 - l_e/l)), h_d -> h_d (1 - s (1 - h/l)), l_e and h of Ca = Ca_0 (|U|/U_0)^2, B",
+        act=canopy_bending,
+        amplitude=Amplitude("share", "-", "share s of the plants that bend", 0.5, 0.0, 1.0),
+        shapes=(
+            Shape("cauchy", "-", "Cauchy number Ca_0 at U_0", 30.0, 0.1, 1e4, (5.0, 30.0, 200.0)),
+            Shape("buoyancy", "-", "buoyancy number B", 0.0, 0.0, 200.0),
+            REFERENCE_SPEED,
+        ),
+        source="Luhar and Nepf (2011)",
+        doi="10.4319/lo.2011.56.6.2003",
+    ),
+    Effect(
+        name="undergrowth",
+        stage="plants",
+        title="A lower layer grows under the plants",
+        equation="phi -> phi + phi_u min(h/h_u, 1)",
+        act=undergrowth,
+        amplitude=Amplitude("drag", "-", "drag phi_u of the lower layer", 3.0, 0.0, 100.0),
+        shapes=(Shape("height", "m", "height h_u of the lower layer", 0.3, 0.02, 2.0),),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="foliage",
+        stage="plants",
+        title="Leaves add drag of their own that yields to speed",
+        equation="phi -> phi + phi_F (|U|/U_0)^chi_F min(h/h_d, 1)",
+        act=foliage,
+        amplitude=Amplitude("drag", "-", "drag phi_F of the leaves at U_0", 2.0, 0.0, 100.0),
+        shapes=(
+            Shape("vogel_exponent", "-", "Vogel exponent chi_F of leaves", -0.9, -2.0, 0.0, (-1.2, -0.6)),
+            REFERENCE_SPEED,
+        ),
+        source="Västilä and Järvelä (2014)",
+        doi="10.1002/2013WR013819",
+    ),
+    Effect(
+        name="emergent_part",
+        stage="plants",
+        title="Only the part of the plants under water resists",
+        equation="phi -> phi (1 - s (1 - min(h/h_d, 1)))",
+        act=emergent_part,
+        amplitude=Amplitude("share", "-", "share s of the plants to which this applies", 0.5, 0.0, 1.0),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="slow_stems",
+        stage="plants",
+        title="Stems resist more where the water is slow",
+        equation="phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D/nu at least 20",
+        act=slow_stems,
+        amplitude=Amplitude("share", "-", "share s of the excess of C_D over 1", 1.0, 0.0, 5.0),
+        shapes=(Shape("diameter", "m", "diameter D of the stems", 0.01, 0.0005, 0.2, (0.003, 0.01)),),
+        source="White (1991), Viscous Fluid Flow, a fit for single cylinders",
+    ),
+    Effect(
+        name="debris_screen",
+        stage="plants",
+        title="Debris hangs in the front of the plants",
+        equation="phi -> phi (1 + a exp(-f/L)), f the distance from the front of the patch",
+        act=debris_screen,
+        amplitude=Amplitude("excess", "-", "relative excess a of drag at the front", 2.0, -0.9, 50.0),
+        shapes=(Shape("length", "m", "depth L of the screen", 0.5, 0.05, 10.0, (0.3, 1.0)),),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="density_trend",
+        stage="plants",
+        title="The plants grow denser towards the end of the patch",
+        equation="phi -> phi (1 + a tanh(f/L - 1)), f the distance from the front of the patch",
+        act=density_trend,
+        amplitude=Amplitude("trend", "-", "relative excess a towards the end", 0.3, -0.95, 0.95),
+        shapes=(Shape("length", "m", "distance L from the front where phi holds", 2.0, 0.1, 50.0, (1.0, 2.0)),),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="edge_thinning",
+        stage="plants",
+        title="The plants are thinner along the sides of the patch",
+        equation="phi -> phi (1 - a exp(-e/w)), e the distance inward from the sides of the patch",
+        act=edge_thinning,
+        amplitude=Amplitude("share", "-", "share a missing at the very side, negative for more there", 0.4, -5.0, 0.95),
+        shapes=(Shape("width", "m", "width w of the thinner rim", 0.3, 0.02, 5.0, (0.2, 0.5)),),
+        source="definition",
+        checked=True,
     ),
 )

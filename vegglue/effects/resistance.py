@@ -1,5 +1,7 @@
 """Effects on the friction rate k = g / (C^2 h) [1/m] beyond the laws of the classes."""
 
+import numpy as np
+
 from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
 
 
@@ -9,6 +11,36 @@ def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) 
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.ground.bank)}
 
 
+def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
+    """k -> k (h / h_0)^e on the floor where no plants stand."""
+    open_floor = (1.0 - cells.ground.bank) * (1.0 - cells.ground.planted)
+    return {"rate": cells.rate * (cells.depth.clip(0.02) / reference_depth) ** (exponent * open_floor)}
+
+
+def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
+    """k -> k exp(+-a / 2) on the banks, + on that of larger y."""
+    return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.ground.bank * np.sign(cells.ground.offset))}
+
+
+def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
+    """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|."""
+    longer = np.sqrt(1.0 + cells.ground.side_slope**2) - 1.0
+    return {"rate": cells.rate * (1.0 + share * longer)}
+
+
+def bank_vegetation(cells: Cells, drag: Array, height: Array) -> dict[str, Array]:
+    """k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
+    standing = np.minimum(1.0 / height, 1.0 / cells.depth)
+    return {"rate": cells.rate + 0.5 * drag * standing * cells.ground.bank}
+
+
+def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
+    """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s)."""
+    return {"rate": cells.rate * (1.0 - share * cells.ground.planted) ** -2.0}
+
+
+REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0)
+
 EFFECTS = (
     Effect(
         name="depth_dependent_bank",
@@ -17,8 +49,65 @@ EFFECTS = (
         equation="k -> k (h / h_0)^e on the banks, h at least 0.02 m",
         act=depth_dependent_bank,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
-        shapes=(Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0),),
+        shapes=(REFERENCE_DEPTH,),
         source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="depth_dependent_bed",
+        stage="resistance",
+        title="The floor grows rougher or smoother with depth than its law says",
+        equation="k -> k (h / h_0)^e on the floor without plants, h at least 0.02 m",
+        act=depth_dependent_bed,
+        amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
+        shapes=(REFERENCE_DEPTH,),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="bank_difference",
+        stage="resistance",
+        title="One bank is rougher than the other",
+        equation="k -> k exp(a/2) on the bank of larger y, k exp(-a/2) on the other",
+        act=bank_difference,
+        amplitude=Amplitude("log_ratio", "-", "logarithm a of the ratio of both", 0.5, -4.0, 4.0),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
+        name="steep_bank",
+        stage="resistance",
+        title="Steep banks touch more water than their width says",
+        equation="k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|",
+        act=steep_bank,
+        amplitude=Amplitude(
+            "share", "-", "share a of the longer perimeter that counts, 1 for all of it", 1.0, 0.0, 3.0
+        ),
+        source="definition; as in Shiono and Knight (1991)",
+        doi="10.1017/S0022112091001246",
+        checked=True,
+    ),
+    Effect(
+        name="bank_vegetation",
+        stage="resistance",
+        title="Grass or shrubs stand on the banks",
+        equation="k -> k + phi_b min(h/h_b, 1) / (2 h) on the banks",
+        act=bank_vegetation,
+        amplitude=Amplitude("drag", "-", "drag phi_b of the plants", 0.5, 0.0, 50.0),
+        shapes=(Shape("height", "m", "height h_b of the plants", 0.3, 0.02, 3.0, (0.15, 0.6)),),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="stem_blockage",
+        stage="resistance",
+        title="Stems take up room, so that water between them runs faster",
+        equation="k -> k / (1 - s)^2 among plants",
+        act=stem_blockage,
+        amplitude=Amplitude("share", "-", "share s of the volume that stems take up", 0.05, 0.0, 0.6),
+        source="definition; constricted speed as in Stone and Shen (2002)",
+        doi="10.1061/(ASCE)0733-9429(2002)128:5(500)",
         checked=True,
     ),
 )

@@ -1,12 +1,48 @@
-"""Effects on the bed level [m]."""
+"""Effects on the bed level [m]: what a survey may have missed, or the flow has changed since."""
 
-from vegglue.effect import Amplitude, Array, Effect, Ground
+import numpy as np
+
+from vegglue.effect import Amplitude, Array, Effect, Ground, Shape
 
 
 def floor_level(ground: Ground, rise: Array) -> dict[str, Array]:
     """z_b + dz on the floor."""
     return {"bed": rise * (1.0 - ground.bank)}
 
+
+def bank_level(ground: Ground, rise: Array) -> dict[str, Array]:
+    """z_b + dz on the banks."""
+    return {"bed": rise * ground.bank}
+
+
+def bed_slope(ground: Ground, slope: Array) -> dict[str, Array]:
+    """z_b + s (x_end - x): the bed at the outlet stays."""
+    return {"bed": slope * (ground.x[-1] - ground.x) * np.ones_like(ground.bed)}
+
+
+def cross_slope(ground: Ground, slope: Array) -> dict[str, Array]:
+    """z_b + s (y - y_axis)."""
+    return {"bed": slope * ground.offset * ground.half_width}
+
+
+def flank_scour(ground: Ground, depth: Array, width: Array) -> dict[str, Array]:
+    """z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them."""
+    beside = np.where(np.isfinite(ground.edge), ground.edge, -1e3)
+    return {"bed": np.where(beside > 0.0, -depth * np.exp(-(((beside - width) / width) ** 2)), 0.0)}
+
+
+def patch_deposit(ground: Ground, rise: Array) -> dict[str, Array]:
+    """z_b + dz where plants stand."""
+    return {"bed": rise * ground.planted}
+
+
+def wake_deposit(ground: Ground, rise: Array, length: Array) -> dict[str, Array]:
+    """z_b + dz exp(-s / L) behind a patch, s the distance from its end."""
+    return {"bed": rise * np.exp(-ground.wake / length)}
+
+
+FOLLETT = "Follett and Nepf (2012), shape assumed"
+FOLLETT_DOI = "10.1016/j.geomorph.2012.08.006"
 
 EFFECTS = (
     Effect(
@@ -18,5 +54,70 @@ EFFECTS = (
         amplitude=Amplitude("rise", "m", "how much higher the floor lies than surveyed", 0.1, -0.5, 0.5),
         source="definition",
         checked=True,
+    ),
+    Effect(
+        name="bank_level_error",
+        stage="site",
+        title="The banks lie higher than surveyed",
+        equation="z_b -> z_b + dz on the banks",
+        act=bank_level,
+        amplitude=Amplitude("rise", "m", "how much higher the banks lie than surveyed", 0.1, -0.5, 0.5),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="bed_slope_error",
+        stage="site",
+        title="The bed falls more steeply than surveyed",
+        equation="z_b -> z_b + s (x_end - x)",
+        act=bed_slope,
+        amplitude=Amplitude("slope", "-", "additional slope s along the channel", 2e-4, -0.002, 0.002),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="cross_slope_error",
+        stage="site",
+        title="The bed is tilted to one side",
+        equation="z_b -> z_b + s (y - y_axis), higher towards larger y",
+        act=cross_slope,
+        amplitude=Amplitude("slope", "-", "slope s across the channel", 0.02, -0.1, 0.1),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
+        name="flank_scour",
+        stage="site",
+        title="The flow has dug a trench beside the plants",
+        equation="z_b -> z_b - d exp(-((e - w)/w)^2) at the distance e > 0 from the sides of a patch",
+        act=flank_scour,
+        amplitude=Amplitude("depth", "m", "depth d of the trench, negative for a ridge", 0.1, -0.5, 0.5),
+        shapes=(
+            Shape("width", "m", "half width w, and how far off the trench is deepest", 0.4, 0.05, 5.0, (0.3, 0.8)),
+        ),
+        source=FOLLETT,
+        doi=FOLLETT_DOI,
+    ),
+    Effect(
+        name="patch_deposit",
+        stage="site",
+        title="Sediment has settled among the plants",
+        equation="z_b -> z_b + dz where plants stand",
+        act=patch_deposit,
+        amplitude=Amplitude("rise", "m", "thickness dz of the deposit", 0.1, -0.4, 0.4),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="wake_deposit",
+        stage="site",
+        title="A bar has grown behind the plants",
+        equation="z_b -> z_b + dz exp(-s/L), s the distance downstream of a patch",
+        act=wake_deposit,
+        amplitude=Amplitude("rise", "m", "height dz of the bar at the end of the patch", 0.1, -0.4, 0.4),
+        shapes=(Shape("length", "m", "length L over which it fades", 3.0, 0.2, 50.0, (1.5, 6.0)),),
+        source=FOLLETT,
+        doi=FOLLETT_DOI,
     ),
 )
