@@ -5,8 +5,6 @@ results are too.
 """
 
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,11 +12,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
 from vegglue import __version__
 from vegglue.config import resolved_yaml, simulation_hash
+from vegglue.cores import as_finished
 from vegglue.ensemble import FAILED, Header
 from vegglue.errors import InputError
 from vegglue.fields import QUANTITIES, Window, excess, window_of
@@ -88,31 +85,14 @@ def _solve_all(
     todo: list[int],
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    tasks = (delayed(_solve_numbered)(index, case, site, observations, places[chunks[index]]) for index in todo)
-    pool = Parallel(
-        n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve
-    )
-    yield from pool(tasks)
-
-
-def _serve() -> None:
-    """A worker leaves Ctrl-C to the run it serves, and does not outlive it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    run = os.getppid()
-
-    def follow() -> None:
-        while os.getppid() == run:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
+    tasks = ((index, case, site, observations, places[chunks[index]]) for index in todo)
+    yield from as_finished(_solve_numbered, tasks, jobs)
 
 
 def _solve_numbered(
     index: int, case: Case, site: Site, observations: Observations, places: np.ndarray
 ) -> tuple[int, Rows]:
-    with threadpool_limits(1):  # one task a core: threads of linear algebra would only get in each other's way
-        return index, solve_chunk(case, site, observations, places)
+    return index, solve_chunk(case, site, observations, places)
 
 
 def solve_chunk(case: Case, site: Site, observations: Observations, places: np.ndarray) -> Rows:

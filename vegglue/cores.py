@@ -1,0 +1,46 @@
+"""Work spread over the cores: the one place that knows joblib, so that a cluster's backend may take its place.
+
+`joblib.parallel_config(backend="dask")` around a command spreads the same tasks over more than one machine.
+"""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+
+
+def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
+    """work(*task) for every task, in the order in which they end."""
+    yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+
+
+def in_order(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> list[Any]:
+    """work(*task) for every task, in their order."""
+    return list(_pool(jobs, "generator")(delayed(_alone)(work, task) for task in tasks))
+
+
+def _pool(jobs: int, order: str) -> Parallel:
+    return Parallel(n_jobs=jobs, return_as=order, pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve)
+
+
+def _alone(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
+    with threadpool_limits(1):  # one task a core: threads of linear algebra would only get in each other's way
+        return work(*task)
+
+
+def _serve() -> None:
+    """A worker leaves Ctrl-C to the run it serves, and does not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    run = os.getppid()
+
+    def follow() -> None:
+        while os.getppid() == run:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
