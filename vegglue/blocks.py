@@ -9,7 +9,7 @@ it under a given level: no exchange of rows between blocks is needed.
 import numpy as np
 from numba import njit
 
-compiled = njit(cache=True, error_model="numpy")
+compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 # An unknown moves the residuals of the columns from one upstream to two downstream of it, and two rows to either side;
 # unknowns this far apart may be disturbed together.

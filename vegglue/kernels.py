@@ -22,7 +22,7 @@ GAUSS_WEIGHT = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 STRIP, HALO = 40, 3
 
 # No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
-compiled = njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
+compiled = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
 
 
 @compiled
