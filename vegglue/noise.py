@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import scipy.linalg
 import scipy.optimize
+import scipy.special
 
 from vegglue.effect import Array
 from vegglue.errors import InputError
@@ -104,7 +105,8 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
 
     def best(scale_free: bool) -> tuple[float, float, float]:
         def unfold(x: Array) -> tuple[float, float, float]:
-            return float(0.98 / (1.0 + np.exp(-x[0]))), float(np.exp(x[2])) if scale_free else 1.0, float(x[1])
+            rho, scale = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[2], -3.0, 3.0)) if scale_free else 1.0
+            return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
 
         found = []
         for log_t in sizes:

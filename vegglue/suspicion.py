@@ -1,0 +1,145 @@
+"""One look at a calibrated model: which effect, place or single station the misfit points at, and how surely."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from vegglue import score
+from vegglue.baseline import Baseline
+from vegglue.candidates import Candidate, candidates_of, start_of, with_effect
+from vegglue.effect import Amplitude, Array
+from vegglue.linearise import fingerprint, z_at
+from vegglue.noise import Noise, estimated
+from vegglue.places import Spots, spots
+from vegglue.schema import Case
+
+# Size [1/m] of unlisted drag that is set aside when the noise is estimated.
+PLAUSIBLE_SPOT = 0.3
+
+
+@dataclass(frozen=True)
+class Family:
+    """Scores T of fingerprints that are one hypothesis, and the chance of the best of them under errors alone.
+
+    log_p: natural logarithm of the family-wise p-value, carried on beyond what the bootstrap can count.
+    """
+
+    scores: Array
+    log_p: float
+
+    @property
+    def best(self) -> int:
+        return int(np.argmax(self.scores**2))
+
+    @property
+    def p(self) -> float:
+        return float(np.exp(self.log_p))
+
+
+@dataclass(frozen=True)
+class Look:
+    """Fingerprints at a baseline and what the residual says of them.
+
+    columns: for each candidate, its columns among `traces`; settings: shapes of each column; own: candidate of each.
+    """
+
+    noise: Noise
+    candidates: list[Candidate]
+    columns: list[np.ndarray]
+    settings: list[dict[str, float]]
+    traces: Array  # whitened (n, c)
+    projected: score.Projected
+    scores: Array
+    maxima: Array
+    effects: Family
+    places: Family
+    stations: Family
+    spots: Spots
+    spot_length: Array
+
+    def best_column(self, candidate: int) -> int:
+        columns = self.columns[candidate]
+        return int(columns[np.argmax(self.scores[columns] ** 2)])
+
+    def family_p(self, candidate: int) -> float:
+        return score.family_p(float(self.scores[self.best_column(candidate)]), self.maxima)
+
+
+def look(base: Baseline, half_width: float, flagged: tuple[int, ...], keep_noise: bool, seed: int = 1) -> Look:
+    """Fingerprints of all candidates, of spots everywhere and of single stations, against the residual.
+
+    keep_noise: take the noise as it is; else estimate its correlation first, with all that could be missing set aside.
+    """
+    model, point = base.model, base.fitted.point
+    candidates = candidates_of(model.case, model.station)
+    changed: list[tuple[Case, str, Amplitude]] = []
+    columns: list[np.ndarray] = []
+    settings: list[dict[str, float]] = []
+    for one in candidates:
+        tried = one.settings()
+        columns.append(np.arange(len(changed), len(changed) + len(tried)))
+        changed += [(with_effect(model.case, one, shapes), one.parameter, one.effect.amplitude) for shapes in tried]
+        settings += tried
+    prints = base.noise.used(fingerprint(model, point, changed))
+    there = spots(model, point, half_width)
+    spot_prints = base.noise.used(there.traces)
+    slope, left = base.noise.used(point.slope), base.noise.residual(point.prediction)
+    noise = base.noise
+    if not keep_noise:
+        sizes = np.array([amplitude.scale**amplitude.power for _, _, amplitude in changed])
+        noise = estimated(noise, left, np.hstack([slope, prints * sizes, spot_prints * PLAUSIBLE_SPOT]))
+    white, right = noise.whiten(slope), noise.whiten(left)
+    one_sided = np.array([amplitude.low >= amplitude.off for _, _, amplitude in changed])
+    traces = noise.whiten(prints)
+    projected = score.project(white, right, point.z, traces)
+    of_spots = score.project(white, right, point.z, noise.whiten(spot_prints))
+    of_stations = score.project(white, right, point.z, noise.whiten(np.eye(right.size)))
+    seen = score.scores(projected, one_sided)
+    drawn = score.null_draws(projected, one_sided, seed)
+    maxima = (drawn**2).max(axis=1)
+    two = np.zeros(there.x.size, bool)
+    alone = score.scores(of_stations, np.zeros(right.size, bool))
+    alone[list(flagged)] = 0.0
+    return Look(
+        noise=noise,
+        candidates=candidates,
+        columns=columns,
+        settings=settings,
+        traces=traces,
+        projected=projected,
+        scores=seen,
+        maxima=maxima,
+        effects=_family(seen, maxima),
+        places=_family(score.scores(of_spots, two), (score.null_draws(of_spots, two, seed) ** 2).max(axis=1)),
+        stations=_family(alone, (score.null_draws(of_stations, np.zeros(right.size, bool), seed) ** 2).max(axis=1)),
+        spots=there,
+        spot_length=of_spots.length,
+    )
+
+
+def refit_start(base: Baseline, seen: Look, candidate: int, changed: Case) -> Array:
+    """Where in z (p + 1,) to begin the refit with a candidate: the joint linear step of all parameters."""
+    column = seen.best_column(candidate)
+    point, one = base.fitted.point, seen.candidates[candidate]
+    gain = float(seen.scores[column] / max(seen.projected.length[column], 1e-300))
+    amplitude = start_of(one.effect, gain)
+    slope, noise = seen.noise.whiten(seen.noise.used(point.slope)), seen.noise
+    left = noise.whiten(noise.residual(point.prediction)) - seen.traces[:, column] * gain
+    matrix = slope.T @ slope + np.eye(point.z.size)
+    step = np.linalg.solve(matrix, slope.T @ left - point.z)
+    step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
+    alone = changed.model_copy(update={"parameters": {one.parameter: changed.parameters[one.parameter]}})
+    return np.append(point.z + step, z_at(alone, {one.parameter: np.array([amplitude])})[0])
+
+
+def _family(scores: Array, maxima: Array) -> Family:
+    """The tail of the maximum of c alike squares: 1 - (1 - sf(T^2))^c, c so that it fits the bootstrap at 95 %."""
+    if scores.size == 0:
+        return Family(np.zeros(1), 0.0)
+    many = -np.log(0.95) / scipy.stats.chi2.sf(np.quantile(maxima, 0.95), 1)
+    log_tail = scipy.stats.chi2.logsf(float((scores**2).max()), 1)
+    log_p = np.log(many) + log_tail
+    if log_p > -4.0:
+        log_p = float(np.log(-np.expm1(many * np.log1p(-np.exp(log_tail)))))
+    return Family(scores, float(min(log_p, 0.0)))

@@ -1,0 +1,175 @@
+"""What was found, in words: one verdict in one sentence, remarks, and where the model misses."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from vegglue.diagnosis import Step, Suspect, Verdict, Where
+from vegglue.ground import ground_of
+from vegglue.linearise import Model, Point
+from vegglue.noise import Noise
+from vegglue.schema import Case
+
+# A set of more groups than this says nothing.
+MOST_GROUPS = 3
+# Chance of the last misfit under errors alone, below which something is still missing.
+POOR = 1e-3
+# Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
+AT_EDGE = 0.2
+
+
+def judged(
+    case: Case,
+    noise: Noise,
+    steps: Sequence[Step],
+    suspects: Sequence[Suspect],
+    place: Where | None,
+    p_misfit: float,
+    chi2: float,
+    freedom: int,
+    flagged: Sequence[int],
+) -> tuple[Verdict, str, list[str]]:
+    """The verdict, its sentence, and what else should be known."""
+    remarks = _remarks(noise, suspects, flagged, case)
+    fit = f"chi2 is {chi2:.0f} for {freedom} degrees of freedom"
+    if place is not None:
+        before = f", after {_names(steps)}" if steps else ""
+        return (
+            "none-of-these",
+            f"None of the known effects{before}: the misfit points at x = {place.x:.1f}, y = {place.y:.1f} m, where "
+            f"something holds the flow back or lets it pass that the model does not have ({fit} without it).",
+            remarks,
+        )
+    if not steps:
+        return _without_steps(suspects, p_misfit, fit, remarks)
+    wide = max(len(step.groups) for step in steps)
+    if wide > MOST_GROUPS:
+        names = ", ".join(dict.fromkeys(name for step in steps for name in step.rivals))
+        return "cannot-tell", f"Something is missing, but these data cannot tell which of {names} it is.", remarks
+    if p_misfit < POOR:
+        remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {p_misfit:.1g}).")
+    sentences = " and ".join(_step_words(step, suspects) for step in steps)
+    single = all(len(step.rivals) == 1 for step in steps)
+    return ("identified" if single else "one-of"), f"Missing: {sentences}; {fit} with it.", remarks
+
+
+def _without_steps(
+    suspects: Sequence[Suspect], p_misfit: float, fit: str, remarks: list[str]
+) -> tuple[Verdict, str, list[str]]:
+    testable = [suspect for suspect in suspects if suspect.testable]
+    if p_misfit < POOR:
+        return (
+            "cannot-tell",
+            f"The misfit is larger than the errors allow ({fit}), but no known effect and no place stands out.",
+            remarks,
+        )
+    if len(testable) < 0.25 * max(len(suspects), 1):
+        return (
+            "cannot-tell",
+            f"Nothing stands out ({fit}), but only {len(testable)} of {len(suspects)} effects would be seen in these "
+            "data if they were there.",
+            remarks,
+        )
+    return (
+        "nothing-missing",
+        f"Nothing is missing that these data could show: {fit}, and none of {len(suspects)} effects stands out "
+        f"({len(testable)} of them would be seen at a plausible size).",
+        remarks,
+    )
+
+
+def _names(steps: Sequence[Step]) -> str:
+    return " and ".join(step.accepted for step in steps)
+
+
+def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
+    by_name = {suspect.name: suspect for suspect in suspects}
+    best = by_name[step.accepted]
+    low, high = best.interval95
+    unit = "" if best.unit == "-" else f" {best.unit}"
+    words = f"{step.accepted} of {best.amplitude:.3g}{unit} ({low:.3g} to {high:.3g}; {best.title.lower()})"
+    others = [name for name in step.rivals if name != step.accepted]
+    if not others:
+        return words
+    alike = next((group for group in step.groups if step.accepted in group and len(group) > 1), ())
+    same = [name for name in others if name in alike]
+    rest = [name for name in others if name not in alike]
+    if same:
+        words += f", which leaves the same trace in these data as {', '.join(same)}"
+    if rest:
+        words += f", or else {' or '.join(rest)}"
+    return words
+
+
+def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int], case: Case) -> list[str]:
+    remarks = []
+    if noise.correlation > 0:
+        remarks.append(f"Errors of neighbours are correlated by {noise.correlation:.2f}; this is allowed for.")
+    if noise.scale > 1:
+        remarks.append(f"The stated errors look too small by a factor of {noise.scale:.2f}; this is allowed for.")
+    if flagged:
+        remarks.append(f"{len(flagged)} station(s) stand alone against every effect and are set aside: see `flagged`.")
+    hidden = [suspect for suspect in suspects if not suspect.testable]
+    if hidden:
+        remarks.append(
+            "Untestable with these data, neither present nor absent: "
+            + ", ".join(_untestable(suspect, case) for suspect in hidden)
+            + "."
+        )
+    return remarks
+
+
+def _untestable(suspect: Suspect, case: Case) -> str:
+    if abs(suspect.likeness) > 0.8:
+        return f"{suspect.name} (looks like a change of {suspect.mimicked_by})"
+    return suspect.name
+
+
+def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
+    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge)."""
+    used = model.station.iloc[noise.rows]
+    table = pd.DataFrame(
+        {
+            "experiment": used["experiment"].to_numpy(),
+            "section": np.where(used["kind"] == "level", "gauges", used["section"]),
+            "zone": _zones(model, used),
+            "left": noise.residual(point.prediction),
+            "error": noise.scale * noise.error,
+        }
+    )
+    rows = []
+    for (experiment, section, zone), part in table.groupby(["experiment", "section", "zone"], sort=False):
+        size = len(part)
+        related = 1.0 + (noise.correlation / (1.0 - noise.correlation) * 2.0 if size > 2 else 0.0)
+        rows.append(
+            {
+                "experiment": experiment,
+                "section": section,
+                "zone": zone,
+                "stations": size,
+                "mean": float(part["left"].mean()),
+                "standard_error": float(np.sqrt((part["error"] ** 2).sum() * related) / size),
+                "chi2": float(((part["left"] / part["error"]) ** 2).sum()),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _zones(model: Model, used: pd.DataFrame) -> list[str]:
+    grid = model.site.grid
+    grounds = {name: ground_of(model.case, model.site, name) for name in model.case.experiments}
+    zones = []
+    for row in used.itertuples():
+        ground = grounds[str(row.experiment)]
+        i = int(np.clip(round((float(row.x) - grid.x[0]) / grid.dx), 0, grid.x.size - 1))
+        j = int(np.clip(round((float(row.y) - grid.y[0]) / grid.dy), 0, grid.y.size - 1))
+        if row.kind == "level":
+            zones.append("level")
+        elif abs(ground.edge[i, j, 0]) < AT_EDGE * ground.half_width[i, j, 0]:
+            zones.append("edge")
+        elif ground.planted[i, j, 0]:
+            zones.append("plants")
+        else:
+            zones.append("bank" if ground.bank[i, j, 0] else "floor")
+    return zones
