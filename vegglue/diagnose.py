@@ -14,7 +14,7 @@ import scipy.stats
 from vegglue import __version__, score
 from vegglue.baseline import Baseline, baseline, grid_difference
 from vegglue.candidates import Candidate, with_effect
-from vegglue.cores import in_order
+from vegglue.cores import in_threads
 from vegglue.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
 from vegglue.effect import Array
 from vegglue.fit import Fitted, chi2, covariance, fit, objective
@@ -105,7 +105,7 @@ def _accept(
     """Refit the suspects, take the best, and name the rivals that the data do not reject."""
     tried = _handful(seen)
     say(f"refitting with {', '.join(seen.candidates[j].name for j in tried)}")
-    found = in_order(partial(_refit, base, seen), [(j,) for j in tried], jobs)
+    found = in_threads(partial(_refit, base, seen), [(j,) for j in tried], jobs)
     refits = [one for one in found if one is not None]
     if not refits:
         return None, base, []

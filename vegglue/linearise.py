@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr, ndtri
 
+from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
 from vegglue.flow import Problem, crop, residual
 from vegglue.neighbourhood import settled, widen
@@ -86,8 +87,8 @@ def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None
     """The model and its slopes at z; None when a flow finds no rest. near: a point to start from."""
     prediction, slope = np.full(len(model.station), np.nan), np.full((len(model.station), z.size), np.nan)
     flows = {}
-    for experiment in model.case.experiments:
-        flow = _flow(model, experiment, z, near)
+    tasks = [(model, experiment, z, near) for experiment in model.case.experiments]
+    for experiment, flow in zip(model.case.experiments, in_threads(_flow, tasks, -1), strict=True):
         if flow is None:
             return None
         flows[experiment] = flow
@@ -123,27 +124,34 @@ def fingerprint(model: Model, point: Point, changed: Sequence[tuple[Case, str, A
     changed: the case, the name of its added parameter, and the amplitude it stands for.
     """
     found = np.zeros((len(model.station), len(changed)))
-    theta = theta_at(model.case, point.z)
-    for experiment, flow in point.flows.items():
-        rows = _rows(model, experiment)
-        here = [j for j, (case, _, _) in enumerate(changed) if _acts_in(case, experiment)]
-        if not here:
-            continue
-        base = crop(problem_at(model, experiment, point.z), *flow.band)
-        calm = residual(base, flow.state)
-        built, causes = [], np.empty((*flow.state.shape[:3], len(here)))
-        for lane, j in enumerate(here):
-            case, name, amplitude = changed[j]
-            step, gain = _step(amplitude)
-            problem = build_problem(case, model.site, experiment, theta | {name: np.array([amplitude.off + step])})
-            causes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
-            built.append((problem, gain))
-        answers = tangents(base, flow.state, flow.factors, causes, EXACT)
-        for lane, j in enumerate(here):
-            problem, gain = built[lane]
-            moved = flow.state + gain * answers[..., lane : lane + 1]
-            now = _read(model, experiment, problem, moved, flow.band)[0]
-            found[rows, j] = (now - point.prediction[rows]) / gain
+    tasks = [(model, point, experiment, changed) for experiment in point.flows]
+    for experiment, prints in zip(point.flows, in_threads(_prints, tasks, -1), strict=True):
+        found[_rows(model, experiment)] = prints
+    return found
+
+
+def _prints(model: Model, point: Point, experiment: str, changed: Sequence[tuple[Case, str, Amplitude]]) -> Array:
+    """Fingerprints of one experiment, (stations of it, c); zero for what does not act in it."""
+    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), _rows(model, experiment)
+    found = np.zeros((rows.size, len(changed)))
+    here = [j for j, (case, _, _) in enumerate(changed) if _acts_in(case, experiment)]
+    if not here:
+        return found
+    base = crop(problem_at(model, experiment, point.z), *flow.band)
+    calm = residual(base, flow.state)
+    built, causes = [], np.empty((*flow.state.shape[:3], len(here)))
+    for lane, j in enumerate(here):
+        case, name, amplitude = changed[j]
+        step, gain = _step(amplitude)
+        problem = build_problem(case, model.site, experiment, theta | {name: np.array([amplitude.off + step])})
+        causes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
+        built.append((problem, gain))
+    answers = tangents(base, flow.state, flow.factors, causes, EXACT)
+    for lane, j in enumerate(here):
+        problem, gain = built[lane]
+        moved = flow.state + gain * answers[..., lane : lane + 1]
+        now = _read(model, experiment, problem, moved, flow.band)[0]
+        found[:, j] = (now - point.prediction[rows]) / gain
     return found
 
 
@@ -188,18 +196,30 @@ def _rows(model: Model, experiment: str) -> np.ndarray:
 def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> Flowing | None:
     problem = problem_at(model, experiment, z)
     ny = problem.shape[1]
-    warm = None
-    if near is not None:
-        before = near.flows[experiment]
-        warm = widen(before.state, ny, before.band)
-        if before.slopes.shape[3] == z.size:
-            warm = warm + widen(before.slopes @ (z - near.z)[:, None], ny, before.band)
+    warm = None if near is None else _warm(near, near.flows[experiment], z, (problem.shape[0], ny))
     solution, factors, band = settled(problem, warm, model.case.numerics.tolerance)
     if factors is None:
         return None
     part = crop(problem, *band)
     slopes = tangents(part, solution.state, factors, _causes(model, experiment, z, solution.state, band), EXACT)
     return Flowing(solution.state, band, factors, slopes)
+
+
+def _warm(near: Point, before: Flowing, z: Array, shape: tuple[int, int]) -> Array:
+    """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be."""
+    nx, ny = before.state.shape[0], shape[1] if shape[0] == before.state.shape[0] else shape[1] // 2
+    warm = widen(before.state, ny, before.band)
+    if before.slopes.shape[3] == z.size:
+        warm = warm + widen(before.slopes @ (z - near.z)[:, None], ny, before.band)
+    return warm if nx == shape[0] else _prolonged(warm)
+
+
+def _prolonged(coarse: Array) -> Array:
+    """A state (nx, 3, ny, 1) on cells of half the size: velocities between faces are the mean of both."""
+    fine = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=2)
+    fine[2::2, 2] = 0.5 * (fine[1:-1:2, 2] + fine[3::2, 2])
+    fine[:, 1, 1:-1:2] = 0.5 * (fine[:, 1, :-2:2] + fine[:, 1, 2::2])
+    return fine
 
 
 def _causes(model: Model, experiment: str, z: Array, state: Array, band: tuple[int, int]) -> Array:
