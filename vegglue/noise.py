@@ -96,7 +96,7 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
     """
 
     def cost(rho: float, scale: float, log_t: float) -> float:
-        covariance = _covariance(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
+        covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
         factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
         return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
 
@@ -123,10 +123,11 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
 
 
 def _factored(noise: Noise) -> Noise:
-    return replace(noise, lower=np.asarray(np.linalg.cholesky(_covariance(noise))))
+    return replace(noise, lower=np.asarray(np.linalg.cholesky(covariance_of(noise))))
 
 
-def _covariance(noise: Noise) -> Array:
+def covariance_of(noise: Noise) -> Array:
+    """s^2 D R D + E of the used stations (n, n)."""
     related = np.eye(noise.rows.size) if noise.correlation == 0.0 else noise.correlation**noise.apart
     covariance = noise.scale**2 * related * np.outer(noise.error, noise.error)
     return np.asarray(covariance + 0.5 * np.outer(noise.grid, noise.grid) + np.diag(0.5 * noise.grid**2))
