@@ -1,0 +1,191 @@
+"""The next measurement: which one would tell rival explanations apart, and how much it would say per hour of work.
+
+Rival i, fitted to the data at hand, predicts new measurements; rival j predicts others, after it has been calibrated to
+all of them. What is left between both,
+
+    D^2 = |(I - P_[J, S_j]) S_i a_i|^2,
+
+in squared standard errors, is the gain of the log-likelihood ratio (times two) that i would win over j by measuring.
+j may be the model without any effect: then D^2 says whether i would be seen at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.candidates import Candidate, with_effect
+from vegglue.effect import Array
+from vegglue.linearise import Model, fingerprint, linearise
+from vegglue.noise import Noise
+from vegglue.schema import Case, Experiment
+from vegglue.site import build_site
+
+# Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
+HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
+# Verticals are planned this far apart, in half widths of the floor; sections this share of the reach.
+SPACING, SECTIONS = 0.25, 12
+# Other discharges, relative to the nearest one at hand, with the outlet level that goes with it (h ~ Q^0.6).
+FACTORS = (0.5, 1.4)
+LEVEL_POWER = 0.6
+# Below this D^2 a measurement does not separate anything.
+SEPARATES = 4.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One measurement that could be made: its stations (rows of the extended table), where, and its cost [h]."""
+
+    name: str
+    rows: np.ndarray
+    hours: float
+    x: float
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Worth:
+    """A plan, the least D^2 between any two rivals now and with it, and the gain per hour."""
+
+    plan: Plan
+    now: float
+    then: float
+
+    @property
+    def per_hour(self) -> float:
+        return (self.then - self.now) / self.plan.hours
+
+
+Rival = tuple[Candidate | None, dict[str, float], float]
+
+
+def worth_of_measurements(model: Model, noise: Noise, z: Array, rivals: Sequence[Rival]) -> list[Worth]:
+    """Plans ranked by gain per hour; rivals: (effect or None, shapes, fitted gain (amplitude - off)^power)."""
+    wide, plans = planned(model, noise)
+    point = linearise(wide, z)
+    if point is None:
+        return []
+    named = [(one, shapes, gain) for one, shapes, gain in rivals if one is not None]
+    changed = [(with_effect(wide.case, one, shapes), one.parameter, one.effect.amplitude) for one, shapes, _ in named]
+    prints = fingerprint(wide, point, changed)
+    errors = _errors(wide.station, noise)
+    slope = point.slope / errors[:, None]
+    traces = prints / errors[:, None] * np.array([gain for _, _, gain in named])
+    known = np.zeros(len(wide.station), dtype=bool)
+    known[: len(model.station)] = model.station["used"].to_numpy(bool)
+    apart = len(named) if len(named) > 1 else 0
+    now = _least(slope[known], traces[known], apart)
+    found = []
+    for plan in plans:
+        rows = known.copy()
+        rows[plan.rows] = True
+        found.append(Worth(plan, now, _least(slope[rows], traces[rows], apart)))
+    return sorted(found, key=lambda one: -one.per_hour)
+
+
+def planned(model: Model, noise: Noise) -> tuple[Model, list[Plan]]:
+    """The model with every station that could be measured behind those that were, and the plans they make."""
+    tables, plans, count = [model.station], [], len(model.station)
+    case = _with_other_discharges(model.case)
+    velocity = model.station[(model.station["kind"] == "velocity") & model.station["used"]]
+    for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
+        table = _stations(experiment, plan_name, x, y, kind)
+        plans.append(Plan(plan_name, np.arange(count, count + len(table)), hours, x, experiment))
+        tables.append(table)
+        count += len(table)
+    return Model(case, model.site, pd.concat(tables, ignore_index=True)), plans
+
+
+def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:
+    """Name, experiment, x, y, kind and hours of every measurement worth a thought."""
+    usual, y = next(reversed(model.case.experiments)), _verticals(velocity)
+    low, high = model.case.grid.x
+    places = np.linspace(low, high, SECTIONS + 2)[1:-1]
+    taken = [float(x) for x in velocity["x"].unique()]
+    hours = HOURS["section"] + y.size * HOURS["vertical"]
+    new = [float(x) for x in places if min(abs(x - there) for there in taken) > 0.3 * (places[1] - places[0])]
+    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, "velocity", hours) for x in new]
+    ideas += [
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), np.array([_middle(y)]), "level", HOURS["gauge"])
+        for x in places[::2]
+    ]
+    others = [name for name in case.experiments if name not in model.case.experiments]
+    for x in taken:
+        at, here = f"the section at x = {x:g} m", np.sort(velocity[velocity["x"] == x]["y"].unique().astype(float))
+        ideas.append((f"{at} again ({usual})", usual, x, here, "velocity", hours))
+        more = hours + HOURS["discharge"]
+        ideas += [(f"{at} {experiment}", experiment, x, here, "velocity", more) for experiment in others]
+    return ideas
+
+
+def _verticals(velocity: pd.DataFrame) -> Array:
+    """Where verticals stand in the section that has most of them [m]."""
+    counts = velocity.groupby("x")["y"].nunique()
+    return np.sort(velocity[velocity["x"] == counts.idxmax()]["y"].unique().astype(float))
+
+
+def _middle(y: Array) -> float:
+    return float(0.5 * (y[0] + y[-1]))
+
+
+def _stations(experiment: str, section: str, x: float, y: Array, kind: str) -> pd.DataFrame:
+    return pd.DataFrame(
+        {"experiment": experiment, "kind": kind, "section": section, "x": x, "y": y, "value": 0.0,
+         "standard_error": np.nan, "used": False, "reason": "", "depth": np.nan, "device": ""}
+    )  # fmt: skip
+
+
+def _with_other_discharges(case: Case) -> Case:
+    """The case with experiments at discharges it has not seen, where those at hand are numbers."""
+    known = list(case.experiments.items())
+    numbers = [(name, one) for name, one in known if _plain(one)]
+    if not numbers:
+        return case
+    totals = {name: sum(float(q) for q in one.discharge.values()) for name, one in numbers}
+    lowest, highest = min(totals, key=lambda name: totals[name]), max(totals, key=lambda name: totals[name])
+    floor = float(build_site(case).bed[-1].min())
+    more = {}
+    for name, factor in ((lowest, FACTORS[0]), (highest, FACTORS[1])):
+        one = case.experiments[name]
+        depth = float(one.level) - floor
+        level = floor + depth * factor**LEVEL_POWER
+        discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
+        more[f"at {factor * totals[name]:.2f} m3/s"] = one.model_copy(update={"discharge": discharge, "level": level})
+    return case.model_copy(update={"experiments": {**case.experiments, **more}})
+
+
+def _plain(one: Experiment) -> bool:
+    return not isinstance(one.level, str) and not any(isinstance(q, str) for q in one.discharge.values())
+
+
+def _errors(station: pd.DataFrame, noise: Noise) -> Array:
+    """Errors of measurements at hand, and those to come: as good as the usual one of their kind."""
+    errors = np.full(len(station), np.nan)
+    errors[noise.rows] = noise.scale * noise.error
+    kinds = station["kind"].to_numpy()
+    for kind in dict.fromkeys(kinds):
+        known = errors[(kinds == kind) & np.isfinite(errors)]
+        fallback = {"velocity": 0.015, "level": 0.003}[kind]
+        errors[(kinds == kind) & ~np.isfinite(errors)] = np.median(known) if known.size else fallback
+    return errors
+
+
+def _least(slope: Array, traces: Array, apart: int) -> float:
+    """The least D^2 over ordered pairs of rivals; against the model without any when there is only one."""
+    least = np.inf
+    for i in range(traces.shape[1]):
+        others: list[int | None] = [j for j in range(apart) if j != i] or [None]
+        for j in others:
+            calibrated = slope if j is None else np.column_stack([slope, traces[:, j]])
+            least = min(least, _left(calibrated, traces[:, i], slope.shape[1]))
+    return float(least)
+
+
+def _left(calibrated: Array, trace: Array, priors: int) -> float:
+    """|(I - P) trace|^2 with the rows of the priors below the slopes."""
+    below = np.zeros((priors, calibrated.shape[1]))
+    below[:, :priors] = np.eye(priors)
+    wide, target = np.vstack([calibrated, below]), np.concatenate([trace, np.zeros(priors)])
+    answer, *_ = np.linalg.lstsq(wide, target, rcond=1e-10)
+    return float(np.sum((target - wide @ answer) ** 2))
