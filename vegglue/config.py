@@ -21,9 +21,9 @@ PATHS = ("file", "raster", "points", "effect_file")
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
 # What a finished ensemble does not depend on.
-NOT_SIMULATED = dict.fromkeys(("name", "title", "infer", "survey", "reference", "canopy_correction"), True) | {
-    "simulate": {"field_budget"}
-}
+NOT_SIMULATED = dict.fromkeys(
+    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction"), True
+) | {"simulate": {"field_budget"}}
 
 Tree = dict[str, Any]
 
@@ -135,12 +135,21 @@ def _merged(base: Any, layer: Any) -> Any:
 
 def _with_one_inflow_named(tree: Tree) -> Tree:
     """With a single inflow, `discharge: 2.66` means all of it: write it as {inflow: 2.66}."""
-    inflows, experiments = tree.get("inflows"), tree.get("experiments")
-    if not (isinstance(inflows, dict) and len(inflows) == 1 and isinstance(experiments, dict)):
+    inflows = tree.get("inflows")
+    if not (isinstance(inflows, dict) and len(inflows) == 1):
         return tree
     (inflow,) = inflows
-    named = {name: _named(experiment, inflow) for name, experiment in experiments.items()}
-    return tree | {"experiments": named}
+    named = _all_named(tree, inflow)
+    if isinstance(tree.get("validation"), dict):
+        named |= {"validation": tree["validation"] | _all_named(tree["validation"], inflow)}
+    return tree | named
+
+
+def _all_named(tree: Tree, inflow: str) -> Tree:
+    experiments = tree.get("experiments")
+    if not isinstance(experiments, dict):
+        return {}
+    return {"experiments": {name: _named(experiment, inflow) for name, experiment in experiments.items()}}
 
 
 def _named(experiment: Any, inflow: str) -> Any:

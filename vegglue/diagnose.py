@@ -292,6 +292,7 @@ def _written(
         scale=noise.scale,
         grid_error=float(np.sqrt(np.mean(noise.grid**2))),
         flagged=tuple(int(noise.rows[row]) for row in flagged),
+        first_parameters={name: _three(first, name)[0] for name in first.model.names},
         parameters=parameters,
         zones=misfit_zones(first.model, first.noise, first.fitted.point),
         station=first.model.station,

@@ -1,18 +1,22 @@
 """What a diagnosis says: the verdict, the effects that explain the misfit, where it lies, and all numbers behind it."""
 
+import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from vegglue.effect import Array
+from vegglue.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.layout import Group, Variable, table_group
 
 Verdict = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
 # Sum over families of what the data may accuse without cause: listed effects and unlisted places.
 ALARM, ALARM_OF_PLACES = 0.04, 0.01
+# Fields that have one value for each station.
+AT_STATIONS = ("prediction_first", "prediction", "error")
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ class Diagnosis:
     scale: float
     grid_error: float
     flagged: tuple[int, ...]
+    first_parameters: dict[str, float]
     parameters: dict[str, tuple[float, float, float]]
     zones: pd.DataFrame
     station: pd.DataFrame
@@ -153,31 +158,88 @@ def _plain(tree: Any) -> Any:
 
 def groups(diagnosis: Diagnosis) -> dict[str, Group]:
     """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places."""
-    stations = table_group(diagnosis.station, "station", {"x": "m", "y": "m"})
-    dims = ("station",)
-    values = {
-        "prediction_first": Variable(dims, diagnosis.prediction_first, "m/s for velocity, m for level"),
-        "prediction": Variable(dims, diagnosis.prediction, "m/s for velocity, m for level"),
-        "error": Variable(dims, diagnosis.error, "m/s for velocity, m for level"),
-    }
+    stations = table_group(diagnosis.station, "station", STATION_UNITS)
+    values = {name: Variable(("station",), getattr(diagnosis, name), VALUE_UNIT) for name in AT_STATIONS}
     suspects = pd.DataFrame([_row(suspect) for suspect in diagnosis.suspects])
-    place = {"x": Variable(("place",), diagnosis.map_x, "m"), "y": Variable(("place",), diagnosis.map_y, "m")}
-    alike = {"cosine": Variable(("name", "other"), diagnosis.cosine)}
+    places = {
+        "x": Variable(("place",), diagnosis.map_x, "m"),
+        "y": Variable(("place",), diagnosis.map_y, "m"),
+        "score": Variable(("place",), diagnosis.map_score),
+    }
     names = np.array(diagnosis.cosine_names, object)
     return {
         "stations": Group(stations.coordinates, {**stations.variables, **values}),
         "suspects": table_group(suspects, "suspect", {}),
-        "zones": table_group(diagnosis.zones, "zone", {}),
-        "places": Group(
-            {"place": np.arange(diagnosis.map_x.size)}, {**place, "score": Variable(("place",), diagnosis.map_score)}
-        ),
-        "alike": Group({"name": names, "other": names}, alike),
+        "zones": table_group(diagnosis.zones, "zone_number", {}),
+        "places": Group({"place": np.arange(diagnosis.map_x.size)}, places),
+        "alike": Group({"name": names, "other": names}, {"cosine": Variable(("name", "other"), diagnosis.cosine)}),
     }
+
+
+def attributes(diagnosis: Diagnosis) -> dict[str, Any]:
+    """For the attributes of the file: one number or word as it is, what is neither that nor an array as JSON."""
+    return {name: getattr(diagnosis, name) for name in _plain_names()} | {
+        "remarks": json.dumps(diagnosis.remarks),
+        "steps": json.dumps([asdict(step) for step in diagnosis.steps]),
+        "where": json.dumps(None if diagnosis.where is None else asdict(diagnosis.where)),
+        "flagged": json.dumps(diagnosis.flagged),
+        "parameters": json.dumps(diagnosis.parameters),
+    }
+
+
+def diagnosis_from(read: Mapping[str, Mapping[str, Any]], stated: Mapping[str, Any]) -> Diagnosis:
+    """The diagnosis whose file has these groups and attributes."""
+    stations, places, told = read["stations"], read["places"], _told(stated)
+    where = told["where"]
+    return Diagnosis(
+        **{name: kind(stated[name]) for name, kind in _plain_names().items()},
+        remarks=tuple(told["remarks"]),
+        suspects=_suspects_from(read["suspects"]),
+        steps=tuple(_step_from(step) for step in told["steps"]),
+        where=None if where is None else Where(**where | {"experiments": tuple(where["experiments"])}),
+        flagged=tuple(told["flagged"]),
+        parameters={name: tuple(values) for name, values in told["parameters"].items()},
+        zones=_table_from(read["zones"], "zone_number"),
+        station=_table_from(stations, "station", *AT_STATIONS),
+        **{name: stations[name] for name in AT_STATIONS},
+        map_x=places["x"],
+        map_y=places["y"],
+        map_score=places["score"],
+        cosine_names=tuple(read["alike"]["name"]),
+        cosine=read["alike"]["cosine"],
+    )
+
+
+def _plain_names() -> dict[str, type]:
+    """Fields of a diagnosis that are one number or word."""
+    kinds = {each.name: each.type for each in fields(Diagnosis)}
+    return {
+        name: str if kind is Verdict else kind for name, kind in kinds.items() if kind in (str, int, float, Verdict)
+    }
+
+
+def _told(stated: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: json.loads(stated[name]) for name in ("remarks", "steps", "where", "flagged", "parameters")}
+
+
+def _table_from(group: Mapping[str, Any], *others: str) -> pd.DataFrame:
+    return pd.DataFrame({name: values for name, values in group.items() if name not in others})
+
+
+def _step_from(step: dict[str, Any]) -> Step:
+    groups_of_step = tuple(tuple(group) for group in step["groups"])
+    return Step(**step | {"rivals": tuple(step["rivals"]), "groups": groups_of_step})
 
 
 def _row(suspect: Suspect) -> dict[str, Any]:
     row = asdict(suspect)
     low, high = row.pop("interval95")
-    shapes = row.pop("shapes")
-    said = ", ".join(f"{key}={value:g}" for key, value in shapes.items())
-    return row | {"low95": low, "high95": high, "shapes": said}
+    return row | {"low95": low, "high95": high, "shapes": json.dumps(suspect.shapes)}
+
+
+def _suspects_from(group: Mapping[str, Any]) -> tuple[Suspect, ...]:
+    found = []
+    for row in _table_from(group, "suspect").to_dict("records"):
+        interval = row.pop("low95"), row.pop("high95")
+        found.append(Suspect(**row | {"interval95": interval, "shapes": json.loads(row["shapes"])}))
+    return tuple(found)

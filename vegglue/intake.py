@@ -45,15 +45,17 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
         "eddy_viscosity": float(site.get("eddy_viscosity_m2_s", 0.01)),
-        "experiments": {
-            name: {"discharge": float(given["discharge_m3_s"]), "level": float(given["downstream_level_m"])}
-            for name, given in experiments.items()
-        },
+        "experiments": {name: _experiment(given) for name, given in experiments.items()},
         "parameters": dict(PARAMETERS),
         "observations": _observations(folder, target),
         "simulate": {"members": 256, "seed": 1},
         "infer": {"sigma": "known"},
     }
+    if site.get("holdout") and (folder / "holdout.csv").is_file():
+        tree["validation"] = {
+            "experiments": {name: _experiment(given) for name, given in site["holdout"].items()},
+            "observations": [{"kind": "velocity", "file": _named(folder / "holdout.csv", target)}],
+        }
     if patches:
         tree["plants"] = _plants(patches)
         guess = float(site.get("canopy_height_guess_m", 0.8))
@@ -134,6 +136,10 @@ def _grid(channel: Mapping[str, Any], experiments: Mapping[str, Any]) -> Tree:
     return {"x": [0.0, length], "y": [-half, half], "cell": [length / columns, dy]}
 
 
+def _experiment(given: Mapping[str, Any]) -> Tree:
+    return {"discharge": float(given["discharge_m3_s"]), "level": float(given["downstream_level_m"])}
+
+
 def _plants(patches: list[Mapping[str, Any]]) -> Tree:
     densest = max(float(patch.get("stems_per_m2", 1.0)) for patch in patches)
     stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
@@ -154,14 +160,15 @@ def _observations(folder: Path, target: Path) -> list[Tree]:
     found = []
     for kind, name in (("velocity", "velocities.csv"), ("level", "levels.csv")):
         if (folder / name).is_file():
-            file = Path(os.path.relpath(folder / name, target.resolve().parent)).as_posix()
-            found.append({"kind": kind, "file": file})
+            found.append({"kind": kind, "file": _named(folder / name, target)})
     if not found:
         raise InputError(f"{_shown(folder)}: expected velocities.csv or levels.csv, got neither; put them there.")
     return found
 
 
+def _named(file: Path, target: Path) -> str:
+    return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
+
+
 def _shown(path: Path) -> str:
     return os.path.relpath(path)
-
-

@@ -274,6 +274,13 @@ class Infer(Part):
     behavioural: Number | None = Field(default=None, description="threshold of an informal likelihood [-]")
 
 
+class Validation(Part):
+    """Measurements that no calibration sees: for judging a finished model only."""
+
+    experiments: dict[str, Experiment] = Field(min_length=1, description="flows that nothing is calibrated to")
+    observations: tuple[Observation, ...] = Field(min_length=1, description="what was measured in them")
+
+
 class Reference(Part):
     source: str = Field(default="", description="who found these values")
     table: dict[str, Number | tuple[Number, Number]] = Field(default_factory=dict, description="[median, sd] or number")
@@ -309,5 +316,6 @@ class Case(Part):
     numerics: Numerics = Field(default_factory=Numerics, description="choices of the solver")
     simulate: Simulate = Field(default_factory=Simulate, description="size and seed of the ensemble")
     infer: Infer = Field(default_factory=Infer, description="likelihood")
+    validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
     reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")
