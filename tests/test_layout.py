@@ -19,7 +19,7 @@ HOMES = {
     "matplotlib": {"channel_figure", "figure_plan", "figure_posterior", "figure_style", "figures", "reported"},
     "numba": {"blocks", "kernels", "sweeps"},
     "pandas": {
-        "adv", "ensemble", "infer", "layout", "likelihood", "observations", "posterior", "sensor", "table",
+        "adv", "contract", "ensemble", "infer", "layout", "likelihood", "observations", "posterior", "sensor", "table",
         "figures", "flow_pictures", "measured_pictures", "report_tables",
     },
     "pydantic": {"config", "schema"},

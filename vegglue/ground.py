@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from vegglue.effect import Array, Ground
 from vegglue.schema import Case
-from vegglue.site import Site
+from vegglue.site import Site, beyond
 
 # Steeper across than this [-], a cell is no longer floor.
 BREAK = 0.2
@@ -15,7 +15,7 @@ def ground_of(case: Case, site: Site, experiment: str) -> Ground:
     """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
-    floor = _floor(bed, side_slope)
+    floor = ~beyond(side_slope > BREAK, bed)
     axis, half_width = _extent(floor, grid.y, grid.dy)
     patch = np.where(np.isin(site.patch, _present(case, experiment)), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
@@ -54,19 +54,8 @@ def part(ground: Ground, columns: slice, rows: slice) -> Ground:
 def _present(case: Case, experiment: str) -> list[int]:
     plants = case.experiments[experiment].plants
     return [
-        index
-        for index, patch in enumerate(case.plants.patches)
-        if plants is True or (plants and patch.name in plants)
+        index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
     ]
-
-
-def _floor(bed: Array, side_slope: Array) -> NDArray[np.bool_]:
-    """From the lowest cell of each cross-section outward, up to the first steep one."""
-    steep = side_slope > BREAK
-    columns, lowest = np.arange(bed.shape[1])[None, :], bed.argmin(axis=1)[:, None]
-    left = np.logical_or.accumulate((steep & (columns <= lowest))[:, ::-1], axis=1)[:, ::-1]
-    right = np.logical_or.accumulate(steep & (columns >= lowest), axis=1)
-    return ~np.where(columns < lowest, left, right)
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

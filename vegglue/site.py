@@ -126,15 +126,19 @@ def _zone_cells(zone: Zone, grid: Grid, bed: Levels) -> Cells:
     if zone.steeper_than is not None:
         return slope(bed, grid) > zone.steeper_than
     if zone.beyond_slope_break is not None:
-        return _beyond(slope(bed, grid) > zone.beyond_slope_break, bed)
+        return beyond(slope(bed, grid) > zone.beyond_slope_break, bed)
     if zone.polygon is not None:
         return _in_polygon(zone.polygon, grid)
     return _in_range(zone.x, zone.y, grid)
 
 
-def _beyond(steep: Cells, bed: Levels) -> Cells:
-    """From the lowest cell of each cross-section towards both sides: the first steep cell and all behind it."""
-    columns, rows = np.arange(bed.shape[1])[None, :], bed.argmin(axis=1)[:, None]
+def beyond(steep: Cells, bed: Levels) -> Cells:
+    """From the lowest cell of each cross-section towards both sides: the first steep cell and all behind it.
+
+    The lowest cell that is not steep: of an even floor, the first one may be at the toe of a bank.
+    """
+    even = np.where(steep & ~steep.all(axis=1, keepdims=True), np.inf, bed)
+    columns, rows = np.arange(bed.shape[1])[None, :], even.argmin(axis=1)[:, None]
     left = np.logical_or.accumulate((steep & (columns <= rows))[:, ::-1], axis=1)[:, ::-1]
     right = np.logical_or.accumulate(steep & (columns >= rows), axis=1)
     return np.where(columns < rows, left, right)

@@ -1,0 +1,259 @@
+"""What every effect must keep, tried in a small channel: floor, banks, plants under water and plants that stand out.
+
+Both shipped effects and a user's own are judged here; `breaches` says in sentences what is wrong.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vegglue.effect import Array, Effect, Stand, applied
+from vegglue.flow import ACROSS, ALONG, LEVEL, Problem, closed, crop, faces, residual, take
+from vegglue.problem import build_problem
+from vegglue.schema import Case
+from vegglue.sensor import read_sensors
+from vegglue.site import Site, build_site
+from vegglue.start import backwater
+from vegglue.steady import newton
+
+AMPLITUDE = "amplitude"
+CHANNEL = {
+    "name": "contract",
+    "grid": {"x": (0.0, 20.0), "y": (-4.0, 4.0), "cell": (0.5, 0.5)},
+    "bed": [
+        {"trapezoid": {"axis": 0.0, "bottom_width": 4.0, "bank_slope": 0.6, "bed_slope": 0.001, "level": 0.02}},
+    ],
+    "friction": {
+        "classes": {"floor": {"law": "manning", "n": 0.04}, "bank": {"law": "keulegan", "k_s": 0.5}},
+        "default": "floor",
+        "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
+    },
+    "plants": {
+        "stands": {"low": {"phi": 3.0, "canopy_height": 0.4}, "high": {"phi": 2.0, "canopy_height": 1.2}},
+        "patches": [
+            {"name": "low", "stand": "low", "x": (6.0, 9.0), "y": (-1.0, 1.0)},
+            {"name": "high", "stand": "high", "x": (13.0, 15.0), "y": (-1.0, 1.0)},
+        ],
+    },
+    "inflows": {"main": {"side": "west"}},
+    "experiments": {"flow": {"discharge": {"main": 1.2}, "level": 0.7}},
+    "parameters": {AMPLITUDE: {"distribution": "uniform", "low": 0.0, "high": 1.0, "unit": "-"}},
+}
+# Stations stand in pairs that change places in the mirror.
+STATION = pd.DataFrame(
+    [
+        {"experiment": "flow", "kind": kind, "section": section, "x": x, "y": y, "device": device}
+        for kind, section, device in (("velocity", "A", "probe"), ("level", "gauges", "gauge"))
+        for x in (4.1, 8.0, 11.3)
+        for y in (-1.9, -0.4, 0.4, 1.9)
+    ]
+)
+PAIRS = np.arange(len(STATION)).reshape(-1, 4)[:, ::-1].ravel()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect in the channel: the problem of any amplitudes (m,), and without it."""
+
+    effect: Effect
+    case: Case
+    site: Site
+
+    def problem(self, *amplitude: float) -> Problem:
+        return build_problem(self.case, self.site, "flow", {AMPLITUDE: np.array(amplitude)})
+
+    def without(self, members: int) -> Problem:
+        bare = self.case.model_copy(update={"effects": {}})
+        return build_problem(bare, self.site, "flow", {AMPLITUDE: np.zeros(members)})
+
+
+def trial(effect: Effect, own: Path | None = None) -> Trial:
+    """own: the file of the effect, if it is a user's."""
+    works = {effect.name: {"values": {effect.amplitude.name: AMPLITUDE}}}
+    case = Case.model_validate(CHANNEL | {"source": Path("contract"), "effect_file": own, "effects": works})
+    return Trial(effect, case, build_site(case))
+
+
+def breaches(effect: Effect, own: Path | None = None) -> list[str]:
+    """What an effect breaks, in sentences; none for a good one."""
+    declared = list(undeclared(effect))
+    if declared:
+        return declared
+    tried = trial(effect, own)
+    try:
+        with np.errstate(divide="raise", over="raise", invalid="raise", under="ignore"):
+            return [sentence for check in CHECKS for sentence in check(tried)]
+    except (ArithmeticError, *OF_ITS_FUNCTION) as error:
+        return [f"its function fails: {type(error).__name__}: {error}"]
+
+
+OF_ITS_FUNCTION = (ValueError, TypeError, KeyError, IndexError, AttributeError, NameError)
+
+
+def undeclared(effect: Effect) -> Iterator[str]:
+    """Words and numbers of a declaration that are missing or contradict each other."""
+    for word in ("name", "title", "equation", "source"):
+        if not getattr(effect, word).strip():
+            yield f"`{word}` is empty: say it"
+    for parameter in effect.parameters:
+        if not (parameter.unit and parameter.meaning):
+            yield f"the parameter {parameter.name} has no unit or no meaning: say both (- for a pure number)"
+    amplitude = effect.amplitude
+    if not (amplitude.low <= amplitude.off <= amplitude.high and amplitude.low < amplitude.high):
+        yield f"off = {amplitude.off:g} lies outside {amplitude.low:g} to {amplitude.high:g}"
+    if not (0.0 < amplitude.scale <= amplitude.high - amplitude.low) or amplitude.power < 1:
+        yield "the amplitude needs a `scale` above 0 within its support, and a `power` of at least 1"
+    for shape in effect.shapes:
+        if not all(shape.low <= value <= shape.high for value in (shape.default, *shape.grid)):
+            yield f"default or grid of {shape.name} lie outside {shape.low:g} to {shape.high:g}"
+
+
+def at_rest(problem: Problem) -> Array:
+    """Still water at the level of the outlet, for every member."""
+    state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
+    state[:, LEVEL] = problem.outlet_level
+    return state
+
+
+def dry(problem: Problem) -> Array:
+    """No water at all."""
+    state = at_rest(problem)
+    state[:, LEVEL] = problem.bed.min() - 1.0
+    return state
+
+
+def moving(problem: Problem) -> Array:
+    """Water in motion, not steady, not symmetric: every derivative differs from 0, and the banks are partly dry."""
+    nx, ny = problem.shape
+    x, y = np.linspace(0.0, 1.0, nx)[:, None, None], np.linspace(-1.0, 1.0, ny)[None, :, None]
+    state = at_rest(problem)
+    depth = np.clip(0.7 - problem.bed, 0.0, None)[..., None]
+    state[:, LEVEL] += 0.02 * (1.0 - x) + 0.002 * np.sin(7.0 * x + 2.0 * y)
+    state[:, ALONG] = depth * (0.8 + 0.2 * np.sin(9.0 * x) + 0.15 * y - 0.3 * y**2)
+    state[:, ACROSS] = depth * 0.1 * np.cos(8.0 * x + y)
+    state[:, ACROSS, 0] = 0.0
+    return state
+
+
+def mirrored(state: Array) -> Array:
+    """The state seen in a mirror along the axis."""
+    other = np.zeros_like(state)
+    other[:, LEVEL], other[:, ALONG] = state[:, LEVEL, ::-1], state[:, ALONG, ::-1]
+    other[:, ACROSS, 1:] = -state[:, ACROSS, :0:-1]
+    return other
+
+
+def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
+    """All that an effect can change: the residual (nx, 3, ny, m), and the readings (station, m)."""
+    return residual(problem, state), read_sensors(problem, state, tried.site.grid, STATION, ()).prediction.T
+
+
+def sizes(effect: Effect) -> tuple[float, ...]:
+    """Amplitudes worth trying: off, a plausible one to each side as far as there is room, and both ends."""
+    a = effect.amplitude
+    return tuple(np.clip([a.off, a.off + a.scale, a.off - a.scale, a.low, a.high], a.low, a.high).tolist())
+
+
+def _off_is_off(tried: Trial) -> Iterator[str]:
+    """Bit by bit, alone and beside a member where it is on."""
+    off, on = tried.effect.amplitude.off, sizes(tried.effect)[1]
+    for state_of, amplitudes in product((at_rest, moving, dry), ((off,), (on, off))):
+        problem, without = tried.problem(*amplitudes), tried.without(len(amplitudes))
+        found, wanted = (answer(tried, one, state_of(one)) for one in (problem, without))
+        if not all(np.array_equal(a[..., -1], b[..., -1]) for a, b in zip(found, wanted, strict=True)):
+            yield f"something changes although {tried.effect.amplitude.name} is off, in {_name(state_of)} water"
+            return
+
+
+def _acts(tried: Trial) -> Iterator[str]:
+    """It does something, and answers to (amplitude - off)^power where it is small."""
+    a = tried.effect.amplitude
+    step = (0.02 if a.power == 1 else 0.2) * a.scale * (1.0 if a.off + 0.2 * a.scale <= a.high else -1.0)
+    problem = tried.problem(a.off, a.off + 0.5 * step, a.off + step)
+    told = answer(tried, problem, moving(problem))
+    half, whole = (np.concatenate([(t[..., k] - t[..., 0]).ravel() for t in told]) for k in (1, 2))
+    largest = np.abs(whole).max()
+    if largest == 0.0:
+        yield f"nothing changes with {a.name} in moving water: neither the flow nor a reading"
+    elif np.abs(half * 2.0**a.power - whole).max() > 0.1 * largest + 1e-11:
+        yield f"the answer to a small {a.name} is not of the power {a.power}: correct `power`, or avoid a jump at off"
+
+
+def _finite(tried: Trial) -> Iterator[str]:
+    problem = tried.problem(*sizes(tried.effect))
+    for state_of in (at_rest, moving, dry):
+        if not all(np.isfinite(values).all() for values in answer(tried, problem, state_of(problem))):
+            yield f"something is not finite in {_name(state_of)} water"
+
+
+def _never_pushes(tried: Trial) -> Iterator[str]:
+    """Friction rate, viscosity, phi and canopy height stay at or above 0; discharge and spread stay above."""
+    problem = tried.problem(*sizes(tried.effect))
+    for state_of in (at_rest, moving, dry):
+        state = state_of(problem)
+        rate, viscosity, _ = closed(problem, state, faces(problem, state).cell)
+        if (rate < 0.0).any():
+            yield f"the friction rate falls below 0 in {_name(state_of)} water: drag would push"
+        if (viscosity < 0.0).any():
+            yield f"the viscosity falls below 0 in {_name(state_of)} water"
+    for name, values in _standing(problem).items():
+        if (values <= 0.0).any():
+            yield f"{name} does not stay above 0"
+    if any((inflow.discharge <= 0.0).any() or (inflow.spread <= 0.0).any() for inflow in problem.inflows):
+        yield "an inflow does not stay above 0 everywhere"
+
+
+def _standing(problem: Problem) -> dict[str, Array]:
+    """phi and canopy height of plants in 0.3 m of water from slow to fast."""
+    speed = np.geomspace(0.001, 3.0, 40)[:, None] * np.ones(problem.members)
+    one = np.ones_like(speed)
+    stand = Stand(2.0 * one, 0.5 * one, 0.3 * one, speed, one[:, :1], -0.1 * one[:, :1], one[:, :1], 0.0 * one[:, :1])
+    return applied(problem.acting, "plants", stand, {"phi": stand.phi, "canopy_height": stand.canopy_height})
+
+
+def _mirrors(tried: Trial) -> Iterator[str]:
+    """A mirrored flow feels the mirrored effect."""
+    if not tried.effect.mirrored:
+        return
+    problem = tried.problem(sizes(tried.effect)[1])
+    state = moving(problem)
+    rates, readings = answer(tried, problem, state)
+    rates_there, readings_there = answer(tried, problem, mirrored(state))
+    if not (_alike(mirrored(rates), rates_there) and _alike(readings[PAIRS], readings_there)):
+        yield "a mirrored flow does not feel the mirrored effect: set mirrored=False and name in `equation` what turns"
+
+
+def _parts(tried: Trial) -> Iterator[str]:
+    """Some members, or some rows, of a problem answer as they do within it."""
+    problem = tried.problem(*sizes(tried.effect))
+    state, pick = moving(problem), np.array([3, 0, 1])
+    whole = residual(problem, state)
+    if not np.array_equal(residual(take(problem, pick), np.ascontiguousarray(state[..., pick])), whole[..., pick]):
+        yield "members answer otherwise when others are left out: work on each member alone"
+    rows = slice(2, problem.shape[1] - 2)
+    cut = residual(crop(problem, rows.start, rows.stop), np.ascontiguousarray(state[:, :, rows]))
+    if not _alike(cut[3:, :, 3:-3], whole[3:, :, 5:-5]):
+        yield "rows answer otherwise when those beyond them are left out: look no further than the next cell"
+
+
+def _settles(tried: Trial) -> Iterator[str]:
+    """A steady flow exists with a plausible size of it."""
+    problem = tried.problem(sizes(tried.effect)[1])
+    if not newton(problem, backwater(problem), 1e-8).converged[0]:
+        yield f"no steady flow is found with {tried.effect.amplitude.name} = {sizes(tried.effect)[1]:g}"
+
+
+Check = Callable[[Trial], Iterator[str]]
+CHECKS: tuple[Check, ...] = (_finite, _off_is_off, _acts, _never_pushes, _mirrors, _parts, _settles)
+
+
+def _alike(found: Array, wanted: Array) -> bool:
+    return bool(np.abs(found - wanted).max() <= 1e-9 * (1e-3 + np.abs(wanted).max()))
+
+
+def _name(state_of: Callable[[Problem], Array]) -> str:
+    return {"at_rest": "still", "moving": "moving", "dry": "no"}[state_of.__name__]
