@@ -292,6 +292,8 @@ def _written(
         scale=noise.scale,
         grid_error=float(np.sqrt(np.mean(noise.grid**2))),
         flagged=tuple(int(noise.rows[row]) for row in flagged),
+        threshold=float(np.sqrt(np.quantile(seen_first.maxima, 1.0 - ALARM))),
+        first_scores={one.name: _best_score(seen_first, j) for j, one in enumerate(seen_first.candidates)},
         first_parameters={name: _three(first, name)[0] for name in first.model.names},
         parameters=parameters,
         zones=misfit_zones(first.model, first.noise, first.fitted.point),
@@ -309,8 +311,12 @@ def _written(
 
 
 def _order(seen: Look) -> list[int]:
-    squares = [float(seen.scores[seen.best_column(j)] ** 2) for j in range(len(seen.candidates))]
+    squares = [_best_score(seen, j) ** 2 for j in range(len(seen.candidates))]
     return [int(j) for j in np.argsort(-np.array(squares))]
+
+
+def _best_score(seen: Look, candidate: int) -> float:
+    return float(seen.scores[seen.best_column(candidate)])
 
 
 def _at_stations(noise: Noise, stations: int) -> Array:

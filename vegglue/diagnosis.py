@@ -15,6 +15,8 @@ from vegglue.layout import Group, Variable, table_group
 Verdict = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
 # Sum over families of what the data may accuse without cause: listed effects and unlisted places.
 ALARM, ALARM_OF_PLACES = 0.04, 0.01
+# Fields that are lists or tables of plain values.
+LISTS = ("remarks", "flagged", "first_scores", "first_parameters", "parameters")
 # Fields that have one value for each station.
 AT_STATIONS = ("prediction_first", "prediction", "error")
 
@@ -72,7 +74,8 @@ class Where:
 class Diagnosis:
     """Everything a diagnosis found. chi2, freedom: of the last model, whitened; flagged: rows of stations that no
     effect explains and that stand alone; zones: misfit by experiment, section and zone; residual: (station,) of the
-    baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere at the last model.
+    baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere at the first model.
+    threshold, first_scores: score that errors alone reach once in 1 / ALARM, and those of the effects at the baseline.
     """
 
     name: str
@@ -90,6 +93,8 @@ class Diagnosis:
     scale: float
     grid_error: float
     flagged: tuple[int, ...]
+    threshold: float
+    first_scores: dict[str, float]
     first_parameters: dict[str, float]
     parameters: dict[str, tuple[float, float, float]]
     zones: pd.DataFrame
@@ -116,27 +121,25 @@ class Diagnosis:
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """One object with every number that is printed."""
-    table = diagnosis.zones.replace({np.nan: None}).to_dict("records")
-    return {
+    told = {
         "verdict": diagnosis.verdict,
         "sentence": diagnosis.sentence,
         "set": diagnosis.set,
         "groups": diagnosis.groups,
-        "where": _place(diagnosis.where),
-        "effects": [_plain(asdict(suspect)) for suspect in diagnosis.suspects],
-        "steps": [_plain(asdict(step)) for step in diagnosis.steps],
-        "remarks": list(diagnosis.remarks),
+        "where": None if diagnosis.where is None else asdict(diagnosis.where),
+        "effects": [asdict(suspect) for suspect in diagnosis.suspects],
+        "steps": [asdict(step) for step in diagnosis.steps],
+        "remarks": diagnosis.remarks,
         "chi2": {"first": diagnosis.chi2_first, "last": diagnosis.chi2, "freedom": diagnosis.freedom,
                  "p": diagnosis.p_misfit},
+        "threshold": diagnosis.threshold,
         "noise": {"correlation": diagnosis.correlation, "scale": diagnosis.scale, "grid_error": diagnosis.grid_error},
         "flagged": [_flagged(diagnosis, row) for row in diagnosis.flagged],
-        "parameters": {name: list(values) for name, values in diagnosis.parameters.items()},
-        "zones": table,
+        "parameters": diagnosis.parameters,
+        "first_parameters": diagnosis.first_parameters,
+        "zones": diagnosis.zones.to_dict("records"),
     }  # fmt: skip
-
-
-def _place(where: Where | None) -> dict[str, Any] | None:
-    return None if where is None else _plain(asdict(where))
+    return {name: _plain(value) for name, value in told.items()}
 
 
 def _flagged(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
@@ -179,17 +182,16 @@ def groups(diagnosis: Diagnosis) -> dict[str, Group]:
 def attributes(diagnosis: Diagnosis) -> dict[str, Any]:
     """For the attributes of the file: one number or word as it is, what is neither that nor an array as JSON."""
     return {name: getattr(diagnosis, name) for name in _plain_names()} | {
-        "remarks": json.dumps(diagnosis.remarks),
         "steps": json.dumps([asdict(step) for step in diagnosis.steps]),
         "where": json.dumps(None if diagnosis.where is None else asdict(diagnosis.where)),
-        "flagged": json.dumps(diagnosis.flagged),
-        "parameters": json.dumps(diagnosis.parameters),
+        **{name: json.dumps(getattr(diagnosis, name)) for name in LISTS},
     }
 
 
 def diagnosis_from(read: Mapping[str, Mapping[str, Any]], stated: Mapping[str, Any]) -> Diagnosis:
     """The diagnosis whose file has these groups and attributes."""
-    stations, places, told = read["stations"], read["places"], _told(stated)
+    stations, places = read["stations"], read["places"]
+    told = {name: json.loads(stated[name]) for name in ("steps", "where", *LISTS)}
     where = told["where"]
     return Diagnosis(
         **{name: kind(stated[name]) for name, kind in _plain_names().items()},
@@ -198,6 +200,8 @@ def diagnosis_from(read: Mapping[str, Mapping[str, Any]], stated: Mapping[str, A
         steps=tuple(_step_from(step) for step in told["steps"]),
         where=None if where is None else Where(**where | {"experiments": tuple(where["experiments"])}),
         flagged=tuple(told["flagged"]),
+        first_scores=told["first_scores"],
+        first_parameters=told["first_parameters"],
         parameters={name: tuple(values) for name, values in told["parameters"].items()},
         zones=_table_from(read["zones"], "zone_number"),
         station=_table_from(stations, "station", *AT_STATIONS),
@@ -216,10 +220,6 @@ def _plain_names() -> dict[str, type]:
     return {
         name: str if kind is Verdict else kind for name, kind in kinds.items() if kind in (str, int, float, Verdict)
     }
-
-
-def _told(stated: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: json.loads(stated[name]) for name in ("remarks", "steps", "where", "flagged", "parameters")}
 
 
 def _table_from(group: Mapping[str, Any], *others: str) -> pd.DataFrame:

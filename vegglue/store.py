@@ -16,6 +16,8 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
+from vegglue import diagnosis as diagnosed
+from vegglue.diagnosis import Diagnosis, diagnosis_from
 from vegglue.ensemble import ROWS, Ensemble, Header, ensemble_from, unsolved
 from vegglue.errors import InputError, StorageError
 from vegglue.fields import Fields, fields_from, fields_group
@@ -25,6 +27,7 @@ from vegglue.posterior import Posterior, attributes, groups, posterior_from
 from vegglue.unfinished import Unfinished, is_reserved, put, reserve, stored, unfinished_fields
 
 ENSEMBLE_FORMAT, FIELDS_FORMAT, POSTERIOR_FORMAT = "vegglue ensemble 1", "vegglue fields 1", "vegglue posterior 1"
+DIAGNOSIS_FORMAT = "vegglue diagnosis 1"
 
 Result = TypeVar("Result")
 
@@ -127,6 +130,17 @@ def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: 
 def read_posterior(path: Path, expected_hash: str | None = None) -> Posterior:
     """Read a posterior; errors as those of read_ensemble, for `vegglue infer CONFIG`."""
     return _read(path, expected_hash, "infer", posterior_from)
+
+
+def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: str) -> None:
+    """Write a diagnosis with the resolved config it was made under; errors as those of write_posterior."""
+    own = {"config": config, "config_hash": config_hash, "format": DIAGNOSIS_FORMAT}
+    _write_whole(path, diagnosed.groups(diagnosis), diagnosed.attributes(diagnosis) | own)
+
+
+def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
+    """Read a diagnosis; errors as those of read_ensemble, for `vegglue diagnose CONFIG`."""
+    return _read(path, expected_hash, "diagnose", diagnosis_from)
 
 
 def stored_hash(path: Path) -> str | None:
