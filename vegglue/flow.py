@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vegglue import kernels
+from vegglue import canopy, kernels
 from vegglue.acting import closures, push, stages_of, stand_values
 from vegglue.effect import Acting, Ground
 from vegglue.ground import rows
@@ -40,13 +40,17 @@ class Inflow:
 
 @dataclass(frozen=True)
 class Plants:
-    """Vegetated cells (column, row) and their Baptist values per cell and member: phi [-], h_d [m], C_b [m^1/2/s]."""
+    """Vegetated cells (column, row) and their values per cell and member: phi [-], h_d [m], C_b [m^1/2/s].
+
+    law: of each cell, an index into canopy.LAWS; Baptist's when empty.
+    """
 
     column: NDArray[np.int64]
     row: NDArray[np.int64]
     phi: Array
     canopy_height: Array
     bare_chezy: Array
+    law: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -163,6 +167,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         plants.phi[inside],
         plants.canopy_height[inside],
         plants.bare_chezy[inside],
+        plants.law[inside] if plants.law.size else plants.law,
     )
     inflows = tuple(
         _cropped(inflow, south, north) if inflow.side == "west" else inflow for inflow in problem.inflows
@@ -243,11 +248,13 @@ def drag(problem: Problem, depth: Array, plants: tuple[Array, Array] | None = No
 
 
 def _plant(problem: Problem, rate: Array, depth: Array, plants: tuple[Array, Array]) -> None:
-    kernels.plant_drag(
+    law = problem.plants.law
+    canopy.plant_drag(
         rate,
         depth,
         problem.plants.column,
         problem.plants.row,
+        law if law.size else np.zeros_like(problem.plants.row),
         *plants,
         problem.plants.bare_chezy,
         problem.phi_proportional,

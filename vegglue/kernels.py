@@ -144,20 +144,6 @@ def class_drag(depth, reach, friction_class, law, coefficient, log_argument_mini
 
 
 @compiled
-def plant_drag(drag, depth, column, row, phi, canopy, bare_chezy, proportional):
-    """Overwrite k on plant cells by Baptist's: C = (1/C_b^2 + phi/2g)^(-1/2) + [h > h_d] sqrt(g)/kappa ln(h/h_d)."""
-    m = depth.shape[2]
-    for p in range(column.size):
-        i, j = column[p], row[p]
-        for k in range(m):
-            h = depth[i, j, k]
-            share = min(h / canopy[p, k], 1.0) if proportional else 1.0
-            chezy = 1.0 / math.sqrt(1.0 / bare_chezy[p, k] ** 2 + share * phi[p, k] / (2.0 * GRAVITY))
-            chezy += math.sqrt(GRAVITY) / KARMAN * math.log(max(h / canopy[p, k], 1.0))
-            drag[i, j, k] = GRAVITY / (chezy * chezy * h)
-
-
-@compiled
 def _upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
     """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
     from_left = left + (right - left) / 3.0 + (left - far_left) / 6.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vegglue import kernels
+from vegglue import canopy, kernels
 from vegglue.effect import Array, Boundary, Ground
 from vegglue.flow import Inflow, Plants, Problem
 from vegglue.ground import ground_of
@@ -85,7 +85,8 @@ def _plants(case: Case, site: Site, setting: Experiment, theta: Theta, members: 
     for cell, patch in enumerate(patches):
         phi, height, chezy = values[patch.stand]
         fields[:, cell] = phi * patch.stems / case.plants.stands[patch.stand].stems, height, chezy
-    return Plants(column, row, fields[0], fields[1], fields[2])
+    law = [canopy.LAWS.index(case.plants.stands[patch.stand].law) for patch in patches]
+    return Plants(column, row, fields[0], fields[1], fields[2], np.array(law, dtype=np.int64))
 
 
 def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: int) -> tuple[Array, Array, Array]:

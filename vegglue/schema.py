@@ -133,6 +133,9 @@ class Stand(Part):
     canopy_height: Value = Field(description="height h_d of the deflected canopy [m]")
     bare_chezy: Value = Field(default=60.0, description="Chézy coefficient C_b of the bed under the plants [m^1/2/s]")
     stems: Positive = Field(default=1.0, description="density at which phi holds [1/m2]")
+    law: Literal["baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi"] = Field(
+        default="baptist", description="resistance law of the plants"
+    )
 
 
 class StandOverride(Part):
