@@ -127,8 +127,8 @@ def test_laws_stay_finite(law):
             found = [of_law(law, phi, top, depth) for phi in (1e-3, 0.5, 30.0, 5e3)]
             assert np.isfinite(found).all()
             assert min(found) > 0.0
-            # Two do, by their own formulas: yang-choi doubles its log term where plants become dense, and a dense canopy
-            # of klopstra far under water is a smoother bed for what runs above.
+            # Two do, by their own formulas: yang-choi doubles its log term where plants become dense, and to what runs
+            # above, a dense canopy of klopstra far under water is a smooth bed.
             assert law in ("yang-choi", "klopstra") or (np.diff(found) < 1e-9).all()
 
 
