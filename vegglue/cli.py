@@ -14,6 +14,7 @@ from rich.progress import Progress as Bar
 from vegglue import __version__
 from vegglue.channel_figure import save_channel_figure
 from vegglue.check import check_case
+from vegglue.cli_loop import COMMANDS
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.describe import describe
 from vegglue.errors import InputError, StorageError
@@ -115,6 +116,10 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs")) -
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     page = write_report(folder, case, observations, ensemble, posterior, flow, survey)
     console.print(f"Report: {page.resolve()}")
+
+
+for _name, _command in COMMANDS:
+    app.command(name=_name)(_command)
 
 
 def _read(config: Path, members: int | None = None) -> tuple[Case, Observations]:

@@ -28,8 +28,11 @@ NOT_SIMULATED = dict.fromkeys(
 Tree = dict[str, Any]
 
 
-def load_case(path: Path) -> Case:
-    """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do."""
+def load_case(path: Path, trust: bool = False) -> Case:
+    """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do.
+
+    trust: whether a Python file that the case names may be run.
+    """
     layers = _layers(path, ())
     tree: Tree = {}
     for _, layer in reversed(layers):
@@ -39,6 +42,11 @@ def load_case(path: Path) -> Case:
         case = Case.model_validate(tree)
     except ValidationError as error:
         raise _input_error(layers, first_refusal(tree, error.errors())) from None
+    if case.effect_file is not None and not trust:
+        raise InputError(
+            f"{_shown(path)}: `effect_file` names {_shown(case.effect_file)}, which runs as code: read it, and add "
+            "--trust if you trust it."
+        )
     refusal = disagreement(case)
     if refusal is not None:
         raise _input_error(layers, refusal)

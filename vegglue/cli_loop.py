@@ -1,0 +1,265 @@
+"""The shell of the loop: import, diagnose, extend, compare, next, run. What they do stands in `loop`."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+import yaml
+from rich.console import Console
+from rich.table import Table
+
+from vegglue.config import load_case
+from vegglue.design import SEPARATES, Worth
+from vegglue.diagnosis import Diagnosis, as_json
+from vegglue.errors import InputError
+from vegglue.intake import case_from_folder
+from vegglue.ladder import Rung, held_out, improvement
+from vegglue.loop import (
+    child_path,
+    diagnosed,
+    grow,
+    ladder,
+    named_candidates,
+    next_measurements,
+    write_child,
+)
+from vegglue.schema import Case
+
+# Into a file or a pipe, lines as long as they need to be.
+console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
+Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
+Jobs = Annotated[int, typer.Option(min=-1, help="Cores at once; -1 for all. Results do not depend on it.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
+Trust = Annotated[bool, typer.Option("--trust", help="Run the effects of the config's own `effect_file`.")]
+
+
+def import_command(
+    folder: Annotated[Path, typer.Argument(help="Folder with site.json, velocities.csv, levels.csv.")],
+    to: Annotated[
+        Path | None, typer.Option(help="Config to write; configs/<folder>.yaml or <folder>.yaml if not given.")
+    ] = None,
+) -> None:
+    """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand."""
+    target = to or _default_target(folder)
+    tree = case_from_folder(folder, target)
+    text = f"# Made by `vegglue import` from {folder.name}.\n" + yaml.safe_dump(
+        tree, sort_keys=False, allow_unicode=True
+    )
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}); give another file by --to.") from None
+    case = load_case(target)
+    console.print(
+        f"{target}: {len(case.experiments)} experiment(s), {len(case.plants.patches)} patches, "
+        f"{len(case.parameters)} parameters with wide priors. Next: vegglue run {target}"
+    )
+
+
+def diagnose_command(
+    config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), as_object: Json = False, trust: Trust = False
+) -> None:
+    """Say where the model fails, which effect is missing, and how sure that is."""
+    case = load_case(config, trust)
+    found = diagnosed(case, _folder(runs, case), jobs, _say(as_object))
+    if as_object:
+        print(json.dumps(as_json(found), ensure_ascii=False))
+        return
+    _tell(found)
+    console.print(f"Written to {_folder(runs, case) / 'diagnosis.h5'}; `vegglue report {config}` draws it.")
+
+
+def extend_command(
+    config: Config,
+    add: Annotated[
+        list[str] | None, typer.Option(help="Effect to add, e.g. streamlining or discharge_error[high].")
+    ] = None,
+    shape: Annotated[list[str] | None, typer.Option(help="Value of a shape of it, NAME=NUMBER.")] = None,
+    auto: Annotated[bool, typer.Option("--auto", help="Add what the diagnosis accepts, step by step.")] = False,
+    to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
+    jobs: Jobs = -1,
+    runs: Runs = Path("runs"),
+    trust: Trust = False,
+) -> None:
+    """Write a child config that extends its parent by one effect or more."""
+    case = load_case(config, trust)
+    if auto == bool(add):
+        raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
+    if auto:
+        grown = grow(case, runs, jobs, _say())
+        _show_ladder(grown.rungs)
+        console.print(grown.reason)
+        console.print(f"Last config: {grown.paths[-1]}")
+        return
+    added = named_candidates(case, add or [], dict(_number(text) for text in shape or []))
+    target = to or child_path(config, [one for one, _ in added])
+    child = write_child(case, target, added)
+    console.print(f"{target}: {child.name}. Next: vegglue run {target}, or vegglue compare {config} {target}")
+
+
+def compare_command(
+    configs: Annotated[list[Path], typer.Argument(help="Cases, the baseline first.", show_default=False)],
+    runs: Runs = Path("runs"),
+    as_object: Json = False,
+    trust: Trust = False,
+) -> None:
+    """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
+    rungs = ladder([load_case(config, trust) for config in configs], runs, _say(as_object))
+    if as_object:
+        print(json.dumps({"rungs": [_rung_json(one) for one in rungs]}, ensure_ascii=False))
+        return
+    _show_ladder(rungs)
+
+
+def next_command(
+    config: Config,
+    between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,
+    jobs: Jobs = -1,
+    runs: Runs = Path("runs"),
+    as_object: Json = False,
+    trust: Trust = False,
+) -> None:
+    """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
+    case = load_case(config, trust)
+    what, found = next_measurements(case, _folder(runs, case), jobs, _say(as_object), between or [])
+    if as_object:
+        print(
+            json.dumps({"tells_apart": what, "measurements": [_worth_json(one) for one in found]}, ensure_ascii=False)
+        )
+        return
+    _show_next(what, found)
+
+
+def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
+    """The whole loop: diagnose, add what is missing, watch the error fall, say what to measure next."""
+    case = load_case(config, trust)
+    folder = _folder(runs, case)
+    _tell(diagnosed(case, folder, jobs, _say()))
+    grown = grow(case, runs, jobs, _say())
+    _show_ladder(grown.rungs)
+    what, found = next_measurements(case, folder, jobs, _say(), [])
+    _show_next(what, found)
+    console.print(f"Last config: {grown.paths[-1]}")
+
+
+COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
+    ("import", import_command),
+    ("diagnose", diagnose_command),
+    ("extend", extend_command),
+    ("compare", compare_command),
+    ("next", next_command),
+    ("run", run_command),
+)
+
+
+def _default_target(folder: Path) -> Path:
+    name = f"{folder.resolve().name}.yaml"
+    return Path("configs") / name if Path("configs").is_dir() else Path(name)
+
+
+def _folder(runs: Path, case: Case) -> Path:
+    folder = runs / case.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _say(quiet: bool = False) -> Callable[[str], None]:
+    def say(text: str) -> None:
+        if not quiet:
+            console.print(f"[dim]... {text}[/dim]")
+
+    return say
+
+
+def _number(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise InputError(f"--shape: expected NAME=NUMBER, got {text!r}; e.g. --shape width=0.5.") from None
+
+
+def _tell(found: Diagnosis) -> None:
+    console.print(f"[bold]{found.verdict}[/bold]: {found.sentence}")
+    for remark in found.remarks:
+        console.print(f"- {remark}")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("effect", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"):
+        table.add_column(heading, justify="left" if heading == "effect" else "right")
+    for one in found.suspects[:10]:
+        mark = "* " if one.name in found.set else "  "
+        low, high = one.interval95
+        chance = f"< {one.p_family:.1g}" if one.p_family < 5e-4 else f"{one.p_family:.2g}"
+        unit = one.unit.removesuffix("-")
+        table.add_row(
+            mark + one.name, f"{one.amplitude:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{one.score:+.1f}",
+            chance, f"{one.visibility:.2f}", f"{one.smallest_detectable:.2g}",
+        )  # fmt: skip
+    console.print(table)
+    if found.flagged:
+        for row in found.flagged:
+            station = found.station.iloc[row]
+            place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
+            console.print(f"- set aside: {place}, measured {station['value']:g}")
+
+
+def _show_ladder(rungs: Sequence[Rung]) -> None:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    headings = ("model", "parameters", "RMSE", "levels", "chi2 / n", "held out (section)", "fell by", "held out (exp.)",
+                "log score", "in 50 %", "in 95 %", "validation")  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "model" else "right")
+    for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
+        gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
+        table.add_row(
+            one.name, str(one.parameters), f"{one.rmse['velocity']:.4f}", f"{one.rmse['level']:.4f}",
+            f"{one.chi2:.0f} / {one.stations}", f"{held_out(one):.4f}", gain, f"{held_out(one, 'experiments'):.4f}",
+            f"{one.log_score:.2f}", f"{one.inside50:.0%}", f"{one.inside95:.0%}", f"{one.validation:.4f}",
+        )  # fmt: skip
+    console.print(table)
+    if rungs:
+        console.print(
+            f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
+            f"{rungs[-1].noise_floor:.4f} m/s."
+        )
+    for one in rungs:
+        moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < 0.01]
+        if moving:
+            console.print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
+
+
+def _show_next(what: str, found: Sequence[Worth]) -> None:
+    if not found:
+        console.print("Nothing is left to be told apart; no further measurement is proposed.")
+        return
+    useful = [one for one in found if one.then >= SEPARATES and one.then > 1.1 * one.now]
+    if not useful:
+        console.print(f"To tell {what}: none of {len(found)} measurements would (D2 now {found[0].now:.2g}).")
+        return
+    console.print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
+    for one in useful[:6]:
+        plan = one.plan
+        console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
+
+
+def _rung_json(one: Rung) -> dict[str, Any]:
+    tree = {name: value for name, value in asdict(one).items() if not isinstance(value, np.ndarray) and name != "place"}
+    tree["held_out_sections"], tree["held_out_experiments"] = held_out(one), held_out(one, "experiments")
+    return {
+        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
+    }
+
+
+def _worth_json(one: Worth) -> dict[str, Any]:
+    plan = one.plan
+    return {
+        "name": plan.name, "experiment": plan.experiment, "x": plan.x, "stations": int(plan.rows.size),
+        "hours": plan.hours, "now": one.now, "then": one.then, "gain_per_hour": one.per_hour,
+    }  # fmt: skip

@@ -1,0 +1,233 @@
+"""The loop in files: calibrated places, diagnoses and child configs beside the results they belong to."""
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from vegglue.baseline import Baseline, baseline
+from vegglue.candidates import Candidate, start_of
+from vegglue.config import case_hash, load_case, resolved_yaml
+from vegglue.design import Rival, Worth, worth_of_measurements
+from vegglue.diagnose import SEEN, diagnose
+from vegglue.diagnosis import Diagnosis, Suspect
+from vegglue.effect import Array
+from vegglue.errors import InputError, StorageError
+from vegglue.extend import candidate_named, child_tree
+from vegglue.ladder import Rung, improvement, rung
+from vegglue.linearise import Model, model_of, theta_at, z_at
+from vegglue.observations import read_observations
+from vegglue.schema import Case
+from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
+
+# An effect whose amplitude lies closer to off than this, in standard errors, is no longer needed.
+NEEDED = 2.0
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Grown:
+    """How a case was extended: its configs from the first to the last, their rungs, and why it ended."""
+
+    paths: tuple[Path, ...]
+    rungs: tuple[Rung, ...]
+    reason: str
+
+
+def model_in(case: Case) -> Model:
+    return model_of(case, read_observations(case))
+
+
+def validation_of(case: Case) -> Model | None:
+    """The case at the measurements that no calibration sees, if it names any."""
+    if case.validation is None:
+        return None
+    seen = {"experiments": case.validation.experiments, "observations": case.validation.observations}
+    return model_in(case.model_copy(update=seen))
+
+
+def known_place(case: Case, folder: Path) -> Array | None:
+    """The best place that an earlier command found for exactly this case, z (p,)."""
+    wanted = case_hash(case)
+    try:
+        found = json.loads((folder / "best.json").read_text(encoding="utf-8"))
+        if found["config_hash"] == wanted:
+            return z_at(case, {name: np.array([found["theta"][name]]) for name in case.parameters})[0]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    if stored_hash(folder / "posterior.h5") != wanted:
+        return None
+    posterior = read_posterior(folder / "posterior.h5", wanted)
+    best = slice(posterior.best, posterior.best + 1)
+    return z_at(case, {name: values[best] for name, values in posterior.theta.items()})[0]
+
+
+def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None:
+    """Keep the best place for the next command. Errors: StorageError."""
+    text = json.dumps({"config_hash": case_hash(case), "theta": {name: float(theta[name]) for name in case.parameters}})
+    _write(folder / "best.json", text)
+
+
+def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
+    """The diagnosis of a case: the one in its folder when it fits, else a new one, which is kept there."""
+    path, wanted = folder / "diagnosis.h5", case_hash(case)
+    if stored_hash(path) == wanted:
+        return read_diagnosis(path, wanted)
+    found = diagnose(model_in(case), known_place(case, folder), jobs, say)
+    write_diagnosis(path, found, resolved_yaml(case), wanted)
+    remember_place(case, folder, found.first_parameters)
+    return found
+
+
+def calibrated(case: Case, folder: Path) -> Baseline:
+    """The case at its best place, which is kept for the next command."""
+    base = baseline(model_in(case), known_place(case, folder))
+    remember_place(case, folder, _theta(base))
+    return base
+
+
+def write_child(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:
+    """Write the config that extends `parent`, and read it back as any other."""
+    tree = child_tree(parent, target, added)
+    names = ", ".join(candidate.name for candidate, _ in added)
+    text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
+    _write(target, text + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True))
+    return load_case(target)
+
+
+def child_path(parent: Path, added: Sequence[Candidate]) -> Path:
+    return parent.with_name("+".join([parent.stem, *(candidate.key for candidate in added)]) + parent.suffix)
+
+
+def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, float]) -> list[tuple[Candidate, Any]]:
+    """Candidates by name, each with those of the shapes that it has; InputError for a shape that none has."""
+    station = read_observations(case).table
+    added = []
+    for name in names:
+        candidate = candidate_named(case, station, name)
+        own = {shape.name for shape in candidate.effect.shapes}
+        added.append((candidate, {key: value for key, value in shapes.items() if key in own}))
+    stray = set(shapes) - {key for _, given in added for key in given}
+    if stray:
+        raise InputError(f"--shape: `{min(stray)}` is no shape of {', '.join(names)}; see `vegglue effects NAME`.")
+    return added
+
+
+def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
+    """Add what the diagnosis accepts, one effect after the other, while errors of held-out measurements fall."""
+    found = diagnosed(case, runs / case.name, jobs, say)
+    paths, rungs = [case.source], [_rung(case, runs / case.name)]
+    parent, added = case, []
+    for step in found.steps:
+        suspect = next(one for one in found.suspects if one.name == step.accepted)
+        added.append((candidate_named(case, found.station, step.accepted), suspect.shapes))
+        say(f"adding {step.accepted}")
+        child = write_child(case, child_path(case.source, [one for one, _ in added]), added)
+        _start_child(child, runs / child.name, found, added)
+        next_rung = _rung(child, runs / child.name)
+        gain, _ = improvement(rungs[-1], next_rung)
+        if not gain > 0:
+            child.source.unlink()
+            return Grown(tuple(paths), tuple(rungs), f"{step.accepted} was not kept: held-out errors did not fall")
+        paths.append(child.source)
+        rungs.append(next_rung)
+        parent = child
+    unneeded = [name for name in parent.effects if not _needed(parent, rungs[-1], name)]
+    reason = found.sentence
+    if unneeded:
+        reason += f" No longer needed: {', '.join(unneeded)}."
+    return Grown(tuple(paths), tuple(rungs), reason)
+
+
+def _start_child(
+    child: Case, folder: Path, found: Diagnosis, added: Sequence[tuple[Candidate, Mapping[str, float]]]
+) -> None:
+    """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    theta = {name: values[0] for name, values in found.parameters.items() if name in child.parameters}
+    for one, _ in added:
+        theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.scale))
+    remember_place(child, folder, theta)
+
+
+def _needed(case: Case, rung: Rung, name: str) -> bool:
+    parameter = next(iter(value for value in case.effects[name].values.values() if isinstance(value, str)), None)
+    if parameter is None:
+        return True
+    middle, low, high = rung.values[parameter]
+    off = float(case.parameters[parameter].mean or 0.0)
+    return abs(middle - off) > NEEDED * (high - low) / 3.92
+
+
+def ladder(cases: Sequence[Case], runs: Path, say: Say) -> list[Rung]:
+    """One rung for each case, in their order."""
+    rungs = []
+    for case in cases:
+        say(f"calibrating {case.name}")
+        rungs.append(_rung(case, runs / case.name))
+    return rungs
+
+
+def _rung(case: Case, folder: Path) -> Rung:
+    folder.mkdir(parents=True, exist_ok=True)
+    return rung(calibrated(case, folder), validation_of(case))
+
+
+def next_measurements(case: Case, folder: Path, jobs: int, say: Say, between: Sequence[str]) -> tuple[str, list[Worth]]:
+    """What is to be told apart, in words, and the measurements that could, the best first.
+
+    between: names of effects, else those that the diagnosis could not tell apart, else those it could not test.
+    """
+    found = diagnosed(case, folder, jobs, say)
+    by_name = {one.name: one for one in found.suspects}
+    unknown = [name for name in between if name not in by_name]
+    if unknown:
+        raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
+    rivals = list(between) or (list(found.steps[-1].rivals) if found.steps else [])
+    base = calibrated(case, folder)
+    if len(rivals) > 1 or between:
+        what = f"{' from '.join(rivals)}" if len(rivals) > 1 else f"{rivals[0]} from nothing"
+        return what, worth_of_measurements(base.model, base.noise, base.fitted.point.z, _rivals(case, found, rivals))
+    hidden = [one for one in found.suspects if not one.testable]
+    if found.steps or not hidden:
+        return "", []
+    # What calibration hides best, of all that would leave a trace without it.
+    target = max(hidden, key=lambda one: _raw_trace(case, found, one))
+    what = f"{target.name} from {target.mimicked_by}"
+    plausible = _rivals(case, found, [target.name], plausible=True)
+    return what, worth_of_measurements(base.model, base.noise, base.fitted.point.z, plausible)
+
+
+def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
+    """Length of the trace of a plausible amplitude before projection, in standard errors."""
+    amplitude = candidate_named(case, found.station, suspect.name).effect.amplitude
+    sizes = (amplitude.scale / suspect.smallest_detectable) ** amplitude.power
+    return SEEN * sizes / max(suspect.visibility, 1e-6)
+
+
+def _rivals(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
+    rivals: list[Rival] = []
+    for suspect in (one for one in found.suspects if one.name in names):
+        candidate = candidate_named(case, found.station, suspect.name)
+        amplitude = candidate.effect.amplitude
+        above = amplitude.scale if plausible else suspect.amplitude - amplitude.off
+        rivals.append((candidate, suspect.shapes, float(np.sign(above) * np.abs(above) ** amplitude.power)))
+    return rivals
+
+
+def _theta(base: Baseline) -> dict[str, float]:
+    return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}
+
+
+def _write(path: Path, text: str) -> None:
+    new = path.with_name(path.name + ".new")
+    try:
+        new.write_text(text, encoding="utf-8")
+        os.replace(new, path)
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written ({error}); make room and run it again.") from error
