@@ -88,14 +88,37 @@ def pareto_shape(weights: Floats) -> float:
     https://doi.org/10.1198/tech.2009.08017.
     """
     ordered = np.sort(weights / np.max(weights))
-    tail = int(np.ceil(min(len(ordered) / 5, 3 * np.sqrt(len(ordered)))))
+    tail = _tail(len(ordered))
     excess = ordered[-tail:] - ordered[-tail - 1]
     excess = excess[excess > 0]
-    return _generalised_pareto_shape(excess) if len(excess) >= 5 else float("nan")
+    return _generalised_pareto(excess)[0] if len(excess) >= 5 else float("nan")
 
 
-def _generalised_pareto_shape(excess: Floats) -> float:
-    """Posterior mean of k over a grid of b = -k/scale, with a weak prior of k = 0.5 worth 10 observations."""
+def pareto_smoothed(log_weights: Floats) -> tuple[Floats, float]:
+    """Weights (m,) to a sum of one whose largest are replaced by quantiles of the distribution fitted to them; k-hat.
+
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. Few distinct ones are left as they are, k-hat NaN.
+    """
+    weights = np.exp(log_weights - np.max(log_weights))
+    order = np.argsort(weights, kind="stable")
+    tail = order[-_tail(len(weights)) :]
+    cut = weights[order[-len(tail) - 1]]
+    excess = weights[tail] - cut
+    if np.sum(excess > 0) < 5:
+        return weights / weights.sum(), float("nan")
+    k, scale = _generalised_pareto(excess[excess > 0])
+    level = (np.arange(len(tail)) + 0.5) / len(tail)
+    grown = -scale * np.log1p(-level) if abs(k) < 1e-9 else scale * np.expm1(-k * np.log1p(-level)) / k
+    weights[tail] = np.minimum(cut + grown, 1.0)
+    return weights / weights.sum(), k
+
+
+def _tail(count: int) -> int:
+    return int(np.ceil(min(count / 5, 3 * np.sqrt(count))))
+
+
+def _generalised_pareto(excess: Floats) -> tuple[float, float]:
+    """Shape k and scale: posterior mean over a grid of b = -k/scale; k has a weak prior of 0.5 worth 10 values."""
     count = len(excess)
     grid = 30 + int(np.sqrt(count))
     quartile = excess[int(count / 4 + 0.5) - 1]
@@ -104,4 +127,5 @@ def _generalised_pareto_shape(excess: Floats) -> float:
     profile = count * (np.log(-b / k) - k - 1)
     share = np.exp(profile - profile.max())
     best = (b * share).sum() / share.sum()
-    return float((np.log1p(-best * excess).mean() * count + 0.5 * 10) / (count + 10))
+    shape = float(np.log1p(-best * excess).mean())
+    return (shape * count + 0.5 * 10) / (count + 10), float(-shape / best)
