@@ -16,11 +16,15 @@ HOMES = {
     "h5py": {"store"},
     "jinja2": {"report"},
     "joblib": {"simulate"},
-    "matplotlib": {"channel_figure", "figure_plan", "figure_posterior", "figure_style", "figures", "reported"},
+    "matplotlib": {
+        "channel_figure", "diagnosis_pictures", "figure_ladder", "figure_misfit", "figure_plan", "figure_posterior",
+        "figure_style", "figure_suspects", "figures", "reported",
+    },
     "numba": {"blocks", "kernels", "sweeps"},
     "pandas": {
         "adv", "contract", "ensemble", "infer", "layout", "likelihood", "observations", "posterior", "sensor", "table",
         "figures", "flow_pictures", "measured_pictures", "report_tables",
+        "diagnosis_pictures", "figure_misfit", "figure_suspects",
     },
     "pydantic": {"config", "schema"},
     "rich": {"cli"},

@@ -1,0 +1,154 @@
+"""What the report says of a diagnosis: standing of each effect, tables, key numbers (HTML)."""
+
+import html
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.diagnosis import Diagnosis, Suspect
+from vegglue.effect import Array
+from vegglue.summary import KeyNumber
+from vegglue.typography import NARROW, fixed, interval, short, unit_html
+
+# Effects in the table that is open; the others stand below it, folded.
+SHOWN = 8
+# Cosine above which an effect is said to look like a change of a parameter.
+LOOKS_LIKE = 0.8
+
+
+@dataclass(frozen=True)
+class SuspectRow:
+    """One effect in the table of a report (HTML)."""
+
+    name: str
+    title: str
+    standing: str
+    amplitude: str
+    interval: str
+    chance: str
+    score: str
+    visibility: str
+    detectable: str
+    looks_like: str
+
+
+@dataclass(frozen=True)
+class FlaggedRow:
+    """A station that was set aside (text)."""
+
+    experiment: str
+    section: str
+    x: str
+    y: str
+    measured: str
+    predicted: str
+    score: str
+
+
+def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:
+    """'accepted', 'rival' (not rejected beside an accepted one), 'rejected', 'no sign' or 'untestable'."""
+    if suspect.name in [step.accepted for step in diagnosis.steps]:
+        return "accepted"
+    if suspect.name in diagnosis.set:
+        return "rival"
+    if not suspect.testable:
+        return "untestable"
+    return "rejected" if abs(first_score(diagnosis, suspect)) > diagnosis.threshold else "no sign"
+
+
+def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
+    """Its score before anything was added [standard errors]."""
+    return diagnosis.first_scores.get(suspect.name, suspect.score)
+
+
+def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
+    """Its score at the last look, NaN where that was the first or it was refitted instead."""
+    return float("nan") if suspect.refitted or not diagnosis.steps else suspect.score
+
+
+def ranked(diagnosis: Diagnosis) -> list[Suspect]:
+    """Accepted, then rivals, then the others, each by its first score; those nobody could see last."""
+    order = ("accepted", "rival", "rejected", "no sign", "untestable")
+    return sorted(
+        diagnosis.suspects,
+        key=lambda one: (order.index(standing(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
+    )
+
+
+def added(diagnosis: Diagnosis) -> str:
+    """The accepted effects in words, '' for none."""
+    return " and ".join(step.accepted for step in diagnosis.steps)
+
+
+def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = "velocity") -> float:
+    """Root mean square of measured minus predicted over the stations that count [m/s or m], NaN without any."""
+    station = diagnosis.station
+    counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
+    counted[list(diagnosis.flagged)] = False
+    left = (station["value"].to_numpy(float) - prediction)[counted]
+    return float(np.sqrt(np.mean(left**2))) if left.size else float("nan")
+
+
+def suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:
+    """The effects worth reading first, and all others."""
+    rows = [_row(diagnosis, suspect) for suspect in ranked(diagnosis)]
+    shown = max(SHOWN, len(diagnosis.set))
+    return rows[:shown], rows[shown:]
+
+
+def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
+    unit = unit_html(suspect.unit)
+    unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
+    alike = abs(suspect.likeness) > LOOKS_LIKE and suspect.mimicked_by in diagnosis.first_parameters
+    return SuspectRow(
+        name=html.escape(suspect.name),
+        title=html.escape(suspect.title),
+        standing=standing(diagnosis, suspect),
+        amplitude=short(suspect.amplitude, 3) + unit,
+        interval=interval(*suspect.interval95),
+        chance=chance(suspect.p_family),
+        score=fixed(first_score(diagnosis, suspect), 1),
+        visibility=fixed(suspect.visibility, 2),
+        detectable=short(suspect.smallest_detectable, 2) + unit,
+        looks_like=html.escape(suspect.mimicked_by) if alike else "",
+    )
+
+
+def chance(p: float) -> str:
+    """A p-value, never more precise than a bootstrap of some thousands is."""
+    return f"<{NARROW}0.001" if p < 0.001 else short(p, 2)
+
+
+def flagged_rows(diagnosis: Diagnosis) -> list[FlaggedRow]:
+    """Stations that stand alone against every effect."""
+    return [_flagged(diagnosis, row) for row in diagnosis.flagged]
+
+
+def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
+    station, predicted = diagnosis.station.iloc[row], float(diagnosis.prediction[row])
+    value = float(station["value"])
+    return FlaggedRow(
+        experiment=str(station["experiment"]),
+        section=str(station["section"]) or "gauge",
+        x=f"{station['x']:g}",
+        y=f"{station['y']:g}",
+        measured=fixed(value, 3),
+        predicted=fixed(predicted, 3),
+        score=fixed((value - predicted) / float(station["standard_error"]), 1),
+    )
+
+
+def diagnosis_numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
+    """How much the misfit fell, and what the errors were taken to be."""
+    before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
+    fell = bool(diagnosis.steps)
+    arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
+    misfit = f"{diagnosis.chi2_first:,.0f} → {diagnosis.chi2:,.0f}" if fell else f"{diagnosis.chi2:,.0f}"
+    apart = len(diagnosis.suspects) - sum(one.testable for one in diagnosis.suspects)
+    return [
+        KeyNumber("chi², correlated errors", misfit, f"for {diagnosis.freedom} degrees of freedom"),
+        KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
+        KeyNumber("effects tried", f"{len(diagnosis.suspects)}", f"{apart} of them untestable with these data"),
+        KeyNumber("correlation of neighbours", fixed(diagnosis.correlation, 2), "of the errors along a section"),
+        KeyNumber("error of the grid", f"{short(1000 * diagnosis.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
+    ]
