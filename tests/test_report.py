@@ -66,11 +66,13 @@ def a_run(folder: Path, case: Case, observations: Observations, truth: dict[str,
     posterior = glue(ensemble, case, observations)
     cylinder = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     flow = {experiment: a_flow(site) for experiment in case.experiments}
-    return Run(folder, case, site, observations, ensemble, posterior, flow, cylinder)
+    return Run(folder, case, site, observations, ensemble, posterior, flow, cylinder, None)
 
 
 def written(run: Run) -> str:
-    path = write_report(run.folder, run.case, run.observations, run.ensemble, run.posterior, run.flow, run.cylinder)
+    path = write_report(
+        run.folder, run.case, run.observations, run.ensemble, run.posterior, run.flow, run.cylinder, run.diagnosis
+    )
     assert path == run.folder / "report.html"
     return path.read_text(encoding="utf-8")
 

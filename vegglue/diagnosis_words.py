@@ -45,6 +45,25 @@ class FlaggedRow:
     score: str
 
 
+@dataclass(frozen=True)
+class Told:
+    """The part of a report that is about a diagnosis, but for its figures (sentences as text)."""
+
+    sentence: str
+    remarks: tuple[str, ...]
+    numbers: list[KeyNumber]
+    suspects: list[SuspectRow]
+    others: list[SuspectRow]
+    flagged: list[FlaggedRow]
+
+
+def told(diagnosis: Diagnosis) -> Told:
+    """Everything the report says of a diagnosis."""
+    first, others = _suspect_rows(diagnosis)
+    flagged = [_flagged(diagnosis, row) for row in diagnosis.flagged]
+    return Told(diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, flagged)
+
+
 def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:
     """'accepted', 'rival' (not rejected beside an accepted one), 'rejected', 'no sign' or 'untestable'."""
     if suspect.name in [step.accepted for step in diagnosis.steps]:
@@ -89,7 +108,7 @@ def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = "velocity") ->
     return float(np.sqrt(np.mean(left**2))) if left.size else float("nan")
 
 
-def suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:
+def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:
     """The effects worth reading first, and all others."""
     rows = [_row(diagnosis, suspect) for suspect in ranked(diagnosis)]
     shown = max(SHOWN, len(diagnosis.set))
@@ -116,12 +135,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
 
 def chance(p: float) -> str:
     """A p-value, never more precise than a bootstrap of some thousands is."""
-    return f"<{NARROW}0.001" if p < 0.001 else short(p, 2)
-
-
-def flagged_rows(diagnosis: Diagnosis) -> list[FlaggedRow]:
-    """Stations that stand alone against every effect."""
-    return [_flagged(diagnosis, row) for row in diagnosis.flagged]
+    return f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
 
 
 def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
@@ -138,7 +152,7 @@ def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
     )
 
 
-def diagnosis_numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
+def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     """How much the misfit fell, and what the errors were taken to be."""
     before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
     fell = bool(diagnosis.steps)

@@ -6,6 +6,9 @@ from pathlib import Path
 import jinja2
 
 from vegglue.config import resolved_yaml
+from vegglue.diagnosis import Diagnosis
+from vegglue.diagnosis_pictures import diagnosis_pictures
+from vegglue.diagnosis_words import told
 from vegglue.ensemble import Ensemble
 from vegglue.errors import StorageError
 from vegglue.figure_style import palette_css
@@ -30,14 +33,15 @@ def write_report(
     posterior: Posterior,
     flow: dict[str, FlowFields],
     survey: RigidCylinder | None,
+    diagnosis: Diagnosis | None,
 ) -> Path:
     """Write run/report.html and run/figures/*.svg and *.png; returns the page.
 
     flow: the member of the median parameters, by experiment; what is not given is left out of the page.
-    survey: the rigid-cylinder estimate of plant drag, where there is one.
+    survey: the rigid-cylinder estimate of plant drag, where there is one; diagnosis: of this very case, if any.
     Errors: StorageError when a file cannot be written.
     """
-    everything = Run(run, case, build_site(case), observations, ensemble, posterior, flow, survey)
+    everything = Run(run, case, build_site(case), observations, ensemble, posterior, flow, survey, diagnosis)
     path = run / "report.html"
     try:
         page = render(everything)
@@ -63,6 +67,8 @@ def render(run: Run) -> str:
             verdict=verdict(run.case, run.posterior),
             numbers=key_numbers(run.case, run.posterior),
             findings=findings(run),
+            missing=None if run.diagnosis is None else told(run.diagnosis),
+            missing_pictures={} if run.diagnosis is None else diagnosis_pictures(run, run.diagnosis),
             parameters=parameter_rows(run),
             others=other_rows(run),
             pictures=pictures(run),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from vegglue.diagnosis import Diagnosis
 from vegglue.ensemble import Ensemble
 from vegglue.figure_style import Picture, publish
 from vegglue.flow import FlowFields, Plants
@@ -22,7 +23,8 @@ SYNTHETIC = "synthetic record"  # stamped on every figure of one
 
 @dataclass(frozen=True)
 class Run:
-    """Everything a report may show. flow: the flow of the median parameters, by experiment; cylinder: if surveyed."""
+    """Everything a report may show. flow: the flow of the median parameters, by experiment; cylinder: if surveyed;
+    diagnosis: if there is one of this case."""
 
     folder: Path
     case: Case
@@ -32,6 +34,7 @@ class Run:
     posterior: Posterior
     flow: dict[str, FlowFields]
     cylinder: RigidCylinder | None
+    diagnosis: Diagnosis | None
 
 
 def is_synthetic(case: Case) -> bool:
