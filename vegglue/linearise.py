@@ -14,7 +14,7 @@ from scipy.special import ndtr, ndtri
 from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
 from vegglue.flow import Problem, crop, residual
-from vegglue.neighbourhood import settled, widen
+from vegglue.neighbourhood import overflows, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
 from vegglue.problem import build_problem
@@ -112,9 +112,10 @@ def _few_near(model: Model, point: Point, z: Array) -> Array:
         rows = _rows(model, experiment)
         problem = problem_at(model, experiment, z)
         start = flow.state + flow.slopes @ (z - point.z).T
-        solution = chord(crop(problem, *flow.band), start, flow.factors, model.case.numerics.tolerance)
+        part = crop(problem, *flow.band)
+        solution = chord(part, start, flow.factors, model.case.numerics.tolerance)
         found[:, rows] = _read(model, experiment, problem, solution.state, flow.band)
-        found[~solution.converged] = np.nan
+        found[~solution.converged | overflows(part, solution.state, flow.band, problem.shape[1])] = np.nan
     return found
 
 

@@ -188,7 +188,7 @@ def _checked(
 ) -> Attempt:
     """Solved again in a wider band if water came to stand at the edge of this one."""
     part = crop(problem, *band)
-    if not (solution.converged[0] and _overflows(part, solution.state, band, problem.shape[1])[0]):
+    if not (solution.converged[0] and overflows(part, solution.state, band, problem.shape[1])[0]):
         return solution, shared, band
     wider = widen(solution.state, problem.shape[1], band)
     band = _band(problem, wider)
@@ -240,7 +240,7 @@ def _chord_in_band(problem: Problem, start: Array, lead: _Lead, tolerance: float
     assert lead.factors is not None
     part = crop(problem, *lead.band)
     solution = chord(part, inside(start, lead.band), lead.factors, tolerance)
-    overflowing = _overflows(part, solution.state, lead.band, problem.shape[1])
+    overflowing = overflows(part, solution.state, lead.band, problem.shape[1])
     return replace(solution, converged=solution.converged & ~overflowing)
 
 
@@ -256,8 +256,8 @@ def _band(problem: Problem, start: Array) -> tuple[int, int]:
     return south, north
 
 
-def _overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np.ndarray:
-    """Whether water stands in an outermost row of the band, where a wall is that the problem does not have."""
+def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np.ndarray:
+    """Whether water stands in an outermost row of the band, where a wall is that the problem does not have (m,)."""
     above = state[:, LEVEL] - part.bed[:, :, None]
     south = (above[:, 0].max(axis=0) > 0.0) & (band[0] > 0)
     north = (above[:, -1].max(axis=0) > 0.0) & (band[1] < ny)
