@@ -27,10 +27,10 @@ HOMES = {
         "diagnosis_pictures", "figure_misfit", "figure_suspects",
     },
     "pydantic": {"config", "schema"},
-    "rich": {"cli"},
+    "rich": {"cli", "cli_effects", "cli_loop"},
     "scipy": {"figures", "prior", "statistics", "terrain"},
     "threadpoolctl": {"simulate"},
-    "typer": {"cli"},
+    "typer": {"cli", "cli_effects", "cli_loop"},
     "yaml": {"config"},
 }  # fmt: skip
 DISTRIBUTIONS = {"yaml": "pyyaml"}

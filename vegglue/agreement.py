@@ -4,6 +4,8 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from vegglue.effect import Amplitude, Shape
+from vegglue.effects import library
 from vegglue.prior import quantile
 from vegglue.refusal import Place, Refusal, dotted, nearest
 from vegglue.schema import Case, Inflow, Interval, Stand, StandOverride, Value
@@ -16,7 +18,7 @@ LEAST_PROBABILITY = 1e-6
 
 def disagreement(case: Case) -> Refusal | None:
     """The first thing in a case that does not agree with the rest of it."""
-    checks = (_names, _values, _parameters, _sides, _files, _likelihood)
+    checks = (_names, _files, _effects, _values, _parameters, _sides, _likelihood)
     return next((refusal for check in checks for refusal in check(case)), None)
 
 
@@ -87,6 +89,45 @@ def _values(case: Case) -> Iterator[Refusal]:
                 yield Refusal(("parameters", value), complaint)
         elif value is not None and positive and value <= 0:
             yield Refusal(place, f"expected a number above 0, got {value:g}")
+
+
+def _effects(case: Case) -> Iterator[Refusal]:
+    """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
+    known = library(case.effect_file)
+    for key, working in case.effects.items():
+        place: Place = ("effects", key)
+        name = working.effect or key
+        yield from _unknown(place if working.effect is None else (*place, "effect"), name, known, "effect")
+        effect = known[name]
+        parameters = {parameter.name: parameter for parameter in effect.parameters}
+        for word, value in working.values.items():
+            yield from _unknown_word((*place, "values", word), word, parameters)
+            yield from _in_support(case, (*place, "values", word), value, parameters[word])
+        if effect.amplitude.name not in working.values:
+            complaint = f"says nothing about `{effect.amplitude.name}`, without which {name} is off: add it"
+            yield Refusal((*place, "values"), complaint)
+        if effect.stage != "sensor" and (working.sections or working.devices):
+            yield Refusal(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
+
+
+def _unknown_word(place: Place, word: str, known: Iterable[str]) -> Iterator[Refusal]:
+    names = list(known)
+    if word not in names:
+        yield Refusal(place, f"is no parameter of this effect: {nearest(word, names)}")
+
+
+def _in_support(case: Case, place: Place, value: Value, parameter: Amplitude | Shape) -> Iterator[Refusal]:
+    low, high = parameter.low, parameter.high
+    if isinstance(value, str):
+        if value in case.parameters:
+            ends = [quantile(case.parameters[value], p) for p in (LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)]
+            if not low <= min(ends) <= max(ends) <= high:
+                complaint = (
+                    f"may leave {low:g} to {high:g} {parameter.unit}, where `{dotted(place)}` must lie: bound it"
+                )
+                yield Refusal(("parameters", value), complaint)
+    elif not low <= value <= high:
+        yield Refusal(place, f"expected a number from {low:g} to {high:g} {parameter.unit}, got {value:g}")
 
 
 def _parameters(case: Case) -> Iterator[Refusal]:

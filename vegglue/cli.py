@@ -14,7 +14,8 @@ from rich.progress import Progress as Bar
 from vegglue import __version__
 from vegglue.channel_figure import save_channel_figure
 from vegglue.check import check_case
-from vegglue.cli_loop import COMMANDS
+from vegglue.cli_effects import effects_command
+from vegglue.cli_loop import COMMANDS, Trust
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.describe import describe
 from vegglue.errors import InputError, StorageError
@@ -56,9 +57,9 @@ def version() -> None:
 
 
 @app.command()
-def check(config: Config, runs: Runs = Path("runs")) -> None:
+def check(config: Config, runs: Runs = Path("runs"), trust: Trust = False) -> None:
     """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
-    case, observations = _read(config)
+    case, observations = _read(config, trust)
     site = build_site(case)
     figure = _folder(runs, case) / "channel.png"
     oddities = check_case(case, site, observations)
@@ -73,11 +74,13 @@ def check(config: Config, runs: Runs = Path("runs")) -> None:
 
 
 @app.command(name="simulate")
-def simulate_command(config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs")) -> None:
+def simulate_command(
+    config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False
+) -> None:
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
     if jobs == 0:
         raise InputError("--jobs: expected the number of processes, or -1 for one on every core, got 0.")
-    case, observations = _read(config, members)
+    case, observations = _read(config, trust, members)
     path = _folder(runs, case) / "ensemble.h5"
     if _is_current(path, case):
         console.print(f"{path} is up to date.")
@@ -93,9 +96,9 @@ def simulate_command(config: Config, members: Members = None, jobs: Jobs = -1, r
 
 
 @app.command()
-def infer(config: Config, members: Members = None, runs: Runs = Path("runs")) -> None:
+def infer(config: Config, members: Members = None, runs: Runs = Path("runs"), trust: Trust = False) -> None:
     """Weigh the members by the measurements and say what was found."""
-    case, observations = _read(config, members)
+    case, observations = _read(config, trust, members)
     folder = _folder(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = glue(ensemble, case, observations)
@@ -106,26 +109,26 @@ def infer(config: Config, members: Members = None, runs: Runs = Path("runs")) ->
 
 
 @app.command()
-def report(config: Config, members: Members = None, runs: Runs = Path("runs")) -> None:
+def report(config: Config, members: Members = None, runs: Runs = Path("runs"), trust: Trust = False) -> None:
     """Make the page and the figures of a run."""
-    case, observations = _read(config, members)
+    case, observations = _read(config, trust, members)
     folder = _folder(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = read_posterior(folder / "posterior.h5", case_hash(case))
     flow = solve_flow(case, posterior.median)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     asked = folder / "diagnosis.h5"
-    diagnosis = read_diagnosis(asked) if stored_hash(asked) == case_hash(load_case(config)) else None
+    diagnosis = read_diagnosis(asked) if stored_hash(asked) == case_hash(load_case(config, trust)) else None
     page = write_report(folder, case, observations, ensemble, posterior, flow, survey, diagnosis)
     console.print(f"Report: {page.resolve()}")
 
 
-for _name, _command in COMMANDS:
+for _name, _command in (*COMMANDS, ("effects", effects_command)):
     app.command(name=_name)(_command)
 
 
-def _read(config: Path, members: int | None = None) -> tuple[Case, Observations]:
-    case = load_case(config)
+def _read(config: Path, trust: bool, members: int | None = None) -> tuple[Case, Observations]:
+    case = load_case(config, trust)
     if members is not None:
         case = case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
     return case, read_observations(case)

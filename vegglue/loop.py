@@ -97,7 +97,7 @@ def write_child(parent: Case, target: Path, added: Sequence[tuple[Candidate, Map
     names = ", ".join(candidate.name for candidate, _ in added)
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
     _write(target, text + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True))
-    return load_case(target)
+    return load_case(target, trust=True)  # what it can run, its parent has run
 
 
 def child_path(parent: Path, added: Sequence[Candidate]) -> Path:

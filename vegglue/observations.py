@@ -10,6 +10,7 @@ from vegglue.adv import Section, average_of, read_section
 from vegglue.discharge import Discharge
 from vegglue.errors import InputError
 from vegglue.profile import CanopyHeight, ProfileFit
+from vegglue.refusal import nearest
 from vegglue.schema import Case, Observation
 from vegglue.table import read_table, refuse_repeated, refuse_rows, shown
 
@@ -63,14 +64,29 @@ def read_observations(case: Case) -> Observations:
             stations.append(_averaged(sections[key], observation))
         else:
             stations.append(_read_stations(case, observation))
+    table = _joined(stations)
+    _refuse_unknown_places(case, table)
     return Observations(
-        table=_joined(stations),
+        table=table,
         points=_joined([section.points for section in sections.values()]),
         profiles=_joined([section.profiles for section in sections.values()]),
         discharge={key: section.discharge for key, section in sections.items()},
         neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
     )
+
+
+def _refuse_unknown_places(case: Case, table: pd.DataFrame) -> None:
+    """Refuse sections and devices that an effect is limited to and nobody measured at."""
+    for name, working in case.effects.items():
+        for column, words in (("section", working.sections), ("device", working.devices)):
+            known = [str(word) for word in table[column].unique() if word]
+            for word in words:
+                if word not in known:
+                    raise InputError(
+                        f"{shown(case.source)}: `effects.{name}.{column}s` names the {column} `{word}`, of which there "
+                        f"are no measurements: {nearest(word, known)}"
+                    )
 
 
 def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:

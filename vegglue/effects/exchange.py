@@ -119,7 +119,7 @@ EFFECTS = (
         equation="nu -> nu + l^2 |du/dy|",
         act=mixing_length,
         amplitude=Amplitude("length", "m", "mixing length l", 0.5, 0.0, 3.0, power=2),
-        source="Prandtl (1925), doi:10.1002/zamm.19250050212",
+        source="Prandtl (1925)",
         doi="10.1002/zamm.19250050212",
     ),
     Effect(
