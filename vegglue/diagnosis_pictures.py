@@ -175,22 +175,25 @@ def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     yield picture(run, figure, "missing-places", caption, f"Plan of the channel. {told}.")
 
 
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
 def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     zones = diagnosis.zones
     if zones.empty:
         return
-    miss = (zones["mean"] / zones["standard_error"]).to_numpy(float)
-    worst = zones.iloc[int(np.nanargmax(np.abs(miss)))] if np.isfinite(miss).any() else zones.iloc[0]
-    side = "more" if worst["mean"] > 0 else "less"
+    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
+    worst = zones.iloc[int(np.argmax(size))]
     told = (
-        f"{worst['experiment']} {worst['section']}, {worst['zone']}: measured is {side} than modelled, by "
-        f"{fixed(float(np.nanmax(np.abs(miss), initial=0.0)), 1)} standard errors of the mean"
+        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(float(size.max()), 1)} standard "
+        "errors, where errors alone make 1"
     )
     caption = (
-        f"<b>Misfit by zone</b> of the model as it was. Largest in {html.escape(told)}. Full squares: more was "
-        "measured than modelled, hollow: less."
+        f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(told)}. Small: the mean in its "
+        "own standard errors; squares are full where more was measured than modelled, hollow where less."
     )
-    yield picture(run, draw_zones(zones), "missing-zones", caption, f"Mean misfit by section and zone. {told}.")
+    yield picture(run, draw_zones(zones), "missing-zones", caption, f"Misfit by section and zone. {told}.")
 
 
 def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
@@ -199,7 +202,7 @@ def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     families = [group for group in groups(diagnosis.cosine_names, diagnosis.cosine) if len(group) > 1]
     told = "No two of the strongest suspects leave the same trace"
     if families:
-        told = "These data cannot tell apart " + "; nor ".join(" and ".join(group) for group in families)
+        told = f"These data cannot tell apart {'; nor '.join(_listed(group) for group in families)}"
     caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(told)}."
     figure = draw_alike(diagnosis.cosine_names, diagnosis.cosine)
     yield picture(run, figure, "missing-alike", caption, f"Cosines between traces of effects. {told}.")

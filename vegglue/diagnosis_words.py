@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.effect import Array
 from vegglue.summary import KeyNumber
-from vegglue.typography import NARROW, fixed, interval, short, unit_html
+from vegglue.typography import NARROW, as_given, fixed, interval, short, unit_html
 
 # Effects in the table that is open; the others stand below it, folded.
 SHOWN = 8
@@ -54,6 +54,7 @@ class Told:
     numbers: list[KeyNumber]
     suspects: list[SuspectRow]
     others: list[SuspectRow]
+    looked_again: bool
     flagged: list[FlaggedRow]
 
 
@@ -61,7 +62,7 @@ def told(diagnosis: Diagnosis) -> Told:
     """Everything the report says of a diagnosis."""
     first, others = _suspect_rows(diagnosis)
     flagged = [_flagged(diagnosis, row) for row in diagnosis.flagged]
-    return Told(diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, flagged)
+    return Told(diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, bool(diagnosis.steps), flagged)
 
 
 def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:
@@ -118,6 +119,7 @@ def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectR
 def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     unit = unit_html(suspect.unit)
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
+    scores = first_score(diagnosis, suspect), last_score(diagnosis, suspect)
     alike = abs(suspect.likeness) > LOOKS_LIKE and suspect.mimicked_by in diagnosis.first_parameters
     return SuspectRow(
         name=html.escape(suspect.name),
@@ -126,7 +128,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         amplitude=short(suspect.amplitude, 3) + unit,
         interval=interval(*suspect.interval95),
         chance=chance(suspect.p_family),
-        score=fixed(first_score(diagnosis, suspect), 1),
+        score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(suspect.visibility, 2),
         detectable=short(suspect.smallest_detectable, 2) + unit,
         looks_like=html.escape(suspect.mimicked_by) if alike else "",
@@ -144,8 +146,8 @@ def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
     return FlaggedRow(
         experiment=str(station["experiment"]),
         section=str(station["section"]) or "gauge",
-        x=f"{station['x']:g}",
-        y=f"{station['y']:g}",
+        x=as_given(station["x"]),
+        y=as_given(station["y"]),
         measured=fixed(value, 3),
         predicted=fixed(predicted, 3),
         score=fixed((value - predicted) / float(station["standard_error"]), 1),

@@ -22,8 +22,8 @@ from vegglue.typography import fixed
 
 # Standard errors beyond which a residual is drawn as one that errors alone seldom make.
 USUAL = 2.0
-# Mean misfit in standard errors that is set in bold.
-UNUSUAL = 3.0
+# Root mean square misfit in standard errors that is set in bold; errors alone make 1.
+UNUSUAL = 2.0
 # Strength of a colour from one quarter of the largest score of a map to the next, the first left blank.
 SHADES = (0.22, 0.5, 0.85)
 BEFORE: dict[str, Any] = {"color": COLOUR["muted"], "linewidth": 1.2, "dashes": (3, 2)}
@@ -132,13 +132,13 @@ def draw_gauges(stations: pd.DataFrame, added: str) -> Figure:
 
 @styled
 def draw_zones(zones: pd.DataFrame) -> Figure:
-    """Mean misfit by experiment, section and zone in standard errors: full squares where more was measured than
-    predicted, hollow where less; the area follows the size.
+    """Misfit by experiment, section and zone: root mean square in standard errors, and the mean in its own.
 
-    zones: columns experiment, section, zone, stations, mean, standard_error.
+    The area of a square follows the misfit; it is full where more was measured than predicted on average, else hollow.
+    zones: columns experiment, section, zone, stations, mean, standard_error, chi2.
     """
     height = 0.7 + 0.25 * len(zones[["experiment", "section"]].drop_duplicates())
-    figure, axes = canvas(max(WIDTH, 1.7 + 0.85 * zones["zone"].nunique()), height)
+    figure, axes = canvas(max(WIDTH, 1.5 + 0.9 * zones["zone"].nunique()), height)
     paint_zones(axes, zones)
     return figure
 
@@ -148,18 +148,19 @@ def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
     rows = list(dict.fromkeys(zip(zones["experiment"], zones["section"], strict=True)))
     rows.sort(key=lambda row: experiments.index(row[0]))
     columns = list(dict.fromkeys(zones["zone"]))
-    misses = np.nan_to_num((zones["mean"] / zones["standard_error"]).to_numpy(float))
-    largest = float(np.abs(misses).max(initial=3.0))
-    places = zip(misses, zip(zones["experiment"], zones["section"], strict=True), zones["zone"], strict=True)
-    for miss, row, zone in places:
-        across, down = columns.index(zone), rows.index(row)
+    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
+    mean = np.nan_to_num(zones["mean"] / zones["standard_error"])
+    largest = float(size.max(initial=UNUSUAL))
+    for each, miss, row in zip(size, mean, zones.itertuples(), strict=True):
+        across, down = columns.index(row.zone), rows.index((row.experiment, row.section))
         face = COLOUR["measured"] if miss > 0 else "none"
         axes.scatter(
-            across - 0.2, down, 170 * abs(miss) / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
+            across - 0.3, down, 170 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
         )
-        weight = "bold" if abs(miss) > UNUSUAL else "normal"
+        weight = "bold" if each > UNUSUAL else "normal"
+        axes.text(across + 0.06, down, fixed(float(each), 1), ha="right", va="center", fontsize=8, fontweight=weight)
         text = ("+" if miss > 0 else "") + fixed(float(miss), 1)
-        axes.text(across + 0.32, down, text, ha="right", va="center", fontsize=8, fontweight=weight)
+        axes.text(across + 0.42, down, text, ha="right", va="center", fontsize=7, color=COLOUR["muted"])
     for down in range(1, len(rows)):
         if rows[down][0] != rows[down - 1][0]:
             axes.axhline(down - 0.5, color=COLOUR["rule"], linewidth=0.8)
