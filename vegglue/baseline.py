@@ -41,7 +41,7 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         fits = [fit(search, noise, start) for start in _starts(search, noise)]
         best = min(fits, key=lambda found: found.objective)
         known, on_coarse = best.point.z, best.point
-    start = linearise(model, known, on_coarse if coarse is not None else None)
+    start = linearise(model, known, on_coarse if coarse is not None else None) or linearise(model, known)
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow at its best place; widen the priors.")
     fitted = fit(model, noise, start)

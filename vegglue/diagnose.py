@@ -22,16 +22,16 @@ from vegglue.ground import ground_of
 from vegglue.linearise import Model, linearise, theta_at
 from vegglue.noise import Noise, with_grid_error, without
 from vegglue.suspicion import Look, look, refit_start
-from vegglue.verdict import judged, misfit_zones
+from vegglue.verdict import MOST_GROUPS, judged, misfit_zones
 
 # Suspects that are refitted in one round, effects that are accepted one after the other, stations set aside at most.
-REFITTED, ACCEPTED, FLAGGED = 6, 3, 6
+REFITTED, ACCEPTED, FLAGGED, REFIT_STEPS = 6, 3, 6, 8
 # Scores this much below the best one's (in squares, and as a share of it) are not refitted.
 BEHIND, BEHIND_SHARE = 15.0, 0.45
 # Amplitude seen in 19 of 20 tries at the 5 % level, over its standard error.
 SEEN = 3.5
-# Chance of a misfit as large as the last one under errors alone, below which something is still missing.
-POOR = 1e-3
+# A second effect must be this much surer than a first one.
+FURTHER = 0.2
 # Logarithm of the odds by which a place must beat every listed effect, or a single station both.
 CLEARLY = 3.0
 
@@ -65,7 +65,7 @@ def diagnose(
         base = replace(base, noise=seen.noise)
         if seen_first is None:
             seen_first, first = seen, base
-        alarm = _alarm(seen)
+        alarm = _alarm(seen, 1.0 if not steps else FURTHER)
         if alarm == "station" and len(flagged) < FLAGGED:
             flagged.append(seen.stations.best)
             base = _set_aside(base, seen.stations.best)
@@ -75,22 +75,28 @@ def diagnose(
             place = _where(base, seen)
         if alarm != "effect" or len(steps) == ACCEPTED:
             break
-        step, base, refits = _accept(base, seen, jobs, say)
+        step, further, refits = _accept(base, seen, jobs, say)
         suspects |= {one.candidate.name: _refitted(base, seen, one) for one in refits}
         if step is None:
             break
+        if steps and len(step.groups) > MOST_GROUPS:
+            break
         steps.append(step)
+        base = further
     return _written(first, base, seen_first, seen, flagged, steps, suspects, place)
 
 
-def _alarm(seen: Look) -> str:
-    """What the residual points at most surely: 'effect', 'place', 'station', or '' when errors alone explain it."""
+def _alarm(seen: Look, strictness: float) -> str:
+    """What the residual points at most surely: 'effect', 'place', 'station', or '' when errors alone explain it.
+
+    strictness: factor on the chance of a false alarm.
+    """
     effect, place, station = seen.effects.log_p, seen.places.log_p, seen.stations.log_p
     if station < np.log(0.01) and station < min(effect, place) - CLEARLY:
         return "station"
-    if place < np.log(ALARM_OF_PLACES) and place < effect - CLEARLY:
+    if place < np.log(strictness * ALARM_OF_PLACES) and place < effect - CLEARLY:
         return "place"
-    return "effect" if effect < np.log(ALARM) else ""
+    return "effect" if effect < np.log(strictness * ALARM) else ""
 
 
 def _set_aside(base: Baseline, station: int) -> Baseline:
@@ -140,7 +146,7 @@ def _refit(base: Baseline, seen: Look, candidate: int) -> _Refit | None:
     start = linearise(model, refit_start(base, seen, candidate, case), base.fitted.point)
     if start is None:
         return None
-    fitted = fit(model, base.noise, start)
+    fitted = fit(model, base.noise, start, REFIT_STEPS)
     amplitude, interval = _interval(model, fitted, one.parameter)
     return _Refit(one, column, fitted, amplitude, interval)
 

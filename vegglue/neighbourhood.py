@@ -134,9 +134,12 @@ def _solve_centre(
 ) -> _Lead:
     """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
     problem = take(whole, np.array([centre]))
-    solution, shared, band = settled(problem, warm, tolerance)
-    spent = int(solution.iterations[0])
-    if shared is not None:
+    spent = 0
+    for start in [warm, None] if warm is not None else [None]:
+        solution, shared, band = settled(problem, start, tolerance)
+        spent += int(solution.iterations[0])
+        if shared is None:
+            continue
         return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
     return _marched(problem, spent, tolerance)
 
@@ -147,11 +150,11 @@ Attempt = tuple[Solution, Factors | None, tuple[int, int]]
 def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
     """One member: its state in the band of rows that may be wet, the factors there, and that band.
 
-    warm (nx, 3, ny, 1): a state nearby, if one is known. Without factors, no attempt has converged.
+    warm (nx, 3, ny, 1): a state nearby to begin from, else a rough estimate is. Without factors, it has not converged.
     """
     attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
     if warm is not None:
-        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance), *attempts]
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance)]
     spent = 0
     for attempt in attempts:
         solution, shared, band = attempt()
@@ -168,10 +171,10 @@ def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
     return _checked(problem, solution, shared, band, tolerance)
 
 
-def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float = 200.0) -> Attempt:
+def _by_newton(problem: Problem, warm: Array, tolerance: float, most: int = 12, time_step: float = 200.0) -> Attempt:
     band = _band(problem, warm)
     part = crop(problem, *band)
-    near = newton(part, inside(warm, band), CLOSE, time_step=time_step)
+    near = newton(part, inside(warm, band), CLOSE, most, time_step)
     if not near.converged[0]:
         return near, None, band
     solution, shared = finish(part, near.state, tolerance)
@@ -180,7 +183,7 @@ def _by_newton(problem: Problem, warm: Array, tolerance: float, time_step: float
 
 
 def _from_cold(problem: Problem, tolerance: float) -> Attempt:
-    return _by_newton(problem, backwater(problem), tolerance, time_step=10.0)
+    return _by_newton(problem, backwater(problem), tolerance, most=60, time_step=10.0)
 
 
 def _checked(

@@ -43,9 +43,8 @@ def judged(
         )
     if not steps:
         return _without_steps(suspects, p_misfit, fit, remarks)
-    wide = max(len(step.groups) for step in steps)
-    if wide > MOST_GROUPS:
-        names = ", ".join(dict.fromkeys(name for step in steps for name in step.rivals))
+    if len(steps[0].groups) > MOST_GROUPS:
+        names = ", ".join(steps[0].rivals)
         return "cannot-tell", f"Something is missing, but these data cannot tell which of {names} it is.", remarks
     if p_misfit < POOR:
         remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {p_misfit:.1g}).")
