@@ -17,6 +17,7 @@ from vegglue.config import load_case
 from vegglue.design import SEPARATES, Worth
 from vegglue.diagnosis import Diagnosis, as_json
 from vegglue.errors import InputError
+from vegglue.figure_ladder import save_ladder_figure
 from vegglue.intake import case_from_folder
 from vegglue.ladder import Rung, held_out, improvement
 from vegglue.loop import (
@@ -112,10 +113,13 @@ def compare_command(
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
     rungs = ladder([load_case(config, trust) for config in configs], runs, _say(as_object))
+    picture = _folder(runs, load_case(configs[-1], trust)) / "ladder.png"
+    save_ladder_figure(rungs, picture)
     if as_object:
         print(json.dumps({"rungs": [_rung_json(one) for one in rungs]}, ensure_ascii=False))
         return
     _show_ladder(rungs)
+    console.print(f"Drawn in {picture}")
 
 
 def next_command(
@@ -146,7 +150,9 @@ def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trus
     _show_ladder(grown.rungs)
     what, found = next_measurements(case, folder, jobs, _say(), [])
     _show_next(what, found)
-    console.print(f"Last config: {grown.paths[-1]}")
+    picture = _folder(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
+    save_ladder_figure(grown.rungs, picture)
+    console.print(f"Ladder drawn in {picture}; last config: {grown.paths[-1]}")
 
 
 COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
