@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from diagnoses import NOTHING, a_diagnosis
 
 from vegglue.config import load_case
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, Ensemble
@@ -281,6 +282,36 @@ def test_a_run_without_flow_fields_has_a_page(tmp_path: Path) -> None:
     text = written(replace(a_toy(tmp_path), flow={}))
     assert 'id="flow"' not in text
     assert 'id="sections"' in text
+
+
+def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
+    found = a_diagnosis(sentence="Missing: eddies <b>or so</b>.")
+    run = replace(a_toy(tmp_path), diagnosis=found)
+    page = Page(text := written(run))
+    assert page.open == []
+    assert page.unlabelled == 0
+    assert len(page.ids) == len(set(page.ids))
+    assert "Missing: eddies &lt;b&gt;or so&lt;/b&gt;." in text
+    assert found.remarks[0] in text
+    assert all(f"<b>{one.name}</b>" in text for one in found.suspects)
+    assert "Stations set aside" in text
+    drawn = {path.stem for path in (tmp_path / "figures").glob("missing-*.svg")}
+    assert drawn == {
+        "missing-suspects", "missing-profiles-1", "missing-places", "missing-zones", "missing-alike", "missing-gauges"
+    }  # fmt: skip
+    assert drawn <= set(page.ids)
+
+
+def test_an_empty_diagnosis_is_a_sentence_and_no_figure_breaks(tmp_path: Path) -> None:
+    text = written(replace(a_toy(tmp_path), diagnosis=NOTHING))
+    assert NOTHING.sentence in text
+    assert "Stations set aside" not in text
+    assert 'id="missing-suspects"' not in text
+
+
+def test_without_a_diagnosis_the_report_says_how_to_get_one(toy: tuple[Run, str]) -> None:
+    assert "<code>vegglue diagnose CONFIG</code> would tell" in toy[1]
+    assert 'id="missing-' not in toy[1]
 
 
 def said(run: Run, subject: str, **changes: object) -> tuple[str, bool]:

@@ -25,7 +25,7 @@ from vegglue.report import write_report
 from vegglue.schema import Case
 from vegglue.simulate import Progress, simulate, solve_flow
 from vegglue.site import build_site
-from vegglue.store import read_diagnosis, read_ensemble, read_posterior, stored_hash, write_posterior
+from vegglue.store import diagnosis_that_fits, read_ensemble, read_posterior, stored_hash, write_posterior
 from vegglue.survey import read_survey, rigid_cylinder
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -117,8 +117,7 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs"), t
     posterior = read_posterior(folder / "posterior.h5", case_hash(case))
     flow = solve_flow(case, posterior.median)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
-    asked = folder / "diagnosis.h5"
-    diagnosis = read_diagnosis(asked) if stored_hash(asked) == case_hash(load_case(config, trust)) else None
+    diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(load_case(config, trust)))
     page = write_report(folder, case, observations, ensemble, posterior, flow, survey, diagnosis)
     console.print(f"Report: {page.resolve()}")
 

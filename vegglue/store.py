@@ -143,6 +143,11 @@ def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
     return _read(path, expected_hash, "diagnose", diagnosis_from)
 
 
+def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
+    """The diagnosis of exactly this config, None when there is none or only one of another state of it."""
+    return read_diagnosis(path) if stored_hash(path) == config_hash else None
+
+
 def stored_hash(path: Path) -> str | None:
     """Config hash a result file was made from, or None when there is no readable file."""
     try:
