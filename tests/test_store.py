@@ -353,7 +353,7 @@ def a_posterior(canopy: bool) -> Posterior:
         bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])}, sigma=per_kind, rmse=per_kind,
         best_rmse=per_kind, noise=np.array([0.02, np.nan]), residual=random.random(2), best_residual=random.random(2),
         model_band=random.random((5, 2)), total_band=random.random((5, 2)), draws=draws, predictive=predictive,
-        station=station, canopy=corrected if canopy else None,
+        station=station, canopy=corrected if canopy else None, method="glue", refinement=None,
     )  # fmt: skip
 
 
@@ -406,7 +406,7 @@ def test_xarray_opens_every_group_of_a_posterior(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "posterior.h5") as file:
         names = set(file)
     assert names == {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data", "constant_data",
-                     "sample_stats", "glue", "stations", "canopy"}  # fmt: skip
+                     "sample_stats", "members", "stations", "canopy"}  # fmt: skip
     for name in names:
         with xarray.open_dataset(tmp_path / "posterior.h5", group=name, engine="h5netcdf") as data:
             data.load()

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -18,9 +18,12 @@ from vegglue.cli_effects import effects_command
 from vegglue.cli_loop import COMMANDS, Trust
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.describe import describe
+from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError, StorageError
 from vegglue.infer import glue
 from vegglue.observations import Observations, read_observations
+from vegglue.posterior import Posterior
+from vegglue.refine import refinable, refine
 from vegglue.report import write_report
 from vegglue.schema import Case
 from vegglue.simulate import Progress, simulate, solve_flow
@@ -96,16 +99,37 @@ def simulate_command(
 
 
 @app.command()
-def infer(config: Config, members: Members = None, runs: Runs = Path("runs"), trust: Trust = False) -> None:
-    """Weigh the members by the measurements and say what was found."""
+def infer(
+    config: Config,
+    method: Annotated[
+        Literal["refine", "glue"] | None,
+        typer.Option(help="Draws around the best members, or these members weighed; instead of the config's."),
+    ] = None,
+    members: Members = None,
+    jobs: Jobs = -1,
+    runs: Runs = Path("runs"),
+    trust: Trust = False,
+) -> None:
+    """Infer the parameters from the measurements and say what was found."""
     case, observations = _read(config, trust, members)
     folder = _folder(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
-    posterior = glue(ensemble, case, observations)
+    posterior = _inferred(case, observations, ensemble, method, jobs)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
     for sentence in describe(posterior):
         console.print(f"- {sentence}")
     console.print(f"Written to {folder / 'posterior.h5'}")
+
+
+def _inferred(case: Case, observations: Observations, ensemble: Ensemble, method: str | None, jobs: int) -> Posterior:
+    if method == "refine" and not refinable(case):
+        raise InputError(
+            "--method refine: expected `infer.likelihood: gaussian` without `behavioural`, got an informal likelihood; "
+            "change the config or use --method glue."
+        )
+    if (method or case.infer.method) == "glue" or not refinable(case):
+        return glue(ensemble, case, observations)
+    return refine(ensemble, case, observations, jobs, lambda text: console.print(f"[dim]... {text}[/dim]"))
 
 
 @app.command()

@@ -4,22 +4,23 @@ import math
 
 import numpy as np
 
+from vegglue.describe_refined import UNIT_OF_KIND, drawn, unseen
 from vegglue.posterior import IDENTIFIED_BELOW, NEAR_BOUND, Posterior
 
 CLAIMED_FROM = 100  # effective members; below, no posterior is claimed
 HEAVY_TAIL = 0.7  # of pareto_k, above which weighted means are not to be trusted
 STRONG_CORRELATION = 0.7
-UNIT_OF_KIND = {"velocity": "m/s", "level": "m"}
 
 
 def describe(posterior: Posterior) -> list[str]:
     """Sentences on the ensemble and its worth, each parameter, their correlation, the fit, the canopy correction."""
     return [
-        *_ensemble(posterior),
+        *(_ensemble(posterior) if posterior.refinement is None else drawn(posterior, posterior.refinement)),
         *_worth(posterior),
         *(sentence for name in posterior.parameters for sentence in _parameter(posterior, name)),
         *_correlations(posterior),
         *_misfit(posterior),
+        *(unseen(posterior, posterior.refinement) if posterior.refinement else ()),
         *_canopy(posterior),
     ]
 
@@ -44,9 +45,12 @@ def _worth(posterior: Posterior) -> list[str]:
         f"of their tail k-hat {posterior.pareto_k:.2g} (to be trusted below {HEAVY_TAIL})."
     ]
     if posterior.effective_size < CLAIMED_FROM:
+        remedy = "refine around the best members (`infer --method refine`)"
+        if posterior.refinement is not None:
+            remedy = "narrow the priors or fix what the data do not tell"
         sentences.append(
             f"With {size} effective members, fewer than {CLAIMED_FROM}, no posterior is claimed: take the medians and "
-            "widths below as a first look, and refine around the best members before resting anything on them."
+            f"widths below as a first look, and {remedy} before resting anything on them."
         )
     return sentences
 
@@ -98,7 +102,7 @@ def _misfit(posterior: Posterior) -> list[str]:
         f"The median prediction misses by {errors} (root mean square); {int(np.sum(outside & used))} of "
         f"{posterior.used} measurements lie outside the total 95 % band, {0.05 * posterior.used:.1f} are expected to."
     ]
-    if math.isfinite(posterior.chi2):
+    if math.isfinite(posterior.chi2) and posterior.refinement is None:
         sentences.append(
             f"Against the standard errors of the data, the best member has chi2 = {posterior.chi2:.3g} over "
             f"{posterior.used} stations."

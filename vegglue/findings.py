@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.describe import CLAIMED_FROM, HEAVY_TAIL, STRONG_CORRELATION
+from vegglue.describe_refined import UNBELIEVED, drawn, unseen
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
 from vegglue.observations import Observations
 from vegglue.posterior import Posterior
@@ -48,6 +49,7 @@ def findings(run: Run) -> list[Finding]:
         *_canopy(run),
         *(_residual(posterior, kind) for kind in posterior.sigma),
         *_coverage(posterior),
+        *_refined(posterior),
         *_flagged(observations),
         *_discharge(case, observations),
         _weights(posterior),
@@ -160,6 +162,17 @@ def _coverage(posterior: Posterior) -> Iterator[Finding]:
     )
 
 
+def _refined(posterior: Posterior) -> Iterator[Finding]:
+    refined = posterior.refinement
+    if refined is None:
+        return
+    missing = refined.errors == "stated" and refined.p_misfit < UNBELIEVED
+    yield Finding("errors", html.escape(" ".join(drawn(posterior, refined)[1:])), doubt=refined.errors == "estimated")
+    yield Finding("draws", html.escape(drawn(posterior, refined)[0]))
+    told = html.escape(" ".join(unseen(posterior, refined)))
+    yield Finding("unseen", told, doubt=missing or bool(refined.outlier.any()))
+
+
 def _flagged(observations: Observations) -> Iterator[Finding]:
     for _, row in observations.table[~observations.table["used"].astype(bool)].iterrows():
         yield Finding(
@@ -198,7 +211,8 @@ def _weights(posterior: Posterior) -> Finding:
     )
     few, long = posterior.effective_size < CLAIMED_FROM, posterior.pareto_k > HEAVY_TAIL
     if few:
-        text += f". Fewer than {CLAIMED_FROM} make the 95{NARROW}% ranges themselves uncertain: simulate more members"
+        text += f". Fewer than {CLAIMED_FROM} make the 95{NARROW}% ranges themselves uncertain: "
+        text += "refine or simulate more members" if posterior.refinement is None else "narrow the priors"
     if long:
         text += f". The tail of the weights is long (k̂ = {fixed(posterior.pareto_k, 2)}, above {HEAVY_TAIL})"
     return Finding("weights", text + ".", doubt=few or long)

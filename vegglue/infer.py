@@ -52,29 +52,32 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
     standard errors missing, sigma zero, no member above the threshold.
     """
     station = observations.table
-    _check_stations(ensemble, station)
+    check_stations(ensemble, station)
     fit = fit_members(ensemble, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
     weights = member_weights(fit, case.infer.likelihood, threshold)
     return Posterior(
+        method="glue",
         likelihood=case.infer.likelihood,
         sigma_rule=case.infer.sigma,
         threshold=threshold,
         weights=weights,
         prediction=ensemble.prediction,
         station=station,
-        canopy=_corrected_canopy(ensemble, case, weights),
+        refinement=None,
+        canopy=corrected_canopy(ensemble.parameters, case, weights),
         **{name: getattr(fit, name) for name in ("best", "sigma", "noise", "efficiency", "log_likelihood")},
         ensemble_hash=ensemble.config_hash,
         seed=ensemble.seed,
         version=ensemble.version,
         **_counts(fit, weights, station),
-        **_marginals(ensemble, case, weights),
-        **_predictions(ensemble, fit, weights, station),
+        **marginals(ensemble.parameters, case, weights),
+        **predictions(ensemble.prediction, fit.best, fit.noise, weights, station, ensemble.seed),
     )
 
 
-def _check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
+def check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
+    """Errors: InputError when the stations are not those that were simulated, or none is used."""
     same = len(station) == len(ensemble.station) and all(
         np.array_equal(station[column].to_numpy(), ensemble.station[column].to_numpy())
         for column in ("experiment", "kind", "x", "y")
@@ -100,9 +103,9 @@ def _counts(fit: Fit, weights: Floats, station: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _marginals(ensemble: Ensemble, case: Case, weights: Floats) -> dict[str, Any]:
+def marginals(theta: dict[str, Floats], case: Case, weights: Floats) -> dict[str, Any]:
     """Everything said of each parameter, by its name."""
-    theta, priors = ensemble.parameters, case.parameters
+    priors = case.parameters
     seen = {name: _seen(values, priors[name]) for name, values in theta.items()}
     logs = [name for name in theta if _on_log_scale(priors[name])]
     prior_quantiles = {name: quantile(priors[name], LEVELS) for name in theta}
@@ -166,24 +169,36 @@ def _pressing_mass(effective: float) -> float:
     return max(PRESSES_ABOVE, NEAR_BOUND + 3 * math.sqrt(NEAR_BOUND * (1 - NEAR_BOUND) / effective))
 
 
-def _predictions(ensemble: Ensemble, fit: Fit, weights: Floats, station: pd.DataFrame) -> dict[str, Any]:
-    """Bands, residuals and equal-weight draws at all stations."""
-    random = np.random.default_rng(ensemble.seed)
+def predictions(
+    prediction: Floats,
+    best: int,
+    noise: Floats,
+    weights: Floats,
+    station: pd.DataFrame,
+    seed: int,
+    lower: Floats | None = None,
+) -> dict[str, Any]:
+    """Bands, residuals and equal-weight draws at all stations; lower: factor of the errors' covariance if correlated.
+
+    prediction: (member, station); noise: standard deviation of the errors (station,); lower: (station, station).
+    """
+    random = np.random.default_rng(seed)
     draws = systematic_draws(weights, CHAINS * DRAWS, random).reshape(CHAINS, DRAWS)
-    model_band = weighted_quantile(ensemble.prediction, weights, LEVELS)
+    model_band = weighted_quantile(prediction, weights, LEVELS)
     value, errors = station["value"].to_numpy(float), station["standard_error"].to_numpy(float)
-    residual, best_residual = value - model_band[LEVELS.index(0.5)], value - ensemble.prediction[fit.best]
+    residual, best_residual = value - model_band[LEVELS.index(0.5)], value - prediction[best]
     kinds, weighed = stations_by_kind(station), weights > 0
+    normal = random.standard_normal((*draws.shape, len(station)))
     return {
         "model_band": model_band,
-        "total_band": mixture_quantile(ensemble.prediction[weighed], weights[weighed], fit.noise, LEVELS),
+        "total_band": mixture_quantile(prediction[weighed], weights[weighed], noise, LEVELS),
         "residual": residual,
         "best_residual": best_residual,
         "rmse": {kind: root_mean_square(residual[rows]) for kind, rows in kinds.items()},
         "best_rmse": {kind: root_mean_square(best_residual[rows]) for kind, rows in kinds.items()},
         "chi2": float(np.sum((best_residual / errors)[station["used"].to_numpy(bool)] ** 2)),
         "draws": draws,
-        "predictive": ensemble.prediction[draws] + fit.noise * random.standard_normal((*draws.shape, len(station))),
+        "predictive": prediction[draws] + (noise * normal if lower is None else normal @ lower.T),
     }
 
 
@@ -210,15 +225,16 @@ def _above(depth: float, canopy_height: float) -> float:
     return math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / canopy_height, 1.0))
 
 
-def _corrected_canopy(ensemble: Ensemble, case: Case, weights: Floats) -> CorrectedCanopy | None:
+def corrected_canopy(theta: dict[str, Floats], case: Case, weights: Floats) -> CorrectedCanopy | None:
+    """phi of the stand that the case asks to correct, for all members; None when it asks for nothing."""
     asked = case.canopy_correction
     if asked is None:
         return None
     stand = case.plants.stands[asked.stand]
     if not isinstance(stand.phi, str):
         raise InputError(f"canopy_correction: phi of the stand {asked.stand} is a number; make it a parameter.")
-    bare = ensemble.parameters[stand.bare_chezy] if isinstance(stand.bare_chezy, str) else stand.bare_chezy
-    raw = ensemble.parameters[stand.phi]
+    bare = theta[stand.bare_chezy] if isinstance(stand.bare_chezy, str) else stand.bare_chezy
+    raw = theta[stand.phi]
     phi = correct_phi_for_canopy(raw, asked.from_height, asked.to_height, asked.depth, bare)
     with np.errstate(divide="ignore"):
         log10_phi = np.log10(phi)

@@ -55,9 +55,16 @@ def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> Fit:
         best=best,
         sigma=sigma if errors is None else {kind: root_mean_square(errors[rows]) for kind, rows in kinds.items()},
         noise=noise,
-        efficiency=1 - np.mean([square[kind] / _variance(value[rows]) for kind, rows in kinds.items()], axis=0),
+        efficiency=efficiency(residual, station),
         log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy(bool)),
     )
+
+
+def efficiency(residual: Floats, station: pd.DataFrame) -> Floats:
+    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k, (member,); residual (member, station)."""
+    value = station["value"].to_numpy(float)
+    kinds = stations_by_kind(station).values()
+    return 1 - np.mean([np.mean(residual[:, rows] ** 2, axis=1) / _variance(value[rows]) for rows in kinds], axis=0)
 
 
 def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Floats:

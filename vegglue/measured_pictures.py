@@ -19,6 +19,7 @@ from vegglue.figures import (
     draw_section,
     draw_verticals,
 )
+from vegglue.likelihood import fit_members, member_weights
 from vegglue.observations import fitted_curve
 from vegglue.posterior import Posterior
 from vegglue.reported import Run, picture, standing, zones
@@ -159,6 +160,14 @@ def _stretch(verticals: list[Vertical]) -> float:
     return 1.5 * spacing / max(float(vertical.velocity.max()) for vertical in verticals)
 
 
+def weights_of_ensemble(run: Run) -> np.ndarray:
+    """Of the members that were simulated, also where the posterior was drawn anew."""
+    if run.posterior.method == "glue":
+        return run.posterior.weights
+    fit = fit_members(run.ensemble, run.posterior.station, run.posterior.sigma_rule)
+    return member_weights(fit, "gaussian", -np.inf)
+
+
 def discharges(run: Run) -> Iterator[Picture]:
     """Discharge by each rule beside what the model let through, for each ADV section."""
     sections = [name for name, _ in run.ensemble.sections]
@@ -166,7 +175,7 @@ def discharges(run: Run) -> Iterator[Picture]:
         if section not in sections:
             continue
         through = run.ensemble.section_flow[:, run.ensemble.experiments.index(experiment), sections.index(section)]
-        spread = weighted_quantile(through, run.posterior.weights, [0.025, 0.5, 0.975])
+        spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])
         names = {"paper": "paper’s rule", "profile": "profile fit"}
         rows = [(names.get(rule, rule), found.value, found.standard_error) for rule, found in rules.items()]
         told = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)

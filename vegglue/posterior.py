@@ -38,6 +38,43 @@ class CorrectedCanopy:
 
 
 @dataclass(frozen=True)
+class Refinement:
+    """How draws around the best places of the prior were made, under which errors, and what they predict unseen.
+
+    A mode is a place of the prior from which no step helps; a round draws members from all that is known by then.
+    """
+
+    errors: str  # stated or estimated
+    correlation: float  # of the errors of neighbours along a section [-]
+    scale: float  # of the stated errors [-]
+    grid_error: float  # root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made
+    starts: int  # members that were followed downhill
+    chi2: float  # of the best member, whitened by the covariance of the errors [-]
+    freedom: int
+    p_misfit: float  # chance of a chi2 as large under errors alone [-]
+    elpd: float  # sum of the log predictive densities of stations left out in turn [-]
+    elpd_error: float
+    inside50: float  # share of measurements within the 50 % band of the prediction from all others [-]
+    inside95: float
+    p_calibration: float  # chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-]
+    mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]
+    mode_chi2: Annotated[np.ndarray, Stored(("mode",))]
+    mode_weight: Annotated[np.ndarray, Stored(("mode",))]  # of the draws nearest to each
+    drawn: Annotated[np.ndarray, Stored(("round",))]  # members after each round
+    worth: Annotated[np.ndarray, Stored(("round",))]  # effective members after each round
+    log_density: Annotated[np.ndarray, Stored(("member",))]  # of the posterior up to a constant; -inf failed
+    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
+    score: Annotated[np.ndarray, Stored(("station",))]  # log predictive density given all other stations
+    score_k: Annotated[np.ndarray, Stored(("station",))]  # k-hat of it
+    below: Annotated[np.ndarray, Stored(("station",))]  # share of the prediction below the measurement
+    surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
+    outlier: Annotated[np.ndarray, Stored(("station",))]  # whether one such among all stations is no chance
+    left_out: Annotated[np.ndarray, Stored(("group",))]  # sections and experiments left out in turn
+    left_out_score: Annotated[np.ndarray, Stored(("group",))]
+    left_out_k: Annotated[np.ndarray, Stored(("group",))]
+
+
+@dataclass(frozen=True)
 class Posterior:
     """Members weighed by their likelihood. `station` counts all rows of the station table; `kind` is velocity or level.
 
@@ -45,6 +82,7 @@ class Posterior:
     """
 
     parameters: tuple[str, ...]
+    method: str  # glue: members of the ensemble weighed; refine: draws around the best places of the prior
     likelihood: str
     sigma_rule: str
     threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
@@ -64,7 +102,7 @@ class Posterior:
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
     weights: Annotated[np.ndarray, Stored(("member",))]  # sum 1
     efficiency: Annotated[np.ndarray, Stored(("member",))]  # Nash-Sutcliffe
-    log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]  # Gaussian; NaN where not used
+    log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]  # Gaussian, refined: given all other stations
     prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
     median: ByParameter
     sd: ByParameter
@@ -90,47 +128,58 @@ class Posterior:
     predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]  # draws with residual error
     station: pd.DataFrame
     canopy: CorrectedCanopy | None
+    refinement: Refinement | None
+
+
+PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement}
 
 
 def groups(posterior: Posterior) -> dict[str, Group]:
-    """All groups of posterior.h5: those ArviZ knows, `glue` with every array, and `stations` with the whole table."""
+    """All groups of posterior.h5: those ArviZ knows, `members` with every array, `stations` with the whole table."""
     coordinates = _coordinates(posterior)
     arrays = {name: _variable(getattr(posterior, name), stored) for name, stored in stored_fields(Posterior).items()}
-    own = {"glue": Group(coordinates, arrays), "stations": table_group(posterior.station, "station", STATION_UNITS)}
-    if posterior.canopy is not None:
-        stored = stored_fields(CorrectedCanopy).items()
-        values = {name: _variable(getattr(posterior.canopy, name), each) for name, each in stored}
-        own["canopy"] = Group({dim: coordinates[dim] for dim in ("member", "level")}, values)
+    own = {"members": Group(coordinates, arrays), "stations": table_group(posterior.station, "station", STATION_UNITS)}
+    for name, part in _parts(posterior).items():
+        stored = stored_fields(type(part))
+        dims = dict.fromkeys(dim for each in stored.values() for dim in each.dims)
+        values = {field: _variable(getattr(part, field), each) for field, each in stored.items()}
+        own[name] = Group({dim: coordinates[dim] for dim in dims}, values)
     return own | _arviz_groups(posterior)
+
+
+def _parts(posterior: Posterior) -> dict[str, Any]:
+    """What a posterior may have besides its own arrays, by the name of the group."""
+    return {name: part for name in PARTS if (part := getattr(posterior, name)) is not None}
 
 
 def attributes(posterior: Posterior) -> dict[str, Any]:
     """Numbers and words of the posterior and its canopy correction, for the attributes of the file."""
     own = {name: getattr(posterior, name) for name in _plain(Posterior)}
-    if posterior.canopy is None:
-        return own
-    return own | {f"canopy_{name}": getattr(posterior.canopy, name) for name in _plain(CorrectedCanopy)}
+    for name, part in _parts(posterior).items():
+        own |= {f"{name}_{field}": getattr(part, field) for field in _plain(type(part))}
+    return own
 
 
 def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]) -> Posterior:
     """The posterior whose file has these groups and attributes."""
-    glue = read["glue"]
-    arrays = {name: _value(glue, name, stored, Posterior) for name, stored in stored_fields(Posterior).items()}
+    own = read["members"]
+    arrays = {name: _value(own, name, stored, Posterior) for name, stored in stored_fields(Posterior).items()}
     return Posterior(
         **arrays,
         **{name: kind(stated[name]) for name, kind in _plain(Posterior).items()},
-        parameters=tuple(glue["parameter"]),
+        parameters=tuple(own["parameter"]),
         station=pd.DataFrame({name: values for name, values in read["stations"].items() if name != "station"}),
-        canopy=_canopy_from(read["canopy"], stated) if "canopy" in read else None,
+        **{name: _part_from(kind, name, read, stated) for name, kind in PARTS.items()},
     )
 
 
-def _canopy_from(group: Mapping[str, np.ndarray], stated: Mapping[str, Any]) -> CorrectedCanopy:
-    return CorrectedCanopy(
-        phi=group["phi"],
-        quantiles=group["quantiles"],
-        **{name: kind(stated[f"canopy_{name}"]) for name, kind in _plain(CorrectedCanopy).items()},
-    )
+def _part_from(
+    kind: Any, name: str, read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]
+) -> Any:
+    if name not in read:
+        return None
+    arrays = {field: _value(read[name], field, stored, kind) for field, stored in stored_fields(kind).items()}
+    return kind(**arrays, **{field: hint(stated[f"{name}_{field}"]) for field, hint in _plain(kind).items()})
 
 
 def _plain(kind: type) -> dict[str, type]:
@@ -154,8 +203,10 @@ def _value(group: Mapping[str, np.ndarray], name: str, stored: Stored, kind: typ
 
 
 def _coordinates(posterior: Posterior) -> dict[str, Any]:
-    names = np.array(posterior.parameters, object)
-    return {
+    names, refined = np.array(posterior.parameters, object), posterior.refinement
+    counted = {"mode": "mode_chi2", "round": "drawn", "group": "left_out"}
+    of_refinement = {dim: np.arange(len(getattr(refined, field))) for dim, field in counted.items()} if refined else {}
+    return of_refinement | {
         "member": np.arange(posterior.members),
         "station": np.arange(len(posterior.station)),
         "parameter": names,
@@ -176,17 +227,19 @@ def _arviz_groups(posterior: Posterior) -> dict[str, Group]:
     prior = {"chain": np.arange(1), "draw": np.arange(posterior.members)}
     station, at_draws = {"station": used}, ("chain", "draw")
     member, log_likelihood = posterior.draws, posterior.log_likelihood[:, used]
-    units, theta = posterior.unit, posterior.theta
+    units, theta, refined = posterior.unit, posterior.theta, posterior.refinement
+    before = refined.prior_theta if refined else theta
+    lp = refined.log_density if refined else log_likelihood.sum(axis=1)
     table = table_group(posterior.station.iloc[used], "station", STATION_UNITS)
 
     def measured(dims: tuple[str, ...], values: Any, unit: str) -> dict[str, Variable]:
         return {"measured": Variable((*dims, "station"), values, unit)}
 
-    stats = {"lp": Variable(at_draws, log_likelihood.sum(axis=1)[member]), "member": Variable(at_draws, member)}
+    stats = {"lp": Variable(at_draws, lp[member]), "member": Variable(at_draws, member)}
     value = posterior.station["value"].to_numpy(float)[used]
     return {
         "posterior": Group(draw, {name: Variable(at_draws, theta[name][member], units[name]) for name in theta}),
-        "prior": Group(prior, {name: Variable(at_draws, theta[name][None, :], units[name]) for name in theta}),
+        "prior": Group(prior, {name: Variable(at_draws, before[name][None, :], units[name]) for name in theta}),
         "log_likelihood": Group(draw | station, measured(at_draws, log_likelihood[member], "-")),
         "posterior_predictive": Group(draw | station, measured(at_draws, posterior.predictive[:, :, used], VALUE_UNIT)),
         "observed_data": Group(station, measured((), value, VALUE_UNIT)),

@@ -245,7 +245,7 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     )
     yield (
         "likelihood",
-        f"{infer.likelihood}, sigma {infer.sigma}"
+        f"{infer.likelihood}, sigma {infer.sigma}, {run.posterior.method}"
         + (f", members with an efficiency of at least {infer.behavioural:g}" if infer.behavioural is not None else ""),
     )
     yield "plants taller than the water is deep", "φ as it is" if numerics.emergent == "constant" else "φ h / h_d"

@@ -270,10 +270,13 @@ class Simulate(Part):
 
 
 class Infer(Part):
+    method: Literal["refine", "glue"] = Field(default="refine", description="draws around the best members, or these")
     likelihood: Literal["gaussian", "nse", "inverse-variance"] = Field(
         default="gaussian", description="how residuals weigh"
     )
-    sigma: Literal["best-member", "known"] = Field(default="best-member", description="fitted, or given")
+    sigma: Literal["best-member", "known"] = Field(
+        default="best-member", description="errors estimated from what the best leaves, or known"
+    )
     behavioural: Number | None = Field(default=None, description="threshold of an informal likelihood [-]")
 
 
