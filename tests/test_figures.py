@@ -1,6 +1,7 @@
 """Figures: what is drawn is what was handed in, and a picture in the page is self-contained."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def uniform_flow(u: float = 0.5, v: float = 0.0) -> FlowFields:
 
 
 def unknown(values: np.ndarray, low: float, high: float, logarithmic: bool = False) -> Unknown:
-    return Unknown(values, low, high, logarithmic, "k_s", "m")
+    return Unknown(values, values, low, high, logarithmic, "k_s", "m")
 
 
 def test_density_keeps_its_mass_at_a_bound() -> None:
@@ -129,6 +130,16 @@ def test_marginal_marks_references_on_the_logarithmic_axis() -> None:
     marks = [line for line in figure.axes[0].lines if line.get_marker() == "D"]
     assert marks[0].get_xdata() == pytest.approx([1.0])
     assert figure.axes[0].get_xlim() == pytest.approx((-2, 2))
+
+
+def test_marginal_draws_the_prior_from_its_own_values_or_not_at_all() -> None:
+    values = np.linspace(0.4, 0.6, 500)
+    before = np.linspace(0.0, 1.0, 500)
+    spread = Unknown(values, before, 0.0, 1.0, False, "k_s", "m")
+    for drawn, height in ((spread, 1.0), (replace(spread, before=np.zeros(0)), 0.0)):
+        outline = draw_marginal(drawn, np.ones(500), []).axes[0].collections[0].get_paths()[0].vertices
+        inside = (outline[:, 0] > 0.2) & (outline[:, 0] < 0.8)
+        assert outline[inside, 1].max() == pytest.approx(height, abs=0.05)
 
 
 def test_joint_draws_area_in_proportion_to_weight() -> None:

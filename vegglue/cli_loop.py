@@ -74,7 +74,8 @@ def diagnose_command(
         print(json.dumps(as_json(found), ensure_ascii=False))
         return
     _tell(found)
-    console.print(f"Written to {_folder(runs, case) / 'diagnosis.h5'}; `vegglue report {config}` draws it.")
+    folder = _folder(runs, case)
+    console.print(f"Written to {folder / 'diagnosis.h5'}, drawn in {folder / 'diagnosis.png'}.")
 
 
 def extend_command(

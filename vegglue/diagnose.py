@@ -281,6 +281,7 @@ def _written(
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.refitted, -(one.score**2))))
     verdict, sentence, remarks = judged(last.model.case, noise, steps, ranked, place, p_misfit, left, freedom, flagged)
     parameters = {name: _three(last, name) for name in last.model.names}
+    mapped = seen_first if place is None else seen  # a place is found in what the steps leave
     top = [seen_first.best_column(j) for j in _order(seen_first)[:12]]
     return Diagnosis(
         name=first.model.case.name,
@@ -307,9 +308,9 @@ def _written(
         prediction_first=first.fitted.point.prediction,
         prediction=point.prediction,
         error=_at_stations(noise, len(first.model.station)),
-        map_x=seen_first.spots.x,
-        map_y=seen_first.spots.y,
-        map_score=seen_first.places.scores,
+        map_x=mapped.spots.x,
+        map_y=mapped.spots.y,
+        map_score=mapped.places.scores,
         cosine_names=tuple(seen_first.candidates[j].name for j in _order(seen_first)[:12]),
         cosine=score.cosines(seen_first.projected)[np.ix_(top, top)],
         version=__version__,

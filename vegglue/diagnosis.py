@@ -74,7 +74,8 @@ class Where:
 class Diagnosis:
     """Everything a diagnosis found. chi2, freedom: of the last model, whitened; flagged: rows of stations that no
     effect explains and that stand alone; zones: misfit by experiment, section and zone; residual: (station,) of the
-    baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere at the first model.
+    baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere, of the model in
+    which `where` was found, else of the first.
     threshold, first_scores: score that errors alone reach once in 1 / ALARM, and those of the effects at the baseline.
     """
 

@@ -159,8 +159,9 @@ def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         return
     where = diagnosis.where
     if where is not None:
+        given = f"With {html.escape(added(diagnosis))} in the model, a" if diagnosis.steps else "A"
         told = (
-            f"A spot of drag at x = {fixed(where.x, 1)} m, y = {fixed(where.y, 1)} m would explain most "
+            f"{given} spot of drag at x = {fixed(where.x, 1)} m, y = {fixed(where.y, 1)} m would explain most "
             f"({fixed(abs(where.score), 1)} standard errors); {html.escape(', '.join(where.experiments))} point at it"
         )
     elif diagnosis.steps:

@@ -23,9 +23,13 @@ NARROW_WIDTH = 3.4  # three to a row of the page [inch]
 
 @dataclass(frozen=True)
 class Unknown:
-    """One parameter as it is drawn: its values (member,) and bounds, on a logarithmic axis where `logarithmic`."""
+    """One parameter as it is drawn: its values (member,) and bounds, on a logarithmic axis where `logarithmic`.
+
+    before: values drawn from the prior alone (n,), empty where the prior is not to be drawn.
+    """
 
     values: Array
+    before: Array
     low: float
     high: float
     logarithmic: bool
@@ -74,11 +78,11 @@ def density(values: Array, weights: Array, low: float, high: float) -> tuple[Arr
 def draw_marginal(unknown: Unknown, weights: Array, references: Sequence[Reference]) -> Figure:
     """Prior (grey) and posterior (blue) density of one parameter, 50 and 95 % shaded, values of others marked."""
     figure, axes = canvas(NARROW_WIDTH, 2.7)
-    values = unknown.coordinate(unknown.values)
+    values, before = unknown.coordinate(unknown.values), unknown.coordinate(unknown.before)
     low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
-    grid, prior = density(values, np.ones(len(values)), low, high)
-    _, posterior = density(values, weights, low, high)
+    grid, posterior = density(values, weights, low, high)
     quantiles = weighted_quantile(values, weights, [0.025, 0.25, 0.5, 0.75, 0.975])
+    prior = density(before, np.ones(len(before)), low, high)[1] if before.size else np.zeros(GRID)
     axes.fill_between(grid, prior, color=COLOUR["prior"], linewidth=0)
     for (left, right), colour in ((quantiles[[0, 4]], "wide"), (quantiles[[1, 3]], "narrow")):
         inside = np.linspace(left, right, GRID)
@@ -101,6 +105,8 @@ def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> 
     right = at < GRID / 2
     side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
     label(axes, grid[at], posterior[at], "posterior", "model", **side)
+    if not prior.any():
+        return
     gap = int(np.argmax(np.where((grid > grid[12]) & (grid < grid[-40]), prior - posterior, -np.inf)))
     label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
 
@@ -147,7 +153,8 @@ def draw_joint(
     """
     figure, axes = canvas(NARROW_WIDTH, 3.0)
     x, y = across.coordinate(across.values), upward.coordinate(upward.values)
-    axes.plot(x[:SHOWN], y[:SHOWN], ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
+    before = across.coordinate(across.before)[:SHOWN], upward.coordinate(upward.before)[:SHOWN]
+    axes.plot(*before, ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
     heavy = weights > 1e-3 * weights.max()
     axes.scatter(
         x[heavy], y[heavy], 55 * weights[heavy] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0

@@ -16,6 +16,7 @@ from vegglue.config import case_hash, load_case, resolved_yaml
 from vegglue.design import Rival, Worth, worth_of_measurements
 from vegglue.diagnose import SEEN, diagnose
 from vegglue.diagnosis import Diagnosis, Suspect
+from vegglue.diagnosis_pictures import save_diagnosis_figure
 from vegglue.effect import Array
 from vegglue.errors import InputError, StorageError
 from vegglue.extend import candidate_named, child_tree
@@ -80,6 +81,7 @@ def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
         return read_diagnosis(path, wanted)
     found = diagnose(model_in(case), known_place(case, folder), jobs, say)
     write_diagnosis(path, found, resolved_yaml(case), wanted)
+    save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.first_parameters)
     return found
 

@@ -47,6 +47,7 @@ def _unknown(run: Run, name: str) -> Unknown:
     values = run.posterior.theta[name]
     return Unknown(
         values,
+        run.ensemble.parameters[name],
         float(low) if np.isfinite(low) and (low > 0 or not logarithmic) else float(values.min()),
         float(high) if np.isfinite(high) else float(values.max()),
         logarithmic,
@@ -87,12 +88,14 @@ def _corrected(run: Run) -> Iterator[Picture]:
     canopy = run.posterior.canopy
     if canopy is None:
         return
+    uncorrected = _unknown(run, canopy.parameter)
     kept = (canopy.phi > 0) & np.isfinite(canopy.phi)
     phi, weights = canopy.phi[kept], run.posterior.weights[kept]
     references = _references(run, canopy.parameter)
     marked = [reference.value for reference in references]
     low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
-    unknown = replace(_unknown(run, canopy.parameter), values=phi, low=low / 1.5, high=1.5 * high)
+    before = phi if np.array_equal(run.posterior.theta[canopy.parameter], uncorrected.before) else np.zeros(0)
+    unknown = replace(uncorrected, values=phi, before=before, low=low / 1.5, high=1.5 * high)
     caption = (
         f"{symbol(run.case, canopy.parameter)} corrected to a canopy of {canopy.to_height:g} m: "
         f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>."
