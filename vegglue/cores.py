@@ -8,9 +8,10 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from joblib import Parallel, delayed
+from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import threadpool_limits
 
 
@@ -26,8 +27,12 @@ def in_order(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: i
 
 def in_threads(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> list[Any]:
     """work(*task) for every task, in their order, by threads: for compiled work on large values that all share."""
+    threads = cpu_count() if jobs < 0 else jobs
     with threadpool_limits(1):
-        return list(Parallel(n_jobs=jobs, backend="threading")(delayed(work)(*task) for task in tasks))
+        if threads == 1:
+            return [work(*task) for task in tasks]
+        with ThreadPoolExecutor(threads) as pool:  # joblib's own would look for results every hundredth of a second
+            return list(pool.map(lambda task: work(*task), tasks))
 
 
 def _pool(jobs: int, order: str) -> Parallel:
@@ -40,7 +45,8 @@ def _alone(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
 
 
 def _serve() -> None:
-    """A worker leaves Ctrl-C to the run it serves, and does not outlive it."""
+    """A worker is one core, leaves Ctrl-C to the run it serves, and does not outlive it."""
+    os.environ["LOKY_MAX_CPU_COUNT"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     run = os.getppid()
 

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import scipy.stats
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
 from vegglue.schema import Parameter
 
@@ -16,7 +18,14 @@ SMALLEST_PROBABILITY = 2.0**-31
 
 def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
     """x with P(X <= x) = probability; at 0 and 1 the bounds of the prior, maybe infinite [unit of the prior]."""
-    return np.asarray(_distribution(prior).ppf(probability), dtype=np.float64)
+    number, share = _numbers(prior), np.asarray(probability, dtype=np.float64)
+    if prior.distribution == "uniform":
+        return np.asarray(number["low"] + share * (number["high"] - number["low"]))
+    if prior.distribution == "loguniform":
+        return np.asarray(number["low"] * (number["high"] / number["low"]) ** share)
+    if prior.distribution == "lognormal":
+        return np.asarray(number["median"] * np.exp(number["log_sd"] * ndtri(share)))
+    return np.asarray(_distribution(prior).ppf(share), dtype=np.float64)
 
 
 def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
@@ -44,8 +53,9 @@ def log_prior(parameters: Mapping[str, Parameter], theta: Mapping[str, ArrayLike
     return np.sum(terms, axis=0, dtype=np.float64)
 
 
+@lru_cache(maxsize=256)  # scipy takes a millisecond to make one
 def _distribution(prior: Parameter) -> Any:
-    number = {key: math.nan if value is None else value for key, value in _numbers(prior).items()}
+    number = _numbers(prior)
     if prior.distribution == "uniform":
         return scipy.stats.uniform(number["low"], number["high"] - number["low"])
     if prior.distribution == "loguniform":
@@ -58,5 +68,6 @@ def _distribution(prior: Parameter) -> Any:
     return scipy.stats.truncnorm(low, high, loc=mean, scale=sd)
 
 
-def _numbers(prior: Parameter) -> dict[str, float | None]:
-    return {key: getattr(prior, key) for key in ("low", "high", "mean", "sd", "median", "log_sd")}
+def _numbers(prior: Parameter) -> dict[str, float]:
+    keys = ("low", "high", "mean", "sd", "median", "log_sd")
+    return {key: math.nan if (value := getattr(prior, key)) is None else value for key in keys}
