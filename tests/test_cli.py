@@ -106,7 +106,7 @@ def test_the_snippet_of_the_readme_runs(
     assert re.search(r"n_b +0\.05", said)
     assert float(re.findall(r"([\d.]+) m/s is expected", said)[0]) == pytest.approx(0.40, abs=0.03)
     assert isinstance(names["weights"], xr.DataArray)
-    for file in ("members", "theta"):
+    for file in ("members", "ensemble"):
         names[file].close()  # type: ignore[attr-defined]
 
 

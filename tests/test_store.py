@@ -353,7 +353,7 @@ def a_posterior(canopy: bool) -> Posterior:
         bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])}, sigma=per_kind, rmse=per_kind,
         best_rmse=per_kind, noise=np.array([0.02, np.nan]), residual=random.random(2), best_residual=random.random(2),
         model_band=random.random((5, 2)), total_band=random.random((5, 2)), draws=draws, predictive=predictive,
-        station=station, canopy=corrected if canopy else None, method="glue", refinement=None,
+        station=station, canopy=corrected if canopy else None, method="glue", refinement=None, transfer=None,
     )  # fmt: skip
 
 

@@ -116,7 +116,7 @@ def infer(
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = _inferred(case, observations, ensemble, method, jobs)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
-    for sentence in describe(posterior):
+    for sentence in describe(posterior, case.reference.table if case.reference else None):
         console.print(f"- {sentence}")
     console.print(f"Written to {folder / 'posterior.h5'}")
 

@@ -1,10 +1,12 @@
 """What an inference found, in plain sentences with numbers."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from vegglue.describe_refined import UNIT_OF_KIND, drawn, unseen
+from vegglue.describe_transfer import told
 from vegglue.posterior import IDENTIFIED_BELOW, NEAR_BOUND, Posterior
 
 CLAIMED_FROM = 100  # effective members; below, no posterior is claimed
@@ -12,8 +14,10 @@ HEAVY_TAIL = 0.7  # of pareto_k, above which weighted means are not to be truste
 STRONG_CORRELATION = 0.7
 
 
-def describe(posterior: Posterior) -> list[str]:
-    """Sentences on the ensemble and its worth, each parameter, their correlation, the fit, the canopy correction."""
+def describe(posterior: Posterior, others: Mapping[str, object] | None = None) -> list[str]:
+    """Sentences on the ensemble and its worth, each parameter, their correlation, the fit, whether experiments agree,
+    the canopy correction. others: reference values of the case.
+    """
     return [
         *(_ensemble(posterior) if posterior.refinement is None else drawn(posterior, posterior.refinement)),
         *_worth(posterior),
@@ -21,6 +25,7 @@ def describe(posterior: Posterior) -> list[str]:
         *_correlations(posterior),
         *_misfit(posterior),
         *(unseen(posterior, posterior.refinement) if posterior.refinement else ()),
+        *(told(posterior, posterior.transfer, others or {}) if posterior.transfer else ()),
         *_canopy(posterior),
     ]
 

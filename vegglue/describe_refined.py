@@ -85,10 +85,11 @@ def _scores(posterior: Posterior, refined: Refinement) -> list[str]:
     ]
     shaky = [str(name) for name, k in zip(refined.left_out, refined.left_out_k, strict=True) if k > TRUSTED_BELOW]
     if refined.left_out.size:
-        worst = int(np.argmin(refined.left_out_score))
+        each = refined.left_out_score / refined.left_out_stations
+        worst = int(np.argmin(each))
         sentences.append(
             f"Of {refined.left_out.size} sections and experiments left out in turn, the one told worst from the others "
-            f"is {refined.left_out[worst]} (log predictive density {refined.left_out_score[worst]:.1f})."
+            f"is {refined.left_out[worst]} ({each[worst]:.2f} a station, {np.median(each):.2f} in the middle)."
         )
     if shaky:
         sentences.append(f"Without {', '.join(shaky)} the posterior moves too far for these draws: not to be trusted.")

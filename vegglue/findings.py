@@ -9,6 +9,7 @@ import numpy as np
 
 from vegglue.describe import CLAIMED_FROM, HEAVY_TAIL, STRONG_CORRELATION
 from vegglue.describe_refined import UNBELIEVED, drawn, unseen
+from vegglue.describe_transfer import moving, told
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
 from vegglue.observations import Observations
 from vegglue.posterior import Posterior
@@ -50,6 +51,7 @@ def findings(run: Run) -> list[Finding]:
         *(_residual(posterior, kind) for kind in posterior.sigma),
         *_coverage(posterior),
         *_refined(posterior),
+        *_transfer(case, posterior),
         *_flagged(observations),
         *_discharge(case, observations),
         _weights(posterior),
@@ -171,6 +173,12 @@ def _refined(posterior: Posterior) -> Iterator[Finding]:
     yield Finding("draws", html.escape(drawn(posterior, refined)[0]))
     told = html.escape(" ".join(unseen(posterior, refined)))
     yield Finding("unseen", told, doubt=missing or bool(refined.outlier.any()))
+
+
+def _transfer(case: Case, posterior: Posterior) -> Iterator[Finding]:
+    if posterior.transfer is not None:
+        sentences = told(posterior, posterior.transfer, case.reference.table if case.reference else {})
+        yield Finding("transfer", html.escape(" ".join(sentences)), doubt=bool(moving(posterior.transfer).any()))
 
 
 def _flagged(observations: Observations) -> Iterator[Finding]:

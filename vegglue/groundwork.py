@@ -11,7 +11,7 @@ from vegglue.ensemble import Ensemble
 from vegglue.fit import Fitted, fit
 from vegglue.ground import ground_of
 from vegglue.likelihood import fit_members
-from vegglue.linearise import Model, Point
+from vegglue.linearise import Model, Point, linearise
 from vegglue.modes import distinct, modes_of
 from vegglue.noise import Noise, noise_of, with_grid_error
 from vegglue.suspicion import look
@@ -45,16 +45,17 @@ def groundwork(model: Model, ensemble: Ensemble, rule: str, jobs: int) -> Ground
     noise = _first_noise(model, ensemble, rule)
     modes = modes_of(model, noise, ensemble, jobs)
     fits, coarse = list(modes.fits), coarser(model)
-    if rule == "known" and coarse is not None:
-        noise = with_grid_error(noise, grid_difference(coarse, fits[0].point))
+    on_coarse = None if coarse is None else linearise(coarse, fits[0].point.z)
+    if rule == "known":
+        noise = with_grid_error(noise, grid_difference(fits[0].point, on_coarse))
     for _ in range(TURNS if rule != "known" else 0):
         noise = _sized(noise, fits[0], model.station)
         fits = _again(model, noise, fits)
-    seen = look(Baseline(model, noise, fits[0], coarse), _half_width(model), (), keep_noise=False)
+    seen = look(Baseline(model, noise, fits[0], coarse, on_coarse), _half_width(model), (), keep_noise=False)
     noise = seen.noise if rule == "known" else replace(seen.noise, scale=1.0)
     fits = _again(model, noise, fits)
     surprise = unexplained(noise, fits[0].point)
-    return Groundwork(model, noise, tuple(fits), modes.starts, surprise, rule == "known" and coarse is not None)
+    return Groundwork(model, noise, tuple(fits), modes.starts, surprise, rule == "known" and on_coarse is not None)
 
 
 def unexplained(noise: Noise, point: Point) -> Array:

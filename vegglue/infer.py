@@ -65,6 +65,7 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
         prediction=ensemble.prediction,
         station=station,
         refinement=None,
+        transfer=None,
         canopy=corrected_canopy(ensemble.parameters, case, weights),
         **{name: getattr(fit, name) for name in ("best", "sigma", "noise", "efficiency", "log_likelihood")},
         ensemble_hash=ensemble.config_hash,
@@ -139,6 +140,11 @@ def _seen(values: Floats, prior: Parameter) -> Floats:
     """The values on the scale on which the prior is flat or normal: their log10, or themselves."""
     with np.errstate(divide="ignore"):  # the lower bound of a lognormal prior is 0
         return np.log10(values) if _on_log_scale(prior) else values
+
+
+def on_flat_scale(case: Case, theta: dict[str, Floats]) -> Floats:
+    """Values (m,) of each parameter on the scale on which its prior is flat or normal, (m, p)."""
+    return np.column_stack([_seen(theta[name], prior) for name, prior in case.parameters.items()])
 
 
 def _range(quantiles: Floats) -> float:

@@ -70,8 +70,28 @@ class Refinement:
     surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
     outlier: Annotated[np.ndarray, Stored(("station",))]  # whether one such among all stations is no chance
     left_out: Annotated[np.ndarray, Stored(("group",))]  # sections and experiments left out in turn
-    left_out_score: Annotated[np.ndarray, Stored(("group",))]
+    left_out_stations: Annotated[np.ndarray, Stored(("group",))]
+    left_out_score: Annotated[np.ndarray, Stored(("group",))]  # log predictive density of them together
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Each experiment calibrated alone: what its data say of each parameter, and whether that is one value for all.
+
+    Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data say
+    little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
+    """
+
+    experiments: Annotated[np.ndarray, Stored(("experiment",))]
+    value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
+    error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
+    chi2: Annotated[np.ndarray, Stored(("parameter",))]
+    freedom: Annotated[np.ndarray, Stored(("parameter",))]
+    p: Annotated[np.ndarray, Stored(("parameter",))]
+    misfit_together: Annotated[np.ndarray, Stored(("experiment",))]
+    misfit_alone: Annotated[np.ndarray, Stored(("experiment",))]
+    stations: Annotated[np.ndarray, Stored(("experiment",))]
 
 
 @dataclass(frozen=True)
@@ -129,22 +149,25 @@ class Posterior:
     station: pd.DataFrame
     canopy: CorrectedCanopy | None
     refinement: Refinement | None
+    transfer: Transfer | None  # of several experiments
 
 
-PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement}
+PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
 
 
 def groups(posterior: Posterior) -> dict[str, Group]:
     """All groups of posterior.h5: those ArviZ knows, `members` with every array, `stations` with the whole table."""
     coordinates = _coordinates(posterior)
-    arrays = {name: _variable(getattr(posterior, name), stored) for name, stored in stored_fields(Posterior).items()}
-    own = {"members": Group(coordinates, arrays), "stations": table_group(posterior.station, "station", STATION_UNITS)}
-    for name, part in _parts(posterior).items():
-        stored = stored_fields(type(part))
-        dims = dict.fromkeys(dim for each in stored.values() for dim in each.dims)
-        values = {field: _variable(getattr(part, field), each) for field, each in stored.items()}
-        own[name] = Group({dim: coordinates[dim] for dim in dims}, values)
+    own = {name: _group(part, coordinates) for name, part in ({"members": posterior} | _parts(posterior)).items()}
+    own["stations"] = table_group(posterior.station, "station", STATION_UNITS)
     return own | _arviz_groups(posterior)
+
+
+def _group(part: Any, coordinates: Mapping[str, Any]) -> Group:
+    stored = stored_fields(type(part))
+    dims = dict.fromkeys(dim for each in stored.values() for dim in each.dims)
+    values = {name: _variable(getattr(part, name), each) for name, each in stored.items()}
+    return Group({dim: coordinates[dim] for dim in dims}, values)
 
 
 def _parts(posterior: Posterior) -> dict[str, Any]:
@@ -203,10 +226,15 @@ def _value(group: Mapping[str, np.ndarray], name: str, stored: Stored, kind: typ
 
 
 def _coordinates(posterior: Posterior) -> dict[str, Any]:
-    names, refined = np.array(posterior.parameters, object), posterior.refinement
-    counted = {"mode": "mode_chi2", "round": "drawn", "group": "left_out"}
-    of_refinement = {dim: np.arange(len(getattr(refined, field))) for dim, field in counted.items()} if refined else {}
-    return of_refinement | {
+    names = np.array(posterior.parameters, object)
+    counted = {"mode": "mode_chi2", "round": "drawn", "group": "left_out", "experiment": "experiments"}
+    own = {
+        dim: np.arange(len(getattr(part, field)))
+        for part in _parts(posterior).values()
+        for dim, field in counted.items()
+        if hasattr(part, field)
+    }
+    return own | {
         "member": np.arange(posterior.members),
         "station": np.arange(len(posterior.station)),
         "parameter": names,

@@ -26,11 +26,12 @@ from vegglue.linearise import model_of, theta_at
 from vegglue.mixture import Mixture, around
 from vegglue.noise import Noise, covariance_of
 from vegglue.observations import Observations
-from vegglue.posterior import Posterior, Refinement
+from vegglue.posterior import Posterior, Refinement, Transfer
 from vegglue.prior import sample_prior
 from vegglue.runs import predict
 from vegglue.schema import Case
 from vegglue.statistics import effective_size, pareto_shape
+from vegglue.transfer import transfer
 
 # Effective draws that are asked for.
 WANTED = 1000
@@ -54,7 +55,8 @@ def refine(
     say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
     run = partial(predict, base.model, [one.point for one in base.fits], jobs)
     drawn = sample(run, partial(log_posterior, base.noise), start_of(base.fits), WANTED, case.simulate.seed)
-    return _posterior(base, drawn, ensemble)
+    moved = transfer(base.model, base.noise, base.fits[0].point, jobs)
+    return _posterior(base, drawn, moved, ensemble)
 
 
 def refinable(case: Case) -> bool:
@@ -78,7 +80,7 @@ def start_of(fits: tuple[Fitted, ...]) -> Mixture:
     return around(np.stack([one.point.z for one in fits]), covariances, mass)
 
 
-def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior:
+def _posterior(base: Groundwork, drawn: Sample, moved: Transfer | None, ensemble: Ensemble) -> Posterior:
     case, station, noise, weights = base.model.case, base.model.station, base.noise, drawn.weights
     theta, seed = theta_at(case, drawn.z), case.simulate.seed
     residual = station["value"].to_numpy(float) - drawn.values
@@ -112,6 +114,7 @@ def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior
         station=station,
         canopy=corrected_canopy(theta, case, weights),
         refinement=_refinement(base, drawn, best),
+        transfer=moved,
         **marginals(theta, case, weights),
         **predictions(drawn.values, best, own, weights, station, seed, _spread(noise, len(station))),
     )
@@ -158,6 +161,7 @@ def _refinement(base: Groundwork, drawn: Sample, best: int) -> Refinement:
         surprise=at_all(base.surprise),
         outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2 < NO_CHANCE, otherwise=False),
         left_out=np.array(list(groups), object),
+        left_out_stations=np.array([rows.size for rows in groups.values()]),
         left_out_score=np.array([one.score for one in without]),
         left_out_k=np.array([one.k for one in without]),
     )

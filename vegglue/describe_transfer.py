@@ -1,0 +1,69 @@
+"""What calibrating each experiment alone says, in plain sentences with numbers."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vegglue.posterior import Posterior, Transfer
+
+# Chance below which a parameter is said to differ, between all parameters that were compared.
+REJECTED = 0.01
+# In a reference table, what others found for the same chi2.
+PREFIX = "chi2_"
+
+
+def moving(transfer: Transfer) -> np.ndarray:
+    """Which parameters (parameter,) are not one value for all experiments."""
+    compared = int(np.sum(transfer.freedom > 0))
+    return np.nan_to_num(transfer.p, nan=1.0) * max(compared, 1) < REJECTED
+
+
+def told(posterior: Posterior, transfer: Transfer, others: Mapping[str, object]) -> list[str]:
+    """Sentences on each shared parameter, the worst first, and what to make of them; others: reference values."""
+    order = [int(j) for j in np.argsort(-np.nan_to_num(transfer.chi2)) if transfer.freedom[j] > 0]
+    if not order:
+        return ["Calibrated alone, no two experiments tell the same parameter: nothing to compare between them."]
+    moves = moving(transfer)
+    said = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order]
+    names = [posterior.parameters[j] for j in order if moves[j]]
+    return [*said, _misfits(transfer), _meaning(names)]
+
+
+def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
+    name = posterior.parameters[j]
+    scale = f"log10 {name}" if name in posterior.log10_median else name
+    each = ", ".join(
+        f"{value:.3g} ± {error:.1g} ({experiment})"
+        for experiment, value, error in zip(
+            transfer.experiments, transfer.value[:, j], transfer.error[:, j], strict=True
+        )
+        if np.isfinite(value)
+    )
+    verdict = "not one value for all" if moves else "one value for all will do"
+    other = others.get(PREFIX + name)
+    beside = f"; the source has {other:g}" if isinstance(other, int | float) else ""
+    return (
+        f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {transfer.chi2[j]:.3g} with "
+        f"{int(transfer.freedom[j])} degrees of freedom (p = {transfer.p[j]:.2g}{beside}), {verdict}."
+    )
+
+
+def _misfits(transfer: Transfer) -> str:
+    each = ", ".join(
+        f"{together:.3g} together and {alone:.3g} alone over {int(stations)} stations ({experiment})"
+        for experiment, together, alone, stations in zip(
+            transfer.experiments, transfer.misfit_together, transfer.misfit_alone, transfer.stations, strict=True
+        )
+    )
+    return f"The misfit chi2 is {each}."
+
+
+def _meaning(names: list[str]) -> str:
+    if not names:
+        return "The calibration carries over from one experiment to the others."
+    many = len(names) > 1
+    return (
+        f"{' and '.join(names)} {'have' if many else 'has'} to move between experiments to fit each: "
+        f"{'they stand' if many else 'it stands'} in for something that changes between them and that the model lacks, "
+        "and a prediction for another flow cannot rest on one value. `vegglue diagnose` asks what that is."
+    )
