@@ -10,7 +10,16 @@ import pytest
 from matplotlib.colors import to_hex
 
 from vegglue.figure_plan import draw_reach, stream_function, wet_window
-from vegglue.figure_posterior import Reference, Unknown, density, draw_cylinder, draw_joint, draw_marginal, draw_weights
+from vegglue.figure_posterior import (
+    DISCS,
+    Reference,
+    Unknown,
+    density,
+    draw_cylinder,
+    draw_joint,
+    draw_marginal,
+    draw_weights,
+)
 from vegglue.figure_style import COLOUR, PALETTE, inline, publish
 from vegglue.figures import Bands, Vertical, draw_quantiles, draw_section, draw_verticals
 from vegglue.flow import FlowFields
@@ -149,6 +158,14 @@ def test_joint_draws_area_in_proportion_to_weight() -> None:
     sizes = figure.axes[0].collections[0].get_sizes()
     assert len(sizes) == 3
     assert sizes[0] == pytest.approx(2 * sizes[1])
+
+
+def test_joint_of_many_draws_shows_some_of_them() -> None:
+    values = np.linspace(1.0, 4.0, 3000)
+    figure = draw_joint(unknown(values, 0, 5), unknown(values, 0, 5), np.ones(3000), [])
+    drawn = np.asarray(figure.axes[0].collections[0].get_offsets())[:, 0]
+    assert 200 < len(drawn) <= DISCS
+    assert (drawn.min(), drawn.max()) == pytest.approx((1.0, 4.0), abs=0.02)
 
 
 def test_all_weight_on_one_member_can_be_drawn() -> None:

@@ -10,6 +10,8 @@ from vegglue.posterior import Posterior, Refinement
 UNIT_OF_KIND = {"velocity": "m/s", "level": "m"}
 # Chances below which errors alone are not believed to explain what is seen.
 DOUBTED, UNBELIEVED = 0.05, 0.001
+# Stations that are named one by one, at most.
+NAMED = 5
 
 
 def drawn(posterior: Posterior, refined: Refinement) -> list[str]:
@@ -107,6 +109,15 @@ def _bands(refined: Refinement) -> list[str]:
 
 
 def _outliers(posterior: Posterior, refined: Refinement) -> list[str]:
+    many = int(refined.outlier.sum())
+    if many > NAMED:
+        worst = int(np.nanargmax(np.abs(np.where(refined.outlier, refined.surprise, np.nan))))
+        row = posterior.station.iloc[worst]
+        return [
+            f"{many} stations stand out by more than chance allows from what all others and the model tell, most "
+            f"of all {row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m, by "
+            f"{refined.surprise[worst]:+.1f} of its errors: so many are no single errors but something missing."
+        ]
     return [
         f"Station {row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m stands out by "
         f"{surprise:+.1f} of its errors from what all others and the model tell; it is kept."

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 GRID = 240  # points of a drawn density
 SHOWN = 1024  # members drawn for the prior: the start of a Sobol' sequence is as even as the whole
+DISCS = 400  # members drawn for the posterior, at most
 NARROW_WIDTH = 3.4  # three to a row of the page [inch]
 
 
@@ -122,7 +123,7 @@ def _mark(axes: Axes, unknown: Unknown, reference: Reference, height: float) -> 
           ha="right" if left else "left", va="center", xytext=(-6 if left else 6, 0))  # fmt: skip
 
 
-def _window(unknown: Unknown, heavy: NDArray[np.bool_], marked: Sequence[float]) -> tuple[float, float]:
+def _window(unknown: Unknown, heavy: NDArray[np.int64], marked: Sequence[float]) -> tuple[float, float]:
     """The drawn range around the members that count and the marks, within the prior."""
     shown = unknown.coordinate(np.concatenate([unknown.values[heavy], marked]))
     low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
@@ -155,9 +156,10 @@ def draw_joint(
     x, y = across.coordinate(across.values), upward.coordinate(upward.values)
     before = across.coordinate(across.before)[:SHOWN], upward.coordinate(upward.before)[:SHOWN]
     axes.plot(*before, ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
-    heavy = weights > 1e-3 * weights.max()
+    heavy = np.flatnonzero(weights > 1e-3 * weights.max())
+    discs = heavy[:: -(-heavy.size // DISCS)]  # draws of about equal weight are many: each n-th of them
     axes.scatter(
-        x[heavy], y[heavy], 55 * weights[heavy] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0
+        x[discs], y[discs], 55 * weights[discs] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0
     )
     for place, (name, value_x, value_y, marker) in enumerate(marks):
         at = float(across.coordinate(value_x)), float(upward.coordinate(value_y))
