@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vegglue import kernels
 from vegglue.effect import Acting, Array, Cells, Ground, Stand, applied
 from vegglue.ground import part
 
@@ -87,7 +88,7 @@ def closures(
     return Closures(found["rate"], found["viscosity"], momentum)
 
 
-ZERO = np.zeros(1)
+ZERO, NOTHING = np.zeros(1), np.zeros((0, 0, 0))
 
 
 def _cells(
@@ -110,49 +111,6 @@ def _cells(
 
 
 def push(out: Array, momentum: dict[str, Array], depth: Array, film: float, dx: float, dy: float) -> None:
-    """R_u -= f - (1/h) div(h T) on east faces and R_v alike on south faces, h of a face the mean of its cells.
-
-    Faded out in the film on dry land like advection.
-    """
-    x, y = _thrust(momentum, depth, dx, dy)
-    if x is not None:
-        pair = depth[1:] + depth[:-1]
-        along = (x[1:] + x[:-1]) / pair
-        if "xx" in momentum:
-            along -= 2.0 * np.diff(momentum["xx"], axis=0) / (dx * pair)
-        out[:-1, ALONG] -= along * _afloat(0.5 * pair, film)
-        out[-1, ALONG] -= x[-1] / depth[-1] * _afloat(depth[-1], film)
-    if y is not None:
-        pair = depth[:, 1:] + depth[:, :-1]
-        across = (y[:, 1:] + y[:, :-1]) / pair
-        if "yy" in momentum:
-            across -= 2.0 * np.diff(momentum["yy"], axis=1) / (dy * pair)
-        out[:, ACROSS, 1:] -= across * _afloat(0.5 * pair, film)
-
-
-def _thrust(momentum: dict[str, Array], depth: Array, dx: float, dy: float) -> tuple[Array | None, Array | None]:
-    """h f - d(h T_xy) at cell centres [m2/s2], along x and y."""
-    x = depth * momentum["x"] if "x" in momentum else None
-    y = depth * momentum["y"] if "y" in momentum else None
-    if "xy" in momentum:
-        x = (0.0 if x is None else x) - _slope(momentum["xy"], dy, 1)
-        y = (0.0 if y is None else y) - _slope(momentum["xy"], dx, 0)
-    if x is None and "xx" in momentum:
-        x = np.zeros_like(depth)
-    if y is None and "yy" in momentum:
-        y = np.zeros_like(depth)
-    return x, y
-
-
-def _slope(values: Array, step: float, axis: int) -> Array:
-    """Central differences; nothing is carried beyond the sides of the grid."""
-    if axis == 1:
-        beside = np.zeros((values.shape[0], values.shape[1] + 2, values.shape[2]))
-        beside[:, 1:-1] = values
-        return (beside[:, 2:] - beside[:, :-2]) / (2.0 * step)
-    return np.gradient(values, step, axis=0) if values.shape[0] > 1 else np.zeros_like(values)
-
-
-def _afloat(depth: Array, film: float) -> Array:
-    ratio = (0.5 * depth / film) ** 4
-    return ratio / (1.0 + ratio)
+    """Take forces and the divergence of momentum fluxes from a residual (nx, 3, ny, m), see kernels.push."""
+    x, y, xx, xy, yy = (momentum.get(name, NOTHING) for name in ("x", "y", "xx", "xy", "yy"))
+    kernels.push(out, depth, x, y, xx, xy, yy, film, dx, dy)

@@ -231,12 +231,23 @@ class Reading:
 
 def along(values: Array, dx: float) -> Array:
     """d/dx by central differences, one-sided at the ends."""
-    return np.gradient(values, dx, axis=0) if values.shape[0] > 1 else np.zeros_like(values)
+    return _slope(values, dx) if values.shape[0] > 1 else np.zeros_like(values)
 
 
 def across(values: Array, dy: float) -> Array:
     """d/dy by central differences, one-sided at the ends."""
-    return np.gradient(values, dy, axis=1) if values.shape[1] > 1 else np.zeros_like(values)
+    if values.shape[1] < 2:
+        return np.zeros_like(values)
+    return _slope(values.swapaxes(0, 1), dy).swapaxes(0, 1)
+
+
+def _slope(values: Array, step: float) -> Array:
+    """What numpy.gradient gives along the first axis, in fewer passes: effects ask for it in every residual."""
+    slope = np.empty_like(values)
+    np.subtract(values[2:], values[:-2], out=slope[1:-1])
+    slope[1:-1] *= 0.5 / step
+    slope[0], slope[-1] = (values[1] - values[0]) / step, (values[-1] - values[-2]) / step
+    return slope
 
 
 def applied(acting: tuple[Acting, ...], stage: Stage, stand: Any, neutral: Mapping[str, Array]) -> dict[str, Array]:
@@ -247,14 +258,22 @@ def applied(acting: tuple[Acting, ...], stage: Stage, stand: Any, neutral: Mappi
     added = ADDED.get(stage, ())
     now = dict(neutral)
     for one in acting:
-        if one.effect.stage != stage or not one.on.any():
+        on = one.on
+        if one.effect.stage != stage or not on.any():
             continue
         change = one.effect.act(stand, **one.values)
         for name, value in change.items():
             if name in added:
-                now[name] = now[name] + np.where(one.on, value, 0.0)
+                now[name] = now[name] + _chosen(on, value, np.zeros(1))
             else:
-                now[name] = np.where(one.on, value, now[name])
+                now[name] = _chosen(on, value, now[name])
         if not added:
             stand = replace(stand, **{name: now[name] for name in change})
     return now
+
+
+def _chosen(on: NDArray[np.bool_], value: Array, otherwise: Array) -> Array:
+    """np.where, without a copy when all members are on."""
+    if on.all():
+        return np.broadcast_to(value, np.broadcast_shapes(np.shape(value), np.shape(otherwise)))
+    return np.where(on, value, otherwise)

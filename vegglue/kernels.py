@@ -257,6 +257,50 @@ def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy):
 
 
 @compiled
+def push(out, depth, x, y, xx, xy, yy, film, dx, dy):
+    """R_u -= f_x - (1/h) div(h T) on east faces and R_v alike on south faces, h of a face the mean of its cells.
+
+    Forces x, y [m/s2] and fluxes xx, xy, yy = h T [m3/s2] at cell centres (nx, ny, m), empty when there are none;
+    nothing is carried through the sides of the grid. Faded out in the film on dry land like advection.
+    """
+    nx, ny, m = depth.shape
+    half_per_film = 0.5 / film
+    along, across = np.zeros((nx, ny, m)), np.zeros((nx, ny, m))
+    for i in range(nx):
+        before, after = max(i - 1, 0), min(i + 1, nx - 1)
+        for j in range(ny):
+            for k in range(m):
+                if x.size:
+                    along[i, j, k] = depth[i, j, k] * x[i, j, k]
+                if y.size:
+                    across[i, j, k] = depth[i, j, k] * y[i, j, k]
+                if xy.size:
+                    north = xy[i, j + 1, k] if j + 1 < ny else 0.0
+                    south = xy[i, j - 1, k] if j > 0 else 0.0
+                    along[i, j, k] -= (north - south) / (2.0 * dy)
+                    if nx > 1:
+                        across[i, j, k] -= (xy[after, j, k] - xy[before, j, k]) / ((after - before) * dx)
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(m):
+                here = depth[i, j, k]
+                if i + 1 < nx:
+                    pair = here + depth[i + 1, j, k]
+                    pushed = along[i, j, k] + along[i + 1, j, k]
+                    if xx.size:
+                        pushed -= 2.0 * (xx[i + 1, j, k] - xx[i, j, k]) / dx
+                else:
+                    pair, pushed = 2.0 * here, 2.0 * along[i, j, k]
+                out[i, 2, j, k] -= pushed / pair * _afloat(0.5 * pair, half_per_film)
+                if j > 0:
+                    pair = here + depth[i, j - 1, k]
+                    pushed = across[i, j, k] + across[i, j - 1, k]
+                    if yy.size:
+                        pushed -= 2.0 * (yy[i, j, k] - yy[i, j - 1, k]) / dy
+                    out[i, 1, j, k] -= pushed / pair * _afloat(0.5 * pair, half_per_film)
+
+
+@compiled
 def cell_depth(state, bed, lift, reach, film):
     """h (nx, ny, m) at cell centres [m] of a state (nx, 3, ny, m)."""
     nx, _, ny, m = state.shape
