@@ -16,6 +16,7 @@ from vegglue.channel_figure import save_channel_figure
 from vegglue.check import check_case
 from vegglue.cli_effects import effects_command
 from vegglue.cli_loop import COMMANDS, Trust
+from vegglue.cli_twin import COMMANDS as OF_TWINS
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.describe import describe
 from vegglue.ensemble import Ensemble
@@ -146,7 +147,7 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs"), t
     console.print(f"Report: {page.resolve()}")
 
 
-for _name, _command in (*COMMANDS, ("effects", effects_command)):
+for _name, _command in (*COMMANDS, *OF_TWINS, ("effects", effects_command)):
     app.command(name=_name)(_command)
 
 
