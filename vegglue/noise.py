@@ -1,6 +1,6 @@
 """What a residual may be without anything missing: errors of the data, correlated along a section, and of the grid.
 
-    cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation
+cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation
 """
 
 from dataclasses import dataclass, replace
@@ -19,6 +19,8 @@ from vegglue.errors import InputError
 OF_DIFFERENCE = 0.6
 # Difference of twice the log-likelihood above which stated errors count as too small (1 % of chi2 with one degree).
 TOO_SMALL = 6.6
+# Correlations, and sizes of what else there is, from the best of which the search for the likeliest begins.
+RHO, SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -101,21 +103,21 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
         return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
 
     gram = explained @ explained.T
-    sizes = np.log((0.1, 1.0, 10.0))
+    begin = [(cost(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho in RHO for t in SIZES]
+    _, *start = min(begin)
 
     def best(scale_free: bool) -> tuple[float, float, float]:
         def unfold(x: Array) -> tuple[float, float, float]:
             rho, scale = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[2], -3.0, 3.0)) if scale_free else 1.0
             return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
 
-        found = []
-        for log_t in sizes:
-            start = np.array([-1.5, log_t, 0.0][: 3 if scale_free else 2])
-            end = scipy.optimize.minimize(
-                lambda x: cost(*unfold(x)), start, method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.02}
-            )
-            found.append((float(end.fun), *unfold(end.x)[:2]))
-        return min(found)
+        end = scipy.optimize.minimize(
+            lambda x: cost(*unfold(x)),
+            np.array([*start, 0.0][: 3 if scale_free else 2]),
+            method="Nelder-Mead",
+            options={"xatol": 0.02, "fatol": 0.02},
+        )
+        return float(end.fun), *unfold(end.x)[:2]
 
     fixed, free = best(False), best(True)
     _, rho, scale = free if fixed[0] - free[0] > TOO_SMALL and free[2] > 1.0 else fixed
