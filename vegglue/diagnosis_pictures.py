@@ -51,7 +51,7 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict}. {diagnosis.sentence}", 150)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
-    suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.35, 1, 0.95))
+    suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
     paint_suspects(scores, visible, _table(diagnosis), diagnosis.threshold)
     paint_alike(alike.subplots(), diagnosis.cosine_names, diagnosis.cosine)

@@ -24,6 +24,8 @@ from vegglue.typography import fixed
 USUAL = 2.0
 # Root mean square misfit in standard errors that is set in bold; errors alone make 1.
 UNUSUAL = 2.0
+# Score that a map has at least in full colour, lest the ripples of errors alone look like a find.
+FULL = 6.0
 # Strength of a colour from one quarter of the largest score of a map to the next, the first left blank.
 SHADES = (0.22, 0.5, 0.85)
 BEFORE: dict[str, Any] = {"color": COLOUR["muted"], "linewidth": 1.2, "dashes": (3, 2)}
@@ -150,12 +152,12 @@ def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
     columns = list(dict.fromkeys(zones["zone"]))
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
     mean = np.nan_to_num(zones["mean"] / zones["standard_error"])
-    largest = float(size.max(initial=UNUSUAL))
+    largest = float(size.max(initial=2 * UNUSUAL))
     for each, miss, row in zip(size, mean, zones.itertuples(), strict=True):
         across, down = columns.index(row.zone), rows.index((row.experiment, row.section))
         face = COLOUR["measured"] if miss > 0 else "none"
         axes.scatter(
-            across - 0.3, down, 170 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
+            across - 0.34, down, 110 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
         )
         weight = "bold" if each > UNUSUAL else "normal"
         axes.text(across + 0.06, down, fixed(float(each), 1), ha="right", va="center", fontsize=8, fontweight=weight)
@@ -217,7 +219,8 @@ def _raster(x: Array, y: Array, score: Array) -> tuple[Array, Array, Array]:
 
 
 def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest: float) -> None:
-    quarters = largest * np.array([0.25, 0.5, 0.75, 1.0])
+    full = max(largest, FULL)
+    quarters = full * np.array([0.25, 0.5, 0.75, 1.0])
     shown = np.ma.masked_invalid(field.T)
     for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):
         faces = [to_rgba(COLOUR[colour], shade) for shade in SHADES]
@@ -225,7 +228,7 @@ def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest
         axes.contour(
             along, across, sign * shown, levels=quarters[:-1], colors=COLOUR[colour], linewidths=0.7, linestyles=line
         )
-    text = f"steps of {fixed(0.25 * largest, 1)} standard errors; largest {fixed(largest, 1)}"
+    text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
     axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
     for place, words, colour in (
         (0.0, "━ more drag here would help", "model"), (0.24, "╌ less drag here would help", "measured"),

@@ -57,7 +57,7 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
         scores.plot(first[chosen], rows[chosen], linestyle="", zorder=5, label=word, **_mark(word))
     scores.axvline(threshold, color=COLOUR["ink"], linewidth=0.9, dashes=(4, 2))
     scores.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
-    reach = 1.15 * float(np.nanmax([threshold, *first, *left]))
+    reach = float(np.nanmax([3.2 * threshold, *(1.15 * first), *(1.15 * left)]))  # room right of the threshold
     scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, -0.9), xlabel="score [standard errors], root scale")
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
     label(scores, threshold, -0.9, "errors alone seldom reach this", xytext=(4, -8), va="center")
