@@ -1,13 +1,18 @@
 """Laws of resistance of plants against their formulas written out again, their limits, and each other."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
 from channels import make_problem, planted, sloping, solved
 
 from vegglue.canopy import LAWS
+from vegglue.contract import CHANNEL
 from vegglue.flow import Plants, drag, faces
+from vegglue.problem import build_problem
+from vegglue.schema import Case, Stand
+from vegglue.site import build_site
 
 G, KARMAN, BARE = 9.81, 0.4, 60.0
 
@@ -145,3 +150,16 @@ def test_uniform_flow_over_plants_has_the_speed_of_the_law(law):
     bed = sloping(40.0, 20, 3, slope)
     problem = make_problem(bed, (2.0, 1.0), speed * 0.9 * 3.0, 0.9 - slope * 40.0, plants=plants, film=1e-5)
     assert faces(problem, solved(problem)).u == pytest.approx(speed, rel=1e-4)
+
+
+def test_a_case_names_the_law_of_each_stand():
+    stands = {
+        "low": {**CHANNEL["plants"]["stands"]["low"], "law": "huthoff"},
+        "high": CHANNEL["plants"]["stands"]["high"],
+    }
+    case = Case.model_validate(CHANNEL | {"source": "x", "plants": CHANNEL["plants"] | {"stands": stands}})
+    plants = build_problem(case, build_site(case), "flow", {}).plants
+    low = plants.column < 18
+    assert {LAWS[law] for law in plants.law[low]} == {"huthoff"}
+    assert {LAWS[law] for law in plants.law[~low]} == {"baptist"}
+    assert set(LAWS) == set(get_args(Stand.model_fields["law"].annotation))
