@@ -1,8 +1,7 @@
 """The calibrated model that a diagnosis starts from: its best place, its noise, and the error of its grid."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
 import scipy.stats
 
 from vegglue.effect import Array
@@ -15,46 +14,74 @@ from vegglue.site import build_site
 
 # Places of the prior that are looked at on the coarse grid, and how many of them are followed downhill.
 LOOKED_AT, FOLLOWED = 8, 2
-FEWEST_CELLS = 8
+FEWEST_CELLS = 6
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """A model at its best place; coarse: the same on cells of twice the size, when the grid can be halved."""
+    """A model at its best place; coarse, on_coarse: the same on cells of twice the size and its point at the same
+    place, when the grid can be halved.
+    """
 
     model: Model
     noise: Noise
     fitted: Fitted
     coarse: Model | None
+    on_coarse: Point | None
+
+    @property
+    def quick(self) -> tuple[Model, Noise, Point]:
+        """A model that is cheaper to fit, the noise it is fitted with, and a point to start from.
+
+        The coarse one, its measurements shifted by what the grid makes of the predictions here; or the model itself.
+        """
+        point = self.fitted.point
+        if self.coarse is None or self.on_coarse is None:
+            return self.model, self.noise, point
+        shift = self.noise.used(point.prediction - self.on_coarse.prediction)
+        return self.coarse, replace(self.noise, value=self.noise.value - shift), self.on_coarse
 
 
 def baseline(model: Model, known: Array | None = None) -> Baseline:
-    """Calibrate a model: from `known` (p,), or from the best of some places of the prior, first on a coarse grid.
+    """Calibrate a model: from `known` (p,), or from the best of some places of the prior, on coarse grids first.
 
     Errors: InputError when no flow is found anywhere.
     """
-    noise = noise_of(model.station)
-    coarse = coarser(model)
-    on_coarse = None
-    if known is None:
-        search = coarse or model
-        fits = [fit(search, noise, start) for start in _starts(search, noise)]
-        best = min(fits, key=lambda found: found.objective)
-        known, on_coarse = best.point.z, best.point
-    start = linearise(model, known, on_coarse if coarse is not None else None) or linearise(model, known)
+    noise, coarse = noise_of(model.station), coarser(model)
+    near = None
+    if known is None and coarse is not None:
+        coarsest = coarser(coarse)
+        near = _searched(coarsest or coarse, noise)
+        near = near if coarsest is None else _refined(coarse, noise, near).point
+        known = near.z
+    start = _searched(model, noise) if known is None else linearise(model, known, near) or linearise(model, known)
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow at its best place; widen the priors.")
     fitted = fit(model, noise, start)
-    if coarse is not None:
-        noise = with_grid_error(noise, grid_difference(coarse, fitted.point, on_coarse))
-        fitted = fit(model, noise, fitted.point)
-    return Baseline(model, noise, fitted, coarse)
+    if coarse is None:
+        return Baseline(model, noise, fitted, None, None)
+    on_coarse = linearise(coarse, fitted.point.z, near) or linearise(coarse, fitted.point.z)
+    noise = with_grid_error(noise, grid_difference(fitted.point, on_coarse))
+    fitted = fit(model, noise, fitted.point)
+    return Baseline(model, noise, fitted, coarse, on_coarse)
 
 
-def grid_difference(coarse: Model, point: Point, near: Point | None = None) -> Array:
+def _searched(model: Model, noise: Noise) -> Point:
+    """The best place of a model, from the best of some places of its prior."""
+    return min((fit(model, noise, start) for start in _starts(model, noise)), key=lambda found: found.objective).point
+
+
+def _refined(model: Model, noise: Noise, near: Point) -> Fitted:
+    """The best place of a model, from that of one on cells of twice the size."""
+    start = linearise(model, near.z, near) or linearise(model, near.z)
+    if start is None:
+        raise InputError(f"{model.case.name}: the model finds no steady flow on cells of half the size; refine `grid`.")
+    return fit(model, noise, start)
+
+
+def grid_difference(point: Point, on_coarse: Point | None) -> Array:
     """What predictions (station,) change by on cells of twice the size; zero where the coarse flow finds no rest."""
-    there = linearise(coarse, point.z, near)
-    return np.zeros_like(point.prediction) if there is None else np.asarray(point.prediction - there.prediction)
+    return point.prediction - (point if on_coarse is None else on_coarse).prediction
 
 
 def coarser(model: Model) -> Model | None:

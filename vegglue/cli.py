@@ -18,6 +18,7 @@ from vegglue.cli_effects import effects_command
 from vegglue.cli_loop import COMMANDS, Trust
 from vegglue.cli_twin import COMMANDS as OF_TWINS
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
+from vegglue.cores import alone
 from vegglue.describe import describe
 from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError, StorageError
@@ -202,6 +203,7 @@ def _progress(name: str) -> Iterator[Callable[[Progress], None]]:
 def main() -> None:
     """Entry point: errors a user can mend are one sentence and exit code 2, a full disk or a lock 3, Ctrl-C 130."""
     try:
+        alone()
         app()
     except InputError as error:
         print(error, file=sys.stderr)

@@ -35,6 +35,11 @@ def in_threads(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs:
             return list(pool.map(lambda task: work(*task), tasks))
 
 
+def alone() -> None:
+    """One thread for linear algebra in this process: its matrices are small, and the cores have tasks of their own."""
+    threadpool_limits(1)
+
+
 def _pool(jobs: int, order: str) -> Parallel:
     return Parallel(n_jobs=jobs, return_as=order, pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve)
 

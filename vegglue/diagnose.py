@@ -17,7 +17,7 @@ from vegglue.candidates import Candidate, with_effect
 from vegglue.cores import in_threads
 from vegglue.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
 from vegglue.effect import Array
-from vegglue.fit import Fitted, chi2, covariance, fit, objective
+from vegglue.fit import Fitted, chi2, fit, objective
 from vegglue.ground import ground_of
 from vegglue.linearise import Model, linearise, theta_at
 from vegglue.noise import Noise, with_grid_error, without
@@ -61,7 +61,7 @@ def diagnose(
     place: Where | None = None
     while True:
         say(f"looking for what is missing after {' and '.join(step.accepted for step in steps) or 'nothing'}")
-        seen = look(base, _half_width(base.model), tuple(flagged), keep_noise=False)
+        seen = look(base, _half_width(base.model), tuple(flagged))
         base = replace(base, noise=seen.noise)
         if seen_first is None:
             seen_first, first = seen, base
@@ -116,18 +116,23 @@ def _accept(
     if not refits:
         return None, base, []
     best = min(refits, key=lambda one: one.fitted.objective)
-    before = base.fitted.objective
-    if before - best.fitted.objective < scipy.stats.chi2.ppf(0.95, 1):
+    _, noise, point = base.quick
+    if objective(noise, point) - best.fitted.objective < scipy.stats.chi2.ppf(0.95, 1):
         return None, base, refits
+    say(f"calibrating with {best.candidate.name}")
+    further = _onward(base, seen, best)
+    rivals = _not_rejected(seen, refits)
     step = Step(
         accepted=best.candidate.name,
-        rivals=tuple(one.candidate.name for one in _not_rejected(seen, refits)),
-        groups=_groups(seen, _not_rejected(seen, refits)),
+        rivals=tuple(one.candidate.name for one in rivals),
+        groups=_groups(seen, rivals),
         chi2_before=chi2(base.noise, base.fitted.point),
-        chi2_after=best.fitted.chi2,
+        chi2_after=further.fitted.chi2,
         p_family=seen.effects.p,
     )
-    return step, _onward(base, seen, best), refits
+    amplitude, interval = _interval(further.model, further.fitted, best.candidate.parameter)
+    better = replace(best, amplitude=amplitude, interval95=interval)
+    return step, further, [better if one is best else one for one in refits]
 
 
 def _handful(seen: Look) -> list[int]:
@@ -139,14 +144,14 @@ def _handful(seen: Look) -> list[int]:
 
 
 def _refit(base: Baseline, seen: Look, candidate: int) -> _Refit | None:
-    """The model with one effect more at its best place; None where it finds no flow."""
+    """The quick model with one effect more at its best place; None where it finds no flow."""
     one, column = seen.candidates[candidate], seen.best_column(candidate)
-    case = with_effect(base.model.case, one, seen.settings[column])
-    model = replace(base.model, case=case)
-    start = linearise(model, refit_start(base, seen, candidate, case), base.fitted.point)
+    quick, noise, point = base.quick
+    model = replace(quick, case=with_effect(quick.case, one, seen.settings[column]))
+    start = linearise(model, refit_start(base, seen, candidate, model.case), point)
     if start is None:
         return None
-    fitted = fit(model, base.noise, start, REFIT_STEPS)
+    fitted = fit(model, noise, start, REFIT_STEPS)
     amplitude, interval = _interval(model, fitted, one.parameter)
     return _Refit(one, column, fitted, amplitude, interval)
 
@@ -183,22 +188,23 @@ def _groups(seen: Look, rivals: list[_Refit]) -> tuple[tuple[str, ...], ...]:
 
 def _onward(base: Baseline, seen: Look, best: _Refit) -> Baseline:
     """The model with the accepted effect as the next baseline, the error of its grid looked at again."""
-    case = with_effect(base.model.case, best.candidate, seen.settings[best.column])
-    model = replace(base.model, case=case)
-    coarse = None if base.coarse is None else replace(
-        base.coarse, case=with_effect(base.coarse.case, best.candidate, seen.settings[best.column])
-    )  # fmt: skip
-    noise = base.noise
-    if coarse is not None:
-        noise = with_grid_error(noise, grid_difference(coarse, best.fitted.point))
-    point = best.fitted.point
-    fitted = Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), best.fitted.settled)
-    return Baseline(model, noise, fitted, coarse)
+    shapes = seen.settings[best.column]
+    model = replace(base.model, case=with_effect(base.model.case, best.candidate, shapes))
+    if base.coarse is None:
+        return Baseline(model, base.noise, best.fitted, None, None)
+    coarse, place = replace(base.coarse, case=with_effect(base.coarse.case, best.candidate, shapes)), best.fitted.point
+    start = linearise(model, place.z, place) or linearise(model, place.z)
+    if start is None:
+        return replace(base, model=coarse, fitted=best.fitted, coarse=None, on_coarse=None)
+    fitted = fit(model, base.noise, start)
+    on_coarse = linearise(coarse, fitted.point.z, place)
+    noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
+    return Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse)
 
 
 def _suspects(base: Baseline, seen: Look, known: dict[str, Suspect]) -> dict[str, Suspect]:
     """All effects as this look sees them; what was refitted earlier stays as it was then."""
-    slopes = seen.noise.whiten(seen.noise.used(base.fitted.point.slope))
+    slopes = seen.slopes
     lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     now = {}
     for j, one in enumerate(seen.candidates):

@@ -130,7 +130,7 @@ def _factored(noise: Noise) -> Noise:
 
 def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E of the used stations (n, n)."""
-    related = np.eye(noise.rows.size) if noise.correlation == 0.0 else noise.correlation**noise.apart
+    related = np.eye(noise.rows.size) if noise.correlation == 0.0 else np.exp(noise.apart * np.log(noise.correlation))
     covariance = noise.scale**2 * related * np.outer(noise.error, noise.error)
     return np.asarray(covariance + 0.5 * np.outer(noise.grid, noise.grid) + np.diag(0.5 * noise.grid**2))
 

@@ -49,6 +49,7 @@ class Look:
     columns: list[np.ndarray]
     settings: list[dict[str, float]]
     traces: Array  # whitened (n, c)
+    slopes: Array  # whitened (n, p)
     projected: score.Projected
     scores: Array
     maxima: Array
@@ -66,56 +67,71 @@ class Look:
         return score.family_p(float(self.scores[self.best_column(candidate)]), self.maxima)
 
 
-def look(base: Baseline, half_width: float, flagged: tuple[int, ...], keep_noise: bool, seed: int = 1) -> Look:
+def look(base: Baseline, half_width: float, flagged: tuple[int, ...], seed: int = 1) -> Look:
     """Fingerprints of all candidates, of spots everywhere and of single stations, against the residual.
 
-    keep_noise: take the noise as it is; else estimate its correlation first, with all that could be missing set aside.
+    Fingerprints and slopes are those of the quick model: they only have to point the right way. The correlation of the
+    errors is estimated first, with all that could be missing set aside.
     """
-    model, point = base.model, base.fitted.point
+    model, _, point = base.quick
     candidates = candidates_of(model.case, model.station)
-    changed: list[tuple[Case, str, Amplitude]] = []
-    columns: list[np.ndarray] = []
-    settings: list[dict[str, float]] = []
-    for one in candidates:
-        tried = one.settings()
-        columns.append(np.arange(len(changed), len(changed) + len(tried)))
-        changed += [(with_effect(model.case, one, shapes), one.parameter, one.effect.amplitude) for shapes in tried]
-        settings += tried
-    prints = base.noise.used(fingerprint(model, point, changed))
+    changed, columns, settings = _changes(model.case, candidates)
     there = spots(model, point, half_width)
-    spot_prints = base.noise.used(there.traces)
-    slope, left = base.noise.used(point.slope), base.noise.residual(point.prediction)
-    noise = base.noise
-    if not keep_noise:
-        sizes = np.array([amplitude.scale**amplitude.power for _, _, amplitude in changed])
-        noise = estimated(noise, left, np.hstack([slope, prints * sizes, spot_prints * PLAUSIBLE_SPOT]))
-    white, right = noise.whiten(slope), noise.whiten(left)
+    slope, prints, spot_prints = (
+        base.noise.used(values) for values in (point.slope, fingerprint(model, point, changed), there.traces)
+    )
+    left = base.noise.residual(base.fitted.point.prediction)
+    sizes = np.array([amplitude.scale**amplitude.power for _, _, amplitude in changed])
+    noise = estimated(base.noise, left, np.hstack([slope, prints * sizes, spot_prints * PLAUSIBLE_SPOT]))
+
+    def against(traces: Array) -> score.Projected:
+        return score.project(noise.whiten(slope), noise.whiten(left), base.fitted.point.z, noise.whiten(traces))
+
     one_sided = np.array([amplitude.low >= amplitude.off for _, _, amplitude in changed])
-    traces = noise.whiten(prints)
-    projected = score.project(white, right, point.z, traces)
-    of_spots = score.project(white, right, point.z, noise.whiten(spot_prints))
-    of_stations = score.project(white, right, point.z, noise.whiten(np.eye(right.size)))
-    seen = score.scores(projected, one_sided)
-    drawn = score.null_draws(projected, one_sided, seed)
-    maxima = (drawn**2).max(axis=1)
-    two = np.zeros(there.x.size, bool)
-    alone = score.scores(of_stations, np.zeros(right.size, bool))
+    projected, of_spots, of_stations = against(prints), against(spot_prints), against(np.eye(left.size))
+    maxima = _maxima(projected, one_sided, seed)
+    seen, alone = score.scores(projected, one_sided), score.scores(of_stations, np.zeros(left.size, bool))
     alone[list(flagged)] = 0.0
     return Look(
         noise=noise,
         candidates=candidates,
         columns=columns,
         settings=settings,
-        traces=traces,
+        traces=noise.whiten(prints),
+        slopes=noise.whiten(slope),
         projected=projected,
         scores=seen,
         maxima=maxima,
         effects=_family(seen, maxima),
-        places=_family(score.scores(of_spots, two), (score.null_draws(of_spots, two, seed) ** 2).max(axis=1)),
-        stations=_family(alone, (score.null_draws(of_stations, np.zeros(right.size, bool), seed) ** 2).max(axis=1)),
+        places=_both_ways(of_spots, seed),
+        stations=_family(alone, _maxima(of_stations, np.zeros(left.size, bool), seed)),
         spots=there,
         spot_length=of_spots.length,
     )
+
+
+def _changes(
+    case: Case, candidates: list[Candidate]
+) -> tuple[list[tuple[Case, str, Amplitude]], list[np.ndarray], list[dict[str, float]]]:
+    """The case with each candidate at each of its settings, which columns are whose, and the settings."""
+    changed: list[tuple[Case, str, Amplitude]] = []
+    columns: list[np.ndarray] = []
+    settings: list[dict[str, float]] = []
+    for one in candidates:
+        tried = one.settings()
+        columns.append(np.arange(len(changed), len(changed) + len(tried)))
+        changed += [(with_effect(case, one, shapes), one.parameter, one.effect.amplitude) for shapes in tried]
+        settings += tried
+    return changed, columns, settings
+
+
+def _maxima(projected: score.Projected, one_sided: np.ndarray, seed: int) -> Array:
+    return np.asarray((score.null_draws(projected, one_sided, seed) ** 2).max(axis=1))
+
+
+def _both_ways(projected: score.Projected, seed: int) -> Family:
+    two = np.zeros(projected.length.size, bool)
+    return _family(score.scores(projected, two), _maxima(projected, two, seed))
 
 
 def refit_start(base: Baseline, seen: Look, candidate: int, changed: Case) -> Array:
@@ -124,7 +140,7 @@ def refit_start(base: Baseline, seen: Look, candidate: int, changed: Case) -> Ar
     point, one = base.fitted.point, seen.candidates[candidate]
     gain = float(seen.scores[column] / max(seen.projected.length[column], 1e-300))
     amplitude = start_of(one.effect, gain)
-    slope, noise = seen.noise.whiten(seen.noise.used(point.slope)), seen.noise
+    slope, noise = seen.slopes, seen.noise
     left = noise.whiten(noise.residual(point.prediction)) - seen.traces[:, column] * gain
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ left - point.z)
