@@ -62,7 +62,9 @@ def told(diagnosis: Diagnosis) -> Told:
     """Everything the report says of a diagnosis."""
     first, others = _suspect_rows(diagnosis)
     flagged = [_flagged(diagnosis, row) for row in diagnosis.flagged]
-    return Told(diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, bool(diagnosis.steps), flagged)
+    return Told(
+        diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, bool(diagnosis.steps), flagged
+    )
 
 
 def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:

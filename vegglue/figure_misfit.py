@@ -234,4 +234,3 @@ def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest
         (0.0, "━ more drag here would help", "model"), (0.24, "╌ less drag here would help", "measured"),
     ):  # fmt: skip
         axes.text(place, 1.02, words, transform=axes.transAxes, fontsize=SMALL, color=COLOUR[colour])
-
