@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.stats
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from vegglue.schema import Parameter
 
@@ -25,7 +25,19 @@ def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
         return np.asarray(number["low"] * (number["high"] / number["low"]) ** share)
     if prior.distribution == "lognormal":
         return np.asarray(number["median"] * np.exp(number["log_sd"] * ndtri(share)))
-    return np.asarray(_distribution(prior).ppf(share), dtype=np.float64)
+    return _truncated_normal(number["mean"], number["sd"], prior.low, prior.high, share)
+
+
+def _truncated_normal(
+    mean: float, sd: float, low: float | None, high: float | None, share: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """mean + s sd Phi^-1(A + q (B - A)), from the tail (s = -1: the upper one) in which A and B keep their digits."""
+    a, b = -math.inf if low is None else (low - mean) / sd, math.inf if high is None else (high - mean) / sd
+    if a > 0.0:
+        mirrored = _truncated_normal(-mean, sd, None if high is None else -high, -low, 1.0 - share)  # type: ignore[operator]
+        return np.asarray(-mirrored)
+    below, above = ndtr(a), ndtr(b)
+    return np.clip(mean + sd * ndtri(below + share * (above - below)), low, high)
 
 
 def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
