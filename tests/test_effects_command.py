@@ -14,10 +14,13 @@ OWN = re.search(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)[1]
 IN_CONFIG = re.search(r"^```yaml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)[1]
 
 
+WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
+
+
 def own_case(folder: Path) -> Path:
     """The README's reach with the effect of the page, its values merged into the config."""
     (folder / "slow_stones.py").write_text(OWN, encoding="utf-8")
-    return write_reach(folder, COARSE, *pasted(IN_CONFIG))
+    return write_reach(folder, COARSE, *pasted(IN_CONFIG), WITH_ERROR)
 
 
 def pasted(text: str) -> tuple[tuple[str, str], ...]:
@@ -127,3 +130,13 @@ def test_what_does_not_agree_with_the_library_is_refused(what, tmp_path, monkeyp
     config = write_reach(tmp_path, COARSE, *pasted(f"effects:\n  {entry}\n"))
     code, said = said_to(monkeypatch, capsys, "check", config)
     assert (code, complaint in said, said.count("\n")) == (2, True, 1), said
+
+
+@pytest.mark.slow
+def test_diagnose_weighs_an_effect_of_ones_own_unasked(tmp_path):
+    """The page says that `effect_file` alone makes it a suspect."""
+    (tmp_path / "slow_stones.py").write_text(OWN, encoding="utf-8")
+    named = ("observations:\n", "effect_file: slow_stones.py\nobservations:\n")
+    config = write_reach(tmp_path, COARSE, named, WITH_ERROR)
+    found = json.loads(vegglue(tmp_path, "diagnose", config, "--json", "--trust").stdout)
+    assert "slow_stones" in {effect["name"] for effect in found["effects"]}
