@@ -87,7 +87,11 @@ def test_an_effect_of_ones_own_works_in_every_command(tmp_path):
     config = own_case(tmp_path)
     assert "--trust" in vegglue(tmp_path, "check", config, succeed=False).stderr
     assert "as `slow_stones`" in vegglue(tmp_path, "effects", "slow_stones", "--config", config, "--trust").stdout
-    for arguments in (("check",), ("simulate", "--members", 8, "--jobs", 2), ("infer", "--members", 8, "--method", "glue")):
+    for arguments in (
+        ("check",),
+        ("simulate", "--members", 8, "--jobs", 2),
+        ("infer", "--members", 8, "--method", "glue"),
+    ):
         vegglue(tmp_path, *arguments, config, "--trust")
     page = vegglue(tmp_path, "report", config, "--members", 8, "--trust")
     assert "Report" in page.stdout
