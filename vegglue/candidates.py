@@ -1,6 +1,7 @@
 """What a case could lack: every effect of the library where it may act, as a case with one parameter more."""
 
 import itertools
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -32,8 +33,8 @@ class Candidate:
 
     @property
     def key(self) -> str:
-        """The same as a word, for a config."""
-        return "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices])
+        """The same as a word, for a config, where a parameter is named after it."""
+        return re.sub(r"\W", "_", "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices]))
 
     @property
     def parameter(self) -> str:

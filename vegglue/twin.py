@@ -26,6 +26,7 @@ from vegglue.errors import InputError
 from vegglue.extend import candidate_named
 from vegglue.linearise import Model, Point, linearise, theta_at
 from vegglue.noise import Noise, noise_of, with_correlation, with_grid_error
+from vegglue.refusal import nearest
 from vegglue.schema import Case, Working
 from vegglue.site import build_site
 
@@ -36,6 +37,8 @@ OFF_CENTRE = (0.3, 1.0)
 LARGEST = 4.0
 # Steps and exactness [-] of finding the size.
 SIZING_STEPS, SIZED = 6, 0.02
+# Effects and places that are tried where chance decides.
+DRAWN = 20
 # Excess of a bad probe [standard errors].
 BAD = 10.0
 UNLISTED, BAD_PROBE, NOTHING, ANY = "unlisted:", "bad_probe", "nothing", "?"
@@ -177,8 +180,9 @@ def _chosen(
     ground: Ground, errors: Noise, name: str, size: float | None, snr: float, random: np.random.Generator
 ) -> tuple[Candidate, Hidden]:
     """The candidate that `name` asks for, at its size; what `?` or chance decides is drawn until it can be seen."""
-    for _ in range(20):
-        candidate, listed = _candidate(ground.model, name, random), not name.startswith(UNLISTED)
+    for _ in range(DRAWN if name == ANY or name.startswith(UNLISTED) else 1):
+        candidate = _any(ground.model, random) if name == ANY else candidate_of(ground.model, name)
+        listed = not name.startswith(UNLISTED)
         shapes = _shapes(ground.model, candidate, listed, random)
         label = candidate.name if listed else UNLISTED + candidate.effect.name
         if size is not None:
@@ -193,19 +197,21 @@ def _chosen(
     )
 
 
-def _candidate(model: Model, name: str, random: np.random.Generator) -> Candidate:
-    known = {effect.name: effect for effect in strangers.EFFECTS}
-    if name == ANY:
-        everything = candidates_of(model.case, model.station)
-        return everything[int(random.integers(len(everything)))]
+def candidate_of(model: Model, name: str) -> Candidate:
+    """The effect that a name stands for, listed or `unlisted:NAME`. Errors: InputError."""
     if not name.startswith(UNLISTED):
         return candidate_named(model.case, model.station, name)
-    stranger = name.removeprefix(UNLISTED)
-    if stranger not in known:
-        raise InputError(f"--hide: `{name}` is not among {', '.join(UNLISTED + one for one in known)}.")
+    known = {UNLISTED + effect.name: effect for effect in strangers.EFFECTS}
+    if name not in known:
+        raise InputError(f"--hide: `{name}` is unknown: {nearest(name, known)}")
     if model.case.effect_file is not None:
         raise InputError("--hide: expected a config without `effect_file` to hide something unlisted in; take it out.")
-    return Candidate(known[stranger])
+    return Candidate(known[name])
+
+
+def _any(model: Model, random: np.random.Generator) -> Candidate:
+    everything = candidates_of(model.case, model.station)
+    return everything[int(random.integers(len(everything)))]
 
 
 def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.Generator) -> dict[str, float]:

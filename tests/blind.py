@@ -1,0 +1,253 @@
+"""The study behind docs/blind.md: many small twins, something hidden in each, all diagnosed. `make blind`.
+
+    python tests/blind.py [--jobs N] [--share S] [--config FILE] [--runs FOLDER]
+
+One line of JSON for each data set in runs/blind/trials.jsonl. What stands there is not done again, so that the study
+may be stopped and go on, or grow by a larger --share of its data sets. Parameters are true at one of PLACES places of the
+prior; the errors are new in each data set.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from blind_page import write_page
+
+from vegglue.baseline import Baseline, baseline
+from vegglue.candidates import candidates_of, with_effect
+from vegglue.config import load_case
+from vegglue.cores import as_finished
+from vegglue.design import SEPARATES, planned, worth_of_measurements
+from vegglue.diagnose import diagnose
+from vegglue.diagnosis import Diagnosis
+from vegglue.effect import Array
+from vegglue.errors import InputError
+from vegglue.extend import candidate_named
+from vegglue.ladder import improvement, rung
+from vegglue.linearise import Model, linearise, z_at
+from vegglue.loop import model_in
+from vegglue.reveal import marks
+from vegglue.schema import Case
+from vegglue.twin import Answer, Ground, candidate_of, ground_at, hiding, measured, true_place
+
+ROOT = Path(__file__).parents[1]
+CONFIG, RUNS = ROOT / "configs" / "twin.yaml", ROOT / "runs" / "blind"
+PLACES = 16
+UNLISTED = tuple(f"unlisted:{name}" for name in ("pier", "jet", "sink", "fallen_tree", "scour_hole"))
+# Pairs that leave different traces, so that both could be found.
+TWO = (
+    ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
+    ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
+)  # fmt: skip
+# Data sets of each kind at share 1.
+SIZES = {
+    "null-white": 200, "null-ar1": 200, "null-understated": 200, "snr3": 200, "snr6": 200, "unlisted": 100, "two": 50,
+    "probe": 50,
+}  # fmt: skip
+NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
+# Every so many data sets with a set of several groups, the measurement that `next` proposes is made.
+MEASURED_AGAIN = 2
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One data set. hide: what; signal: how visible it is made."""
+
+    group: str
+    number: int
+    hide: tuple[str, ...]
+    signal: float
+
+    @property
+    def key(self) -> str:
+        return f"{self.group}/{self.number}"
+
+
+def planned_trials(names: list[str]) -> list[Trial]:
+    """All data sets, mixed so that a study that is stopped has some of each kind."""
+    found = [
+        Trial(group, number, _hidden(group, number, names), 3.0 if group == "snr3" else 6.0)
+        for group, size in SIZES.items()
+        for number in range(size)
+    ]
+    return sorted(found, key=lambda trial: (trial.number + 0.5) / SIZES[trial.group])
+
+
+def _hidden(group: str, number: int, names: list[str]) -> tuple[str, ...]:
+    if group.startswith("null"):
+        return ()
+    if group == "unlisted":
+        return (UNLISTED[number % len(UNLISTED)],)
+    if group == "two":
+        return TWO[number % len(TWO)]
+    # Names in an order of their own, so that few data sets already hold effects of every kind.
+    name = names[(number * 23) % len(names)]
+    return (name, "bad_probe") if group == "probe" else (name,)
+
+
+@lru_cache
+def model_of_study(config: Path) -> Model:
+    return model_in(load_case(config))
+
+
+@lru_cache(maxsize=PLACES)
+def ground_of_study(config: Path, place: int) -> Ground:
+    model = model_of_study(config)
+    return ground_at(model, true_place(len(model.names), place))
+
+
+def study(trial: Trial, config: Path) -> dict[str, Any]:
+    """The record of one data set: what was hidden, what was said, and what came of it."""
+    seed = list(SIZES).index(trial.group) * 100_000 + trial.number
+    ground = ground_of_study(config, (trial.number * 7 + len(trial.group)) % PLACES)
+    record: dict[str, Any] = {"key": trial.key, **asdict(trial)}
+    began = time.process_time()
+    try:
+        station, answer = measured(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
+    except InputError as error:  # an effect that these data would not show at any plausible size
+        return record | {"left_out": str(error)}
+    model = replace(ground.model, station=station)
+    found = diagnose(model, jobs=1)
+    record |= _said(answer, found) | {"seconds": time.process_time() - began}
+    if found.steps:
+        record["gain"] = held_out_gain(model, found)
+        if answer.hidden and len(found.steps[0].groups) > 1 and trial.number % MEASURED_AGAIN == 0:
+            record["next"] = measured_again(ground, model, answer, found, seed)
+    return record
+
+
+def _said(answer: Answer, found: Diagnosis) -> dict[str, Any]:
+    names, cosine = found.cosine_names, np.asarray(found.cosine)
+    alike = {
+        hidden.name: {
+            names[j]: round(float(cosine[names.index(hidden.name), j]), 3)
+            for j in range(len(names))
+            if names[j] != hidden.name and abs(cosine[names.index(hidden.name), j]) > 0.9
+        }
+        for hidden in answer.hidden
+        if hidden.name in names
+    }
+    return {
+        "hidden": [asdict(hidden) for hidden in answer.hidden],
+        "marks": [
+            {"found": mark.found, "inside": mark.inside, "named": mark.named, "amplitude": mark.amplitude,
+             "away": None if np.isnan(mark.away) else mark.away}
+            for mark in marks(answer, found)
+        ],
+        "verdict": found.verdict, "set": found.set, "steps": [asdict(step) for step in found.steps],
+        "where": None if found.where is None else asdict(found.where), "flagged": len(found.flagged),
+        "correlation": found.correlation, "scale": found.scale, "p_misfit": found.p_misfit, "alike": alike,
+        "scores": {one.name: one.score for one in found.suspects[:8]},
+    }  # fmt: skip
+
+
+def calibrated(model: Model, theta: dict[str, float]) -> Baseline:
+    return baseline(model, z_at(model.case, {name: np.array([theta[name]]) for name in model.names})[0])
+
+
+def with_accepted(model: Model, found: Diagnosis) -> Model:
+    """The model with all effects that the diagnosis accepted."""
+    case: Case = model.case
+    for step in found.steps:
+        suspect = next(one for one in found.suspects if one.name == step.accepted)
+        case = with_effect(case, candidate_named(case, model.station, step.accepted), suspect.shapes)
+    return replace(model, case=case)
+
+
+def held_out_gain(model: Model, found: Diagnosis) -> float:
+    """By how much the squared error of held-out sections falls with what was accepted [(m/s)^2]."""
+    before = rung(calibrated(model, found.first_parameters))
+    after = rung(calibrated(with_accepted(model, found), {name: three[0] for name, three in found.parameters.items()}))
+    return improvement(before, after)[0]
+
+
+def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosis, seed: int) -> dict[str, Any] | None:
+    """The best next measurement, made and added: groups of the first step before and after; None if none is of use."""
+    base = calibrated(model, found.first_parameters)
+    rivals = []
+    for name in found.steps[0].rivals:
+        suspect = next(one for one in found.suspects if one.name == name)
+        candidate = candidate_named(model.case, model.station, name)
+        amplitude = candidate.effect.amplitude
+        above = suspect.amplitude - amplitude.off
+        rivals.append((candidate, suspect.shapes, float(np.sign(above) * np.abs(above) ** amplitude.power)))
+    best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, rivals)[0]
+    if best.then < SEPARATES:
+        return None
+    wide, _ = planned(base.model, base.noise)
+    more = wide.station.iloc[best.plan.rows]
+    usual = model.station.groupby("kind")["standard_error"].median()
+    error = more["kind"].map(usual).to_numpy(float)
+    experiments = {**model.case.experiments, best.plan.experiment: wide.case.experiments[best.plan.experiment]}
+    values = _true_values(ground, answer, experiments, more)
+    if values is None:
+        return None
+    values += error * np.random.default_rng((seed, 3)).standard_normal(len(more))
+    station = pd.concat([model.station, more.assign(value=values, standard_error=error, used=True)], ignore_index=True)
+    case = model.case.model_copy(update={"experiments": experiments})
+    again = diagnose(Model(case, model.site, station), base.fitted.point.z, jobs=1)
+    return {
+        "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
+        "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict, "set": again.set,
+    }  # fmt: skip
+
+
+def _true_values(ground: Ground, answer: Answer, experiments: dict[str, Any], station: pd.DataFrame) -> Array | None:
+    """What is true at further stations, of further experiments maybe."""
+    case = ground.fine.case.model_copy(update={"experiments": experiments})
+    for hidden in (one for one in answer.hidden if one.station < 0):
+        case = hiding(case, candidate_of(ground.model, hidden.name), hidden)
+    point = linearise(Model(case, ground.fine.site, station.reset_index(drop=True)), ground.there.z)
+    return None if point is None else point.prediction
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--jobs", type=int, default=-1)
+    parser.add_argument("--share", type=float, default=1.0, help="share of all data sets, 0 to 1")
+    parser.add_argument("--config", type=Path, default=CONFIG)
+    parser.add_argument("--runs", type=Path, default=RUNS)
+    given = parser.parse_args()
+    records = run(given.config, given.runs, given.jobs, given.share)
+    write_page(records, ROOT / "docs")
+
+
+def run(config: Path, folder: Path, jobs: int, share: float) -> list[dict[str, Any]]:
+    """Do what is not yet done of the first part of the study, and return all there is."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path, model = folder / "trials.jsonl", model_of_study(config)
+    names = [one.name for one in candidates_of(model.case, model.station)]
+    trials = planned_trials(names)
+    trials = trials[: round(share * len(trials))]
+    done = {record["key"] for record in records_in(path)}
+    todo = [trial for trial in trials if trial.key not in done]
+    with path.open("a", encoding="utf-8") as file:
+        for count, record in enumerate(as_finished(study, ((trial, config) for trial in todo), jobs), 1):
+            file.write(json.dumps(record) + "\n")
+            file.flush()
+            print(f"{count} of {len(todo)}: {record['key']} {record.get('verdict', 'left out')}", flush=True)
+    return list(records_in(path))
+
+
+def records_in(path: Path) -> Iterator[dict[str, Any]]:
+    """All whole lines; the last one of a study that was stopped may not be whole."""
+    if not path.exists():
+        return
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            yield json.loads(line)
+        except ValueError:
+            continue
+
+
+if __name__ == "__main__":
+    from blind import main  # by its name, so that workers keep what they know between data sets
+
+    main()
