@@ -15,9 +15,10 @@ FREEDOM = 5.0
 TO_FIT = 200
 # Rounds and draws of following a density that costs next to nothing; components at most, and added in a round.
 ROUNDS, DRAWS, LARGEST, MORE = 8, 4096, 12, 3
-FIT_STEPS = 10
-# The power of the density that is followed: below one, so that its tails are covered too.
-POWER = 0.8
+# Rounds whose draws are pooled; draws of equal weight that a fit is made to, in so many steps.
+POOLED, FITTED, FIT_STEPS = 3, 2000, 10
+# Share of its draws that a normal density may lose because a flatter one is followed, so that tails are covered too.
+SPENT = 0.2
 # A round in which the draws are worth this share of their number, or hardly more than in the last one, is the last.
 WORTH, HARDLY = 0.85, 1.03
 
@@ -80,20 +81,29 @@ def pooled_weights(log_target: Floats, z: Floats, rounds: list[tuple[int, Mixtur
 def follow(target: Callable[[Floats], Floats], start: Mixture, seed: int) -> Mixture:
     """The start moved, reshaped and split until it resembles the density: target z (m, p) -> its log (m,)."""
     random = np.random.default_rng(seed)
-    mixture, rounds, z, logs, before = start, [], np.empty((0, start.centre.shape[1])), np.empty(0), 0.0
+    mixture, before, power = start, 0.0, _power(start.centre.shape[1])
+    rounds: list[tuple[int, Mixture]] = []
+    parts: list[tuple[Floats, Floats]] = []
     for _ in range(ROUNDS):
-        new = draw(mixture, random.random((DRAWS, z.shape[1] + 2)))
-        z, logs = np.concatenate([z, new]), np.concatenate([logs, POWER * target(new)])
-        rounds.append((DRAWS, mixture))
-        worth = effective_size(pooled_weights(logs[-DRAWS:], new, rounds[-1:])) / DRAWS
+        new = draw(mixture, random.random((DRAWS, start.centre.shape[1] + 2)))
+        logs = power * target(new)
+        rounds, parts = [*rounds[1 - POOLED :], (DRAWS, mixture)], [*parts[1 - POOLED :], (new, logs)]
+        worth = effective_size(pooled_weights(logs, new, rounds[-1:])) / DRAWS
         if worth > WORTH or 0.5 < worth < HARDLY * before:
             break
         before = worth
+        z, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
         weights = tempered(pooled_weights(logs, z, rounds), TO_FIT)
-        mixture = _grown(mixture, z, weights, min(MORE, LARGEST - mixture.share.size), random)
+        equal = z[systematic_draws(weights, FITTED, random)]
+        mixture = _grown(mixture, equal, min(MORE, LARGEST - mixture.share.size), random)
         for _ in range(FIT_STEPS):
-            mixture = _fitted(mixture, z, weights)
+            mixture = _fitted(mixture, equal, effective_size(weights))
     return mixture
+
+
+def _power(dimensions: int) -> float:
+    """b < 1 such that draws of p^b are worth 1 - SPENT of as many of p, (b (2 - b))^(dimensions / 2) for a normal p."""
+    return float(1.0 - np.sqrt(1.0 - (1.0 - SPENT) ** (2.0 / dimensions)))
 
 
 def tempered(weights: Floats, wanted: float) -> Floats:
@@ -110,30 +120,29 @@ def tempered(weights: Floats, wanted: float) -> Floats:
     return np.asarray(np.exp(low * logs) / np.exp(low * logs).sum())
 
 
-def _grown(mixture: Mixture, z: Floats, weights: Floats, more: int, random: np.random.Generator) -> Mixture:
-    """With `more` components at draws that weigh, half as wide as all of them together."""
+def _grown(mixture: Mixture, z: Floats, more: int, random: np.random.Generator) -> Mixture:
+    """With `more` components at some of the draws z (m, p), half as wide as all of them together."""
     if more <= 0:
         return mixture
-    centre = z[systematic_draws(weights, more, random)]
-    spread = z - weights @ z
-    spread = spread.T @ (spread * weights[:, None]) / 4.0
-    spread += 1e-6 * np.diag(np.diag(spread))
+    spread = np.cov(z.T, ddof=0).reshape(z.shape[1], -1) / 4.0
+    lower = np.linalg.cholesky(spread + 1e-6 * np.diag(np.diag(spread)) + 1e-300 * np.eye(z.shape[1]))
     k = mixture.share.size
     return Mixture(
         np.concatenate([mixture.share * k, np.ones(more)]) / (k + more),
-        np.concatenate([mixture.centre, centre]),
-        np.concatenate([mixture.lower, np.tile(np.linalg.cholesky(spread), (more, 1, 1))]),
+        np.concatenate([mixture.centre, z[random.choice(len(z), more, replace=False)]]),
+        np.concatenate([mixture.lower, np.tile(lower, (more, 1, 1))]),
     )
 
 
-def _fitted(mixture: Mixture, z: Floats, weights: Floats) -> Mixture:
+def _fitted(mixture: Mixture, z: Floats, worth: float) -> Mixture:
     """One step of expectation and maximisation for a mixture of t's (Cappé et al. 2008, doi:10.1007/s11222-008-9059-x).
 
-    A component that few draws belong to keeps most of its shape.
+    z (m, p): draws of equal weight, worth that many independent ones. A component that few of them belong to keeps most
+    of its shape.
     """
     logs, away = _parts(mixture, z)
-    belongs = np.exp(logs - logsumexp(logs, axis=1, keepdims=True)) * weights[:, None]
-    share, worth, p = belongs.sum(axis=0), effective_size(weights), z.shape[1]
+    belongs = np.exp(logs - logsumexp(logs, axis=1, keepdims=True)) / len(z)
+    share, p = belongs.sum(axis=0), z.shape[1]
     gain = belongs * (FREEDOM + p) / (FREEDOM + away)
     centre, lower = mixture.centre.copy(), mixture.lower.copy()
     for k in np.flatnonzero(share * worth > 1.0):

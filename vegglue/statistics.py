@@ -97,7 +97,8 @@ def pareto_shape(weights: Floats) -> float:
 def pareto_smoothed(log_weights: Floats) -> tuple[Floats, float]:
     """Weights (m,) to a sum of one whose largest are replaced by quantiles of the distribution fitted to them; k-hat.
 
-    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. Few distinct ones are left as they are, k-hat NaN.
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large ones
+    they stay as they are: k-hat is NaN where all are alike, infinite where hardly any counts.
     """
     weights = np.exp(log_weights - np.max(log_weights))
     order = np.argsort(weights, kind="stable")
@@ -105,7 +106,7 @@ def pareto_smoothed(log_weights: Floats) -> tuple[Floats, float]:
     cut = weights[order[-len(tail) - 1]]
     excess = weights[tail] - cut
     if np.sum(excess > 0) < 5:
-        return weights / weights.sum(), float("nan")
+        return weights / weights.sum(), float("inf" if effective_size(weights) < 5 else "nan")
     k, scale = _generalised_pareto(excess[excess > 0])
     level = (np.arange(len(tail)) + 0.5) / len(tail)
     grown = -scale * np.log1p(-level) if abs(k) < 1e-9 else scale * np.expm1(-k * np.log1p(-level)) / k
