@@ -76,5 +76,5 @@ def _known(logs: Floats) -> Floats:
 
 def _next_size(missing: float, share: float) -> int:
     """Draws of the next round: few while they are worth little, else what is missing."""
-    size = 2 * FIRST if share < 0.25 else np.clip(1.15 * missing / max(share, 0.6), SET, MOST)
+    size = 2 * FIRST if share < 0.25 else np.clip(1.1 * missing / max(share, 0.75), SET, MOST)
     return int(SET * np.ceil(size / SET))

@@ -3,7 +3,7 @@
 Members are followed on cells of twice the size where the grid can be halved, and the ends finished on the case's own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def modes_of(model: Model, noise: Noise, ensemble: Ensemble, jobs: int) -> Modes
     coarse = coarser(model)
     ends = _followed(coarse or model, noise, starts, jobs)
     if coarse is not None:
-        ends = _finished(model, noise, ends, jobs)
+        ends = _finished(model, coarse, noise, ends, jobs)
     if not ends:
         raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
     return Modes(tuple(ends), len(starts))
@@ -64,14 +64,20 @@ def _follow(model: Model, noise: Noise, z: Array) -> Fitted | None:
     return None if start is None else fit(model, noise, start)
 
 
-def _finished(model: Model, noise: Noise, ends: list[Fitted], jobs: int) -> list[Fitted]:
-    finer = in_threads(_finish, [(model, noise, end) for end in ends], jobs)
+def _finished(model: Model, coarse: Model, noise: Noise, ends: list[Fitted], jobs: int) -> list[Fitted]:
+    finer = in_threads(_finish, [(model, coarse, noise, end) for end in ends], jobs)
     return distinct([end for end in finer if end is not None])
 
 
-def _finish(model: Model, noise: Noise, end: Fitted) -> Fitted | None:
+def _finish(model: Model, coarse: Model, noise: Noise, end: Fitted) -> Fitted | None:
+    """First on the coarse cells with what the fine ones change in the predictions, then on the fine ones."""
     start = linearise(model, end.point.z, end.point)
-    return None if start is None else fit(model, noise, start)
+    if start is None:
+        return None
+    changed = noise.used(start.prediction - end.point.prediction)
+    there = fit(coarse, replace(noise, value=noise.value - changed), end.point).point.z
+    nearer = linearise(model, there, start)
+    return fit(model, noise, start if nearer is None else nearer)
 
 
 def distinct(ends: list[Fitted]) -> list[Fitted]:
