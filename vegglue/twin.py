@@ -20,11 +20,11 @@ import pandas as pd
 
 from vegglue import score, strangers
 from vegglue.baseline import coarser
-from vegglue.candidates import Candidate, candidates_of
+from vegglue.candidates import Candidate, candidates_of, with_effect
 from vegglue.effect import Array
 from vegglue.errors import InputError
 from vegglue.extend import candidate_named
-from vegglue.linearise import Model, Point, linearise, theta_at
+from vegglue.linearise import Model, Point, fingerprint, linearise, theta_at
 from vegglue.noise import Noise, noise_of, with_correlation, with_grid_error
 from vegglue.refusal import nearest
 from vegglue.schema import Case, Working
@@ -170,10 +170,12 @@ def hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
         sections=candidate.sections,
         devices=candidate.devices,
     )
-    update = {"effects": {**case.effects, candidate.key: working}}
-    if not hidden.listed:
-        update |= {"effect_file": Path(strangers.__file__)}  # type: ignore[dict-item]
-    return case.model_copy(update=update)
+    return _knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
+
+
+def _knowing(case: Case, hidden: Hidden) -> Case:
+    """The case with the file of the strangers, if what is hidden is one of them."""
+    return case if hidden.listed else case.model_copy(update={"effect_file": Path(strangers.__file__)})
 
 
 def _chosen(
@@ -237,16 +239,29 @@ def _sized(
     amplitude = candidate.effect.amplitude
     sides = [sign for sign, end in ((1.0, amplitude.high), (-1.0, amplitude.low)) if sign * (end - amplitude.off) > 0]
     sign, most = float(random.choice(sides)), LARGEST * amplitude.scale
-    size = 0.2 * amplitude.scale
+    size = _first_size(ground, errors, candidate, hidden, snr)
+    if size > 2.0 * most:
+        return None
     for _ in range(SIZING_STEPS):
+        size = min(size, most)
         one = replace(hidden, amplitude=float(np.clip(amplitude.off + sign * size, amplitude.low, amplitude.high)))
         signal = _signal(ground, errors, candidate, one)
         if abs(signal / snr - 1.0) < SIZED:
             return replace(one, signal=signal)
-        size = min(size * min((snr / max(signal, 1e-3)) ** (1.0 / amplitude.power), 20.0), 1.01 * most)
-        if size > most or signal == 0.0:
+        at_its_end = abs(one.amplitude - amplitude.off) < size or size == most
+        if signal == 0.0 or (at_its_end and signal < snr):
             return None
+        size *= min((snr / signal) ** (1.0 / amplitude.power), 3.0)
     return replace(one, signal=signal) if abs(signal / snr - 1.0) < 5.0 * SIZED else None
+
+
+def _first_size(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float) -> float:
+    """(snr / |S_perp|)^(1/power), to first order."""
+    amplitude = candidate.effect.amplitude
+    case = _knowing(ground.model.case, hidden)
+    changed = with_effect(case, candidate, hidden.shapes)
+    trace = fingerprint(replace(ground.model, case=case), ground.here, [(changed, candidate.parameter, amplitude)])
+    return float((snr / max(_visible(ground, errors, trace[:, 0]), 1e-300)) ** (1.0 / amplitude.power))
 
 
 def _signal(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hidden) -> float:
@@ -255,7 +270,12 @@ def _signal(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hidden)
     point = linearise(replace(ground.model, case=case), ground.here.z, ground.here)
     if point is None:
         return 0.0
-    white = errors.whiten(errors.used(point.prediction - ground.here.prediction)[:, None])
+    return _visible(ground, errors, point.prediction - ground.here.prediction)
+
+
+def _visible(ground: Ground, errors: Noise, trace: Array) -> float:
+    """|(I - P_J) W d| of a change d (station,) of the predictions."""
+    white = errors.whiten(errors.used(trace[:, None]))
     slopes = errors.whiten(errors.used(ground.here.slope))
     return float(score.project(slopes, white[:, 0], np.zeros(slopes.shape[1]), white).length[0])
 
