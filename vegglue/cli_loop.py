@@ -9,11 +9,10 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-import yaml
 from rich.console import Console
 from rich.table import Table
 
-from vegglue.config import load_case
+from vegglue.config import as_yaml, load_case
 from vegglue.design import SEPARATES, Worth
 from vegglue.diagnosis import Diagnosis, as_json
 from vegglue.errors import InputError
@@ -49,9 +48,7 @@ def import_command(
     """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand."""
     target = to or _default_target(folder)
     tree = case_from_folder(folder, target)
-    text = f"# Made by `vegglue import` from {folder.name}.\n" + yaml.safe_dump(
-        tree, sort_keys=False, allow_unicode=True
-    )
+    text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")

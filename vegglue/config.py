@@ -55,7 +55,11 @@ def load_case(path: Path, trust: bool = False) -> Case:
 
 def resolved_yaml(case: Case) -> str:
     """The case as one file without `extends`; data files are named relative to the file it was read from."""
-    tree = _plain(_dump(case), lambda file: _relative(file, case.source))
+    return as_yaml(_plain(_dump(case), lambda file: _relative(file, case.source)))
+
+
+def as_yaml(tree: Tree) -> str:
+    """Keys and values as the text of a config."""
     return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
 
 

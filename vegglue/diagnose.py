@@ -121,6 +121,8 @@ def _accept(
         return None, base, refits
     say(f"calibrating with {best.candidate.name}")
     further = _onward(base, seen, best)
+    if further is None:
+        return None, base, refits
     rivals = _not_rejected(seen, refits)
     step = Step(
         accepted=best.candidate.name,
@@ -186,8 +188,10 @@ def _groups(seen: Look, rivals: list[_Refit]) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(group) for group in score.groups([one.candidate.name for one in rivals], cosine))
 
 
-def _onward(base: Baseline, seen: Look, best: _Refit) -> Baseline:
-    """The model with the accepted effect as the next baseline, the error of its grid looked at again."""
+def _onward(base: Baseline, seen: Look, best: _Refit) -> Baseline | None:
+    """The model with the accepted effect as the next baseline, the error of its grid looked at again; None where it
+    finds no flow.
+    """
     shapes = seen.settings[best.column]
     model = replace(base.model, case=with_effect(base.model.case, best.candidate, shapes))
     if base.coarse is None:
@@ -195,7 +199,7 @@ def _onward(base: Baseline, seen: Look, best: _Refit) -> Baseline:
     coarse, place = replace(base.coarse, case=with_effect(base.coarse.case, best.candidate, shapes)), best.fitted.point
     start = linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
-        return replace(base, model=coarse, fitted=best.fitted, coarse=None, on_coarse=None)
+        return None
     fitted = fit(model, base.noise, start)
     on_coarse = linearise(coarse, fitted.point.z, place)
     noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from vegglue.baseline import Baseline, baseline
 from vegglue.candidates import Candidate, start_of
-from vegglue.config import case_hash, load_case, resolved_yaml
+from vegglue.config import as_yaml, case_hash, load_case, resolved_yaml
 from vegglue.design import Rival, Worth, worth_of_measurements
 from vegglue.diagnose import SEEN, diagnose
 from vegglue.diagnosis import Diagnosis, Suspect
@@ -98,7 +97,7 @@ def write_child(parent: Case, target: Path, added: Sequence[tuple[Candidate, Map
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
-    _write(target, text + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True))
+    _write(target, text + as_yaml(tree))
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 

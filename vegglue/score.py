@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.effect import Array
 
-DRAWS = 4000
+DRAWS = 3000
 # Fingerprints whose projected traces have a cosine above this are the same to the data.
 ALIKE = 0.9
 
@@ -55,8 +55,8 @@ def scores(projected: Projected, one_sided: np.ndarray) -> Array:
 def null_draws(projected: Projected, one_sided: np.ndarray, seed: int) -> Array:
     """T (draws, c) of residuals that are errors only."""
     random = np.random.default_rng(seed)
-    noise = random.standard_normal((DRAWS, projected.residual.size))
-    return _signed(noise @ projected.units, one_sided)
+    noise = random.standard_normal((DRAWS, projected.residual.size), dtype=np.float32)
+    return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
 
 
 def family_p(score: float, maxima: Array) -> float:

@@ -5,8 +5,8 @@ import re
 from pathlib import Path
 
 import pandas as pd
-import yaml
 
+from vegglue.config import as_yaml
 from vegglue.errors import InputError, StorageError
 from vegglue.schema import Case
 
@@ -29,7 +29,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Pa
             **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
         }
         text = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
-        target.write_text(text + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        target.write_text(text + as_yaml(tree), encoding="utf-8")
         (folder / SEAL).write_text(seal, encoding="utf-8")
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written ({error.strerror}); give another folder by --to.") from None
