@@ -201,7 +201,7 @@ def _onward(base: Baseline, seen: Look, best: _Refit) -> Baseline | None:
     if start is None:
         return None
     fitted = fit(model, base.noise, start)
-    on_coarse = linearise(coarse, fitted.point.z, place)
+    on_coarse = linearise(coarse, fitted.point.z, base.on_coarse)
     noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
     return Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse)
 
