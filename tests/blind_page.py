@@ -167,8 +167,8 @@ velocities and 12 gauges (`configs/twin.yaml`). The truth of each is computed on
 parameters 0.3 to 1 standard deviations off the centre of their priors, with new errors in each. An effect is as large
 as makes it visible at the ratio stated (length of its trace, whitened, after what calibration can mimic is taken off)
 on the true flow; shapes lie between the values that the search tries. A diagnosis took {seconds:.0f} s of one core
-(median). The truth differs from the model in its grid, parameters and errors, not in its equations: data of another code are
-diagnosed in `tests/test_open_cases.py`.
+(median). The truth differs from the model in its grid, parameters and errors, not in its equations: data of another
+code are diagnosed in `tests/test_open_cases.py`.
 
 {table}
 
