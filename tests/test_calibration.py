@@ -82,6 +82,16 @@ def test_too_much_left_out_is_not_trusted(linear: tuple[np.ndarray, ...]) -> Non
     steep = 300.0 * design
     found = leave_out(measured - draws @ steep.T, np.linalg.inv(covariance), np.full(DRAWS, 1 / DRAWS), np.arange(25))
     assert found.k > 0.7
+    assert np.isfinite(found.score)
+
+
+def test_draws_that_weigh_next_to_nothing_raise_no_warning(linear: tuple[np.ndarray, ...]) -> None:
+    design, measured, covariance, draws = linear
+    weights = np.where(np.arange(DRAWS) % 2, 1.0, 1e-320)
+    found = leave_one_out(measured - draws @ design.T, np.linalg.inv(covariance), weights / weights.sum())
+    half = draws[1::2]
+    plain = leave_one_out(measured - half @ design.T, np.linalg.inv(covariance), np.full(DRAWS // 2, 2 / DRAWS))
+    assert found.score == pytest.approx(plain.score, abs=0.02)
 
 
 def test_independent_errors_give_the_plain_likelihood() -> None:

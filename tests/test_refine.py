@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
-from reach import COARSE, write_reach
+from reach import COARSE, said_to, write_reach
 
 from vegglue.config import load_case
 from vegglue.describe import describe
@@ -150,6 +150,23 @@ def test_an_informal_likelihood_is_not_refined(reach: tuple[Case, Observations, 
     for changes in ({"likelihood": "nse"}, {"behavioural": 0.5}):
         assert not refinable(case.model_copy(update={"infer": case.infer.model_copy(update=changes)}))
     assert refinable(case)
+
+
+def test_the_method_can_be_chosen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write_reach(tmp_path, COARSE, (KNOWN[0], "simulate: {members: 64, seed: 7}"))
+    monkeypatch.chdir(tmp_path)
+    assert said_to(monkeypatch, capsys, "simulate", config, "--jobs", 1) == (0, "")
+    for method in ("refine", "glue"):
+        assert said_to(monkeypatch, capsys, "infer", config, "--method", method, "--jobs", 1) == (0, "")
+        assert read_posterior(tmp_path / "runs/brook/posterior.h5").method == method
+    config.write_text(config.read_text(encoding="utf-8") + "infer: {likelihood: nse}\n", encoding="utf-8")
+    assert said_to(monkeypatch, capsys, "infer", config, "--jobs", 1) == (0, "")
+    assert read_posterior(tmp_path / "runs/brook/posterior.h5").method == "glue"
+    code, told = said_to(monkeypatch, capsys, "infer", config, "--method", "refine")
+    assert code == 2
+    assert "got an informal likelihood" in told
 
 
 def test_missing_standard_errors_are_told(reach: tuple[Case, Observations, Ensemble]) -> None:

@@ -49,7 +49,7 @@ def leave_one_out(left: Floats, precision: Floats, weights: Floats) -> Predictiv
     score, k, below = (np.empty(left.shape[1]) for _ in range(3))
     for i in range(left.shape[1]):
         others, k[i] = pareto_smoothed(np.log(weights) - logs[:, i])
-        score[i] = logsumexp(logs[:, i], b=others)
+        score[i] = _log_mean(logs[:, i], others)
         below[i] = others @ ndtr(away[:, i])
     return Predictive(score, k, below)
 
@@ -61,7 +61,12 @@ def leave_out(left: Floats, precision: Floats, weights: Floats, group: np.ndarra
     size = np.sum(pull * np.linalg.solve(part, pull.T).T, axis=1)
     logs = 0.5 * np.linalg.slogdet(part)[1] - 0.5 * group.size * np.log(2.0 * np.pi) - 0.5 * size
     others, k = pareto_smoothed(np.log(weights) - logs)
-    return LeftOut(float(logsumexp(logs, b=others)), k)
+    return LeftOut(_log_mean(logs, others), k)
+
+
+def _log_mean(logs: Floats, weights: Floats) -> float:
+    counts = weights > 1e-300  # what others carry is below rounding
+    return float(logsumexp(logs[counts] + np.log(weights[counts])))
 
 
 def inside(below: Floats, level: float) -> float:
