@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 import scipy.stats
 
 from vegglue.effect import Array
 from vegglue.errors import InputError
 from vegglue.fit import Fitted, fit, objective
+from vegglue.ground import ground_of
 from vegglue.linearise import Model, Point, linearise
 from vegglue.noise import Noise, noise_of, with_grid_error
 from vegglue.schema import Case
@@ -15,6 +17,8 @@ from vegglue.site import build_site
 # Places of the prior that are looked at on the coarse grid, and how many of them are followed downhill.
 LOOKED_AT, FOLLOWED = 8, 2
 FEWEST_CELLS = 6
+# Cells across the floor below which a grid is no place to compare effects.
+ENOUGH_ACROSS = 7.0
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,11 @@ class Baseline:
     def quick(self) -> tuple[Model, Noise, Point]:
         """A model that is cheaper to fit, the noise it is fitted with, and a point to start from.
 
-        The coarse one, its measurements shifted by what the grid makes of the predictions here; or the model itself.
+        The coarse one, its measurements shifted by what the grid makes of the predictions here; or the model itself
+        when cells of twice the size are too coarse for the floor.
         """
         point = self.fitted.point
-        if self.coarse is None or self.on_coarse is None:
+        if self.coarse is None or self.on_coarse is None or _across_floor(self.coarse) < ENOUGH_ACROSS:
             return self.model, self.noise, point
         shift = self.noise.used(point.prediction - self.on_coarse.prediction)
         return self.coarse, replace(self.noise, value=self.noise.value - shift), self.on_coarse
@@ -77,6 +82,12 @@ def _refined(model: Model, noise: Noise, near: Point) -> Fitted:
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow on cells of half the size; refine `grid`.")
     return fit(model, noise, start)
+
+
+def _across_floor(model: Model) -> float:
+    """Cells across the floor."""
+    ground = ground_of(model.case, model.site, next(iter(model.case.experiments)))
+    return float(2.0 * np.median(ground.half_width) / model.site.grid.dy)
 
 
 def grid_difference(point: Point, on_coarse: Point | None) -> Array:

@@ -21,6 +21,7 @@ from vegglue.fit import Fitted, chi2, fit, objective
 from vegglue.ground import ground_of
 from vegglue.linearise import Model, linearise, theta_at
 from vegglue.noise import Noise, with_grid_error, without
+from vegglue.prune import pruned
 from vegglue.suspicion import Look, look, refit_start
 from vegglue.verdict import MOST_GROUPS, judged, misfit_zones
 
@@ -82,7 +83,8 @@ def diagnose(
         if steps and len(step.groups) > MOST_GROUPS:
             break
         steps.append(step)
-        base = further
+        base, unneeded = pruned(further, [step.accepted for step in steps[:-1]], say)
+        steps = [step for step in steps if step.accepted not in unneeded]
     return _written(first, base, seen_first, seen, flagged, steps, suspects, place)
 
 
