@@ -13,7 +13,7 @@ SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo paper test check bench clean simulate infer report setup
+.PHONY: help demo paper test check bench blind clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -58,6 +58,9 @@ check: $(READY)  # the fast part, under a minute
 
 bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
 	$(BIN)/python -m tests.bench
+
+blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
+	nice $(BIN)/python tests/blind.py --jobs $(JOBS)
 
 clean:  # remove the environment and all runs
 	rm -rf $(VENV) build dist *.egg-info runs/*/
