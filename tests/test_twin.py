@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from diagnoses import a_diagnosis, a_suspect
 from reach import said_to
-from scipy import stats
 
 from vegglue.candidates import with_effect
 from vegglue.config import case_hash, load_case, resolved_yaml
@@ -223,13 +222,3 @@ def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     said = capsys.readouterr().out
     assert "gauge_datum of 0.1" in said
     assert "named alone; the interval holds" in said
-
-
-def test_an_interval_of_a_share() -> None:
-    from blind_page import interval
-
-    low, high = interval(14, 200)
-    assert stats.binom.sf(13, 200, low) == pytest.approx(0.025, rel=1e-6)
-    assert stats.binom.cdf(14, 200, high) == pytest.approx(0.025, rel=1e-6)
-    assert interval(0, 20)[0] == 0.0
-    assert interval(20, 20)[1] == 1.0

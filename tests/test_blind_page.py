@@ -1,0 +1,62 @@
+"""The page of the study: what counts as what, on records made by hand."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from blind_page import caught, counts, interval, pair_printed, set_size, told_apart, write_page, wrongly_named
+from scipy import stats
+
+
+def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, Any]:
+    """The hidden effect is `eddies`; each rival is a group of its own."""
+    steps = [{"accepted": rivals[0], "rivals": list(rivals), "groups": [[name] for name in rivals]}] if rivals else []
+    inside = "eddies" in rivals
+    mark = {"found": inside, "inside": inside, "named": rivals == ("eddies",), "amplitude": None, "away": None}
+    return {
+        "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
+        "verdict": verdict, "steps": steps, "alike": {}, "seconds": 3.0, "gain": 1e-4 if rivals else None,
+    } | changes  # fmt: skip
+
+
+NAMED = record("snr6", "identified", "eddies")
+WRONG = record("snr6", "identified", "wind")
+MANY = record("snr6", "cannot-tell", "wind", "eddies", "sun", "moon")
+SILENT = record("snr6", "nothing-missing")
+LEFT_OUT = {"key": "snr6/9", "group": "snr6", "hide": ["sun"], "left_out": "not visible"}
+
+
+def test_what_counts_as_what() -> None:
+    everything = [NAMED, WRONG, MANY, SILENT, LEFT_OUT]
+    assert counts(everything, ["snr6"], caught) == (2, 4)
+    assert counts(everything, ["snr6"], told_apart) == (2, 4)
+    assert counts(everything, ["snr6"], wrongly_named) == (1, 4)
+    assert counts(everything, ["snr3"], caught) == (0, 0)
+    assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
+
+
+def test_a_pair_counts_where_there_is_one() -> None:
+    alike = {"alike": {"eddies": {"moon": 0.95, "sun": 0.91}}}
+    assert pair_printed(NAMED) is None
+    assert pair_printed(NAMED | alike) is False
+    assert pair_printed(MANY | alike) is True
+    assert pair_printed(WRONG | alike) is None, "missed, which counts elsewhere"
+
+
+def test_an_interval_of_a_share() -> None:
+    low, high = interval(14, 200)
+    assert stats.binom.sf(13, 200, low) == pytest.approx(0.025, rel=1e-6)
+    assert stats.binom.cdf(14, 200, high) == pytest.approx(0.025, rel=1e-6)
+    assert interval(0, 20)[0] == 0.0
+    assert interval(20, 20)[1] == 1.0
+
+
+def test_the_page(tmp_path: Path) -> None:
+    write_page([NAMED, WRONG, MANY, SILENT, LEFT_OUT], tmp_path)
+    page = (tmp_path / "blind.md").read_text(encoding="utf-8")
+    assert "Measured on 4 small twins" in page
+    assert "| Hidden effect in the set, ratio 6 | 2 | 4 | 50.0% |" in page
+    assert "`sun`" in page
+    for name in ("sets", "alarms"):
+        assert f"blind-{name}.svg" in page
+        assert (tmp_path / f"blind-{name}.svg").stat().st_size > 1000
