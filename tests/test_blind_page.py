@@ -15,7 +15,8 @@ def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, 
     mark = {"found": inside, "inside": inside, "named": rivals == ("eddies",), "amplitude": None, "away": None}
     return {
         "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
-        "verdict": verdict, "steps": steps, "set": list(rivals), "alike": {}, "seconds": 3.0, "gain": 1e-4 if rivals else None,
+        "verdict": verdict, "steps": steps, "set": list(rivals), "alike": {}, "seconds": 3.0,
+        "gain": 1e-4 if rivals else None,
     } | changes  # fmt: skip
 
 
