@@ -181,7 +181,7 @@ def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosi
         amplitude = candidate.effect.amplitude
         above = suspect.amplitude - amplitude.off
         rivals.append((candidate, suspect.shapes, float(np.sign(above) * np.abs(above) ** amplitude.power)))
-    best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, rivals)[0]
+    best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
         return None
     wide, _ = planned(base.model, base.noise)

@@ -130,13 +130,11 @@ def next_command(
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
     case = load_case(config, trust)
-    what, found = next_measurements(case, _folder(runs, case), jobs, _say(as_object), between or [])
+    found = next_measurements(case, _folder(runs, case), jobs, _say(as_object), between or [])
     if as_object:
-        print(
-            json.dumps({"tells_apart": what, "measurements": [_worth_json(one) for one in found]}, ensure_ascii=False)
-        )
+        print(json.dumps({"questions": [_question_json(*one) for one in found]}, ensure_ascii=False))
         return
-    _show_next(what, found)
+    _show_next(found)
 
 
 def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
@@ -146,8 +144,7 @@ def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trus
     _tell(diagnosed(case, folder, jobs, _say()))
     grown = grow(case, runs, jobs, _say())
     _show_ladder(grown.rungs)
-    what, found = next_measurements(case, folder, jobs, _say(), [])
-    _show_next(what, found)
+    _show_next(next_measurements(case, folder, jobs, _say(), []))
     picture = _folder(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
     save_ladder_figure(grown.rungs, picture)
     console.print(f"Ladder drawn in {picture}; last config: {grown.paths[-1]}")
@@ -239,18 +236,19 @@ def _show_ladder(rungs: Sequence[Rung]) -> None:
             console.print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
 
 
-def _show_next(what: str, found: Sequence[Worth]) -> None:
+def _show_next(found: Sequence[tuple[str, Sequence[Worth]]]) -> None:
     if not found:
         console.print("Nothing is left to be told apart; no further measurement is proposed.")
-        return
-    useful = [one for one in found if one.then >= SEPARATES and one.then > 1.1 * one.now]
-    if not useful:
-        console.print(f"To tell {what}: none of {len(found)} measurements would (D2 now {found[0].now:.2g}).")
-        return
-    console.print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
-    for one in useful[:6]:
-        plan = one.plan
-        console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
+    for what, worths in found:
+        useful = [one for one in worths if one.then >= SEPARATES and one.then > 1.1 * one.now]
+        if not useful:
+            best = max((one.then for one in worths), default=0.0)
+            console.print(f"To tell {what}: none of {len(worths)} measurements would (D2 at most {best:.2g}).")
+            continue
+        console.print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
+        for one in useful[:4]:
+            plan = one.plan
+            console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
 
 
 def _rung_json(one: Rung) -> dict[str, Any]:
@@ -259,6 +257,10 @@ def _rung_json(one: Rung) -> dict[str, Any]:
     return {
         name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
     }
+
+
+def _question_json(what: str, worths: Sequence[Worth]) -> dict[str, Any]:
+    return {"tells_apart": what, "measurements": [_worth_json(one) for one in worths]}
 
 
 def _worth_json(one: Worth) -> dict[str, Any]:

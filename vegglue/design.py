@@ -57,30 +57,38 @@ class Worth:
         return (self.then - self.now) / self.plan.hours
 
 
-Rival = tuple[Candidate | None, dict[str, float], float]
+Rival = tuple[Candidate, dict[str, float], float]
 
 
-def worth_of_measurements(model: Model, noise: Noise, z: Array, rivals: Sequence[Rival]) -> list[Worth]:
-    """Plans ranked by gain per hour; rivals: (effect or None, shapes, fitted gain (amplitude - off)^power)."""
+def worth_of_measurements(
+    model: Model, noise: Noise, z: Array, questions: Sequence[Sequence[Rival]]
+) -> list[list[Worth]]:
+    """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
+    be told from calibration: (effect, shapes, gain (amplitude - off)^power).
+    """
     wide, plans = planned(model, noise)
     point = linearise(wide, z)
     if point is None:
-        return []
-    named = [(one, shapes, gain) for one, shapes, gain in rivals if one is not None]
-    changed = [(with_effect(wide.case, one, shapes), one.parameter, one.effect.amplitude) for one, shapes, _ in named]
-    prints = fingerprint(wide, point, changed)
-    errors = _errors(wide.station, noise)
-    slope = point.slope / errors[:, None]
-    traces = prints / errors[:, None] * np.array([gain for _, _, gain in named])
+        return [[] for _ in questions]
+    every = [rival for question in questions for rival in question]
+    changed = [(with_effect(wide.case, one, shapes), one.parameter, one.effect.amplitude) for one, shapes, _ in every]
+    errors = _errors(wide.station, noise)[:, None]
+    slope = point.slope / errors
+    traces = fingerprint(wide, point, changed) / errors * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
     known[: len(model.station)] = model.station["used"].to_numpy(bool)
-    apart = len(named) if len(named) > 1 else 0
-    now = _least(slope[known], traces[known], apart)
+    ends = np.cumsum([len(question) for question in questions])
+    own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
+    return [_ranked(plans, known, slope, part) for part in own]
+
+
+def _ranked(plans: Sequence[Plan], known: np.ndarray, slope: Array, traces: Array) -> list[Worth]:
+    now = _least(slope[known], traces[known])
     found = []
     for plan in plans:
         rows = known.copy()
         rows[plan.rows] = True
-        found.append(Worth(plan, now, _least(slope[rows], traces[rows], apart)))
+        found.append(Worth(plan, now, _least(slope[rows], traces[rows])))
     return sorted(found, key=lambda one: -one.per_hour)
 
 
@@ -171,11 +179,11 @@ def _errors(station: pd.DataFrame, noise: Noise) -> Array:
     return errors
 
 
-def _least(slope: Array, traces: Array, apart: int) -> float:
+def _least(slope: Array, traces: Array) -> float:
     """The least D^2 over ordered pairs of rivals; against the model without any when there is only one."""
     least = np.inf
     for i in range(traces.shape[1]):
-        others: list[int | None] = [j for j in range(apart) if j != i] or [None]
+        others: list[int | None] = [j for j in range(traces.shape[1]) if j != i] or [None]
         for j in others:
             calibrated = slope if j is None else np.column_stack([slope, traces[:, j]])
             least = min(least, _left(calibrated, traces[:, i], slope.shape[1]))

@@ -27,6 +27,8 @@ from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_dia
 
 # An effect whose amplitude lies closer to off than this, in standard errors, is no longer needed.
 NEEDED = 2.0
+# Effects hidden behind calibration that measurements are proposed for.
+HIDDEN = 4
 Say = Callable[[str], None]
 
 
@@ -179,29 +181,40 @@ def _rung(case: Case, folder: Path) -> Rung:
     return rung(calibrated(case, folder), validation_of(case))
 
 
-def next_measurements(case: Case, folder: Path, jobs: int, say: Say, between: Sequence[str]) -> tuple[str, list[Worth]]:
-    """What is to be told apart, in words, and the measurements that could, the best first.
+def next_measurements(
+    case: Case, folder: Path, jobs: int, say: Say, between: Sequence[str]
+) -> list[tuple[str, list[Worth]]]:
+    """What is to be told apart, in words, and the measurements that could, the best first; empty when nothing is left.
 
-    between: names of effects, else those that the diagnosis could not tell apart, else those it could not test.
+    between: names of effects, else those that the diagnosis could not tell apart, else the strongest of those it could
+    not test, each by itself at a plausible size.
     """
     found = diagnosed(case, folder, jobs, say)
     by_name = {one.name: one for one in found.suspects}
     unknown = [name for name in between if name not in by_name]
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
-    rivals = list(between) or (list(found.steps[-1].rivals) if found.steps else [])
+    asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
+    if not asked:
+        return []
     base = calibrated(case, folder)
-    if len(rivals) > 1 or between:
-        what = f"{' from '.join(rivals)}" if len(rivals) > 1 else f"{rivals[0]} from nothing"
-        return what, worth_of_measurements(base.model, base.noise, base.fitted.point.z, _rivals(case, found, rivals))
-    hidden = [one for one in found.suspects if not one.testable]
-    if found.steps or not hidden:
-        return "", []
+    point = base.fitted.point
+    worths = worth_of_measurements(base.model, base.noise, point.z, [rivals for _, rivals in asked])
+    return [(what, worth) for (what, _), worth in zip(asked, worths, strict=True)]
+
+
+def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
+    """In words, and the rivals of each."""
+    if len(names) > 1:
+        return [(" from ".join(names), _rivals(case, found, names))]
+    hidden = [one for one in found.suspects if not one.testable and not found.steps]
     # What calibration hides best, of all that would leave a trace without it.
-    target = max(hidden, key=lambda one: _raw_trace(case, found, one))
-    what = f"{target.name} from {target.mimicked_by}"
-    plausible = _rivals(case, found, [target.name], plausible=True)
-    return what, worth_of_measurements(base.model, base.noise, base.fitted.point.z, plausible)
+    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
+    single = [one for one in found.suspects if one.name in names and not found.steps] or strongest
+    return [
+        (f"{one.name} from a change of {one.mimicked_by}", _rivals(case, found, [one.name], plausible=True))
+        for one in single
+    ]
 
 
 def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
