@@ -13,7 +13,7 @@ from vegglue.config import load_case
 from vegglue.describe import describe
 from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError
-from vegglue.fit import Fitted
+from vegglue.fit import Fitted, fit
 from vegglue.groundwork import groundwork, unexplained
 from vegglue.linearise import Point, linearise, model_of, theta_at, z_at
 from vegglue.modes import distinct, starting_places
@@ -262,14 +262,23 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
         assert point is not None
         rows = (table["experiment"] == experiment).to_numpy()
         table.loc[rows, "value"] = point.prediction[rows] + 0.01 * random.normal(size=rows.sum())
-    joint = linearise(model, np.zeros(2))
-    assert joint is not None
-    found = transfer(model, noise_of(table), joint, jobs=1)
+    middle = linearise(model, np.zeros(2))
+    assert middle is not None
+    joint = fit(model, noise_of(table), middle).point
+    found = transfer(model, noise_of(table), joint, True, jobs=1)
     assert found is not None
     assert list(found.experiments) == ["June", "July"]
     assert (found.p[0] < 1e-3) == moves
     assert np.isnan(found.value[1, 1])  # phi is a number in July
     assert np.all(found.misfit_alone < found.misfit_together)
+    assert (found.p_all < 1e-3) == moves
+    assert (found.scale, found.more) == (pytest.approx(1, abs=0.3), 1)
+    twice = with_correlation(noise_of(table.assign(standard_error=0.005)), 0.0, 3.0)
+    again, free = (transfer(model, errors, joint, False, jobs=1) for errors in (twice, noise_of(table)))
+    assert again is not None
+    assert free is not None
+    assert again.scale == pytest.approx(2 * free.scale, rel=0.05)  # its own, whatever the joint fit asked for
+    assert again.chi2[0] == pytest.approx(free.chi2[0], rel=0.1, abs=0.1)
 
 
 def test_errors_of_one_experiment_are_those_of_all(reach: tuple[Case, Observations, Ensemble]) -> None:

@@ -18,6 +18,11 @@ def moving(transfer: Transfer) -> np.ndarray:
     return np.nan_to_num(transfer.p, nan=1.0) * max(compared, 1) < REJECTED
 
 
+def rejected(transfer: Transfer) -> bool:
+    """Whether the calibration does not carry over between experiments."""
+    return bool(moving(transfer).any()) or transfer.p_all < REJECTED
+
+
 def told(posterior: Posterior, transfer: Transfer, others: Mapping[str, object]) -> list[str]:
     """Sentences on each shared parameter, the worst first, and what to make of them; others: reference values."""
     order = [int(j) for j in np.argsort(-np.nan_to_num(transfer.chi2)) if transfer.freedom[j] > 0]
@@ -26,7 +31,7 @@ def told(posterior: Posterior, transfer: Transfer, others: Mapping[str, object])
     moves = moving(transfer)
     said = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order]
     names = [posterior.parameters[j] for j in order if moves[j]]
-    return [*said, _misfits(transfer), _meaning(names)]
+    return [*said, _misfits(transfer), _meaning(names, rejected(transfer))]
 
 
 def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
@@ -55,15 +60,20 @@ def _misfits(transfer: Transfer) -> str:
             transfer.experiments, transfer.misfit_together, transfer.misfit_alone, transfer.stations, strict=True
         )
     )
-    return f"The misfit chi2 is {each}."
-
-
-def _meaning(names: list[str]) -> str:
-    if not names:
-        return "The calibration carries over from one experiment to the others."
-    many = len(names) > 1
+    errors = f" (errors {transfer.scale:.2f} times as large, as the experiments alone leave them)"
     return (
-        f"{' and '.join(names)} {'have' if many else 'has'} to move between experiments to fit each: "
-        f"{'they stand' if many else 'it stands'} in for something that changes between them and that the model lacks, "
-        "and a prediction for another flow cannot rest on one value. `vegglue diagnose` asks what that is."
+        f"The misfit chi2 is {each}{errors if transfer.scale != 1.0 else ''}: with parameters of its own for each "
+        f"experiment it falls by {transfer.gain:.3g} for {transfer.more} more (p = {transfer.p_all:.2g})."
+    )
+
+
+def _meaning(names: list[str], doubted: bool) -> str:
+    if not doubted:
+        return "The calibration carries over from one experiment to the others."
+    many = len(names) != 1
+    what = " and ".join(names) or "the parameters together"
+    return (
+        f"The calibration does not carry over: {what} {'have' if many else 'has'} to move between experiments to fit "
+        f"each, so {'they stand' if many else 'it stands'} in for something that changes between them and that the "
+        "model lacks, and a prediction for another flow cannot rest on one value. `vegglue diagnose` asks what that is."
     )

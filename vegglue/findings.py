@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.describe import CLAIMED_FROM, HEAVY_TAIL, STRONG_CORRELATION
 from vegglue.describe_refined import UNBELIEVED, drawn, unseen
-from vegglue.describe_transfer import moving, told
+from vegglue.describe_transfer import rejected, told
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
 from vegglue.observations import Observations
 from vegglue.posterior import Posterior
@@ -178,7 +178,7 @@ def _refined(posterior: Posterior) -> Iterator[Finding]:
 def _transfer(case: Case, posterior: Posterior) -> Iterator[Finding]:
     if posterior.transfer is not None:
         sentences = told(posterior, posterior.transfer, case.reference.table if case.reference else {})
-        yield Finding("transfer", html.escape(" ".join(sentences)), doubt=bool(moving(posterior.transfer).any()))
+        yield Finding("transfer", html.escape(" ".join(sentences)), doubt=rejected(posterior.transfer))
 
 
 def _flagged(observations: Observations) -> Iterator[Finding]:

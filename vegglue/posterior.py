@@ -83,6 +83,10 @@ class Transfer:
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
     """
 
+    scale: float  # of the errors, from what the experiments alone leave [-]
+    gain: float  # by which chi2 falls when every experiment has its own parameters [-]
+    more: int  # how many parameters more these are
+    p_all: float  # chance of such a gain by errors alone [-]
     experiments: Annotated[np.ndarray, Stored(("experiment",))]
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]

@@ -55,7 +55,7 @@ def refine(
     say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
     run = partial(predict, base.model, [one.point for one in base.fits], jobs)
     drawn = sample(run, partial(log_posterior, base.noise), start_of(base.fits), WANTED, case.simulate.seed)
-    moved = transfer(base.model, base.noise, base.fits[0].point, jobs)
+    moved = transfer(base.model, base.noise, base.fits[0].point, case.infer.sigma == "known", jobs)
     return _posterior(base, drawn, moved, ensemble)
 
 

@@ -2,9 +2,12 @@
 
     chi2 = sum_e (x_e - x)^2 / s_e^2,   x = sum_e (x_e / s_e^2) / sum_e (1 / s_e^2),   one degree of freedom less than e
 
-x_e is what the data of experiment e alone say of a parameter: its prior is taken off, on the scale on which it is flat.
+x_e is what the data of experiment e alone say of a parameter: its prior is taken off, on the scale where it is flat.
+All parameters at once are tested by how much the misfit falls when each experiment has its own. The size of the errors
+is that which the experiments alone leave: what is left together holds the very thing in question.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +15,10 @@ import scipy.stats
 
 from vegglue.cores import in_threads
 from vegglue.effect import Array
-from vegglue.fit import Fitted, fit
+from vegglue.fit import Fitted, covariance, fit
 from vegglue.infer import on_flat_scale
 from vegglue.linearise import STEP, Model, Point, linearise, theta_at
-from vegglue.noise import Noise, covariance_of
+from vegglue.noise import Noise, covariance_of, with_correlation
 from vegglue.posterior import Transfer
 from vegglue.schema import Case
 
@@ -23,31 +26,58 @@ from vegglue.schema import Case
 SILENT = 0.5
 
 
-def transfer(model: Model, noise: Noise, joint: Point, jobs: int) -> Transfer | None:
-    """Every experiment that has stations refitted alone, from the joint best place; None with fewer than two."""
+def transfer(model: Model, noise: Noise, joint: Point, stated: bool, jobs: int) -> Transfer | None:
+    """Every experiment that has stations refitted alone, from the joint best place; None with fewer than two.
+
+    stated: errors are known and only made larger, where the experiments alone ask for it; else their size is free.
+    """
     names = model.station["experiment"].to_numpy()
     here = [name for name in model.case.experiments if (names[noise.rows] == name).any()]
     if len(here) < 2:
         return None
-    fits = in_threads(_alone, [(model, noise, joint, name) for name in here], jobs)
+    noise = with_correlation(noise, noise.correlation, 1.0)
+    parts = [only(model, noise, name) for name in here]
+    fits = in_threads(_alone, [(*part, joint) for part in parts], jobs)
+    scale = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
     for e, fitted in enumerate(fits):
         if fitted is not None:
             value[e], error[e] = told_by_data(model.case, fitted.point.z, np.diag(fitted.covariance))
+    error *= scale
+    together = [_misfit(part, joint.prediction[names == name]) for (_, part), name in zip(parts, here, strict=True)]
+    alone = [np.nan if fitted is None else fitted.chi2 for fitted in fits]
+    gain = float(np.nansum(np.array(together) - np.array(alone)) / scale**2)
+    own = sum(determined(one.covariance) for one in fits if one is not None)
+    more = max(round(own - determined(covariance(noise, joint))), 1)
     tested = [alike(value[:, j], error[:, j]) for j in range(len(model.names))]
-    parts = [only(model, noise, name) for name in here]
-    together = [_misfit(part, joint.prediction[(names == name)]) for (_, part), name in zip(parts, here, strict=True)]
     return Transfer(
+        scale=scale,
+        gain=gain,
+        more=more,
+        p_all=float(scipy.stats.chi2.sf(max(gain, 0.0), more)),
         experiments=np.array(here, object),
         value=value,
         error=error,
         chi2=np.array([one[0] for one in tested]),
         freedom=np.array([one[1] for one in tested]),
         p=np.array([one[2] for one in tested]),
-        misfit_together=np.array(together),
-        misfit_alone=np.array([np.nan if fitted is None else fitted.chi2 for fitted in fits]),
+        misfit_together=np.array(together) / scale**2,
+        misfit_alone=np.array(alone) / scale**2,
         stations=np.array([part.rows.size for _, part in parts]),
     )
+
+
+def _scale(fits: Sequence[Fitted | None], stations: Sequence[int], least: float) -> float:
+    """s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e the parameters that experiment e determines [-]."""
+    pairs = [(one, count) for one, count in zip(fits, stations, strict=True) if one is not None]
+    left = sum(one.chi2 for one, _ in pairs)
+    free = sum(count - determined(one.covariance) for one, count in pairs)
+    return max(float(np.sqrt(left / free)), least) if free > 0 and left > 0 else 1.0
+
+
+def determined(spread: Array) -> float:
+    """How many parameters the data determine, p - tr(covariance of z), not the prior [-]."""
+    return float(spread.shape[0] - np.trace(spread))
 
 
 def told_by_data(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
@@ -89,8 +119,7 @@ def only(model: Model, noise: Noise, experiment: str) -> tuple[Model, Noise]:
     return Model(case, model.site, model.station[here].reset_index(drop=True)), part
 
 
-def _alone(model: Model, noise: Noise, joint: Point, experiment: str) -> Fitted | None:
-    own, errors = only(model, noise, experiment)
+def _alone(own: Model, errors: Noise, joint: Point) -> Fitted | None:
     start = linearise(own, joint.z, joint)
     return None if start is None else fit(own, errors, start)
 
