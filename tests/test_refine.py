@@ -11,6 +11,7 @@ from reach import COARSE, said_to, write_reach
 
 from vegglue.config import load_case
 from vegglue.describe import describe
+from vegglue.describe_transfer import told
 from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError
 from vegglue.fit import Fitted, fit
@@ -19,7 +20,7 @@ from vegglue.linearise import Point, linearise, model_of, theta_at, z_at
 from vegglue.modes import distinct, starting_places
 from vegglue.noise import Noise, covariance_of, noise_of, with_correlation
 from vegglue.observations import Observations, read_observations
-from vegglue.posterior import Posterior
+from vegglue.posterior import Posterior, Transfer
 from vegglue.prior import sample_prior
 from vegglue.refine import log_posterior, refinable, refine
 from vegglue.runs import predict
@@ -279,6 +280,26 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
     assert free is not None
     assert again.scale == pytest.approx(2 * free.scale, rel=0.05)  # its own, whatever the joint fit asked for
     assert again.chi2[0] == pytest.approx(free.chi2[0], rel=0.1, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("apart", "words"), [(0.0, "will do"), (0.028, "hardly one value"), (0.06, "not one value for all")]
+)
+def test_what_is_said_of_experiments(refined: Posterior, apart: float, words: str) -> None:
+    value, error = np.array([0.05, 0.05 + apart]), np.array([0.01, 0.008])
+    chi2, freedom, p = alike(value, error)
+    found = Transfer(
+        scale=1.0, gain=chi2, more=1, p_all=p, experiments=np.array(["June", "July"], object),
+        value=np.column_stack([value, [1.0, np.nan]]), error=np.column_stack([error, [0.1, np.nan]]),
+        chi2=np.array([chi2, np.nan]), freedom=np.array([freedom, 0]), p=np.array([p, np.nan]),
+        misfit_together=np.array([20.0, 15.0]), misfit_alone=np.array([12.0, 13.0]), stations=np.array([15, 15]),
+    )  # fmt: skip
+    said = told(refined, found, {"chi2_n_b": 16.9})
+    assert words in said[0]
+    assert "0.05 ± 0.01 (June)" in said[0]
+    assert "the source has 16.9" in said[0]
+    assert len(said) == 3  # nothing of phi, which one experiment alone tells
+    assert ("does not carry over" in said[-1]) == (words == "not one value for all")
 
 
 def test_errors_of_one_experiment_are_those_of_all(reach: tuple[Case, Observations, Ensemble]) -> None:

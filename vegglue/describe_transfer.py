@@ -8,6 +8,8 @@ from vegglue.posterior import Posterior, Transfer
 
 # Chance below which a parameter is said to differ, between all parameters that were compared.
 REJECTED = 0.01
+# Chance below which it is doubted, on its own.
+DOUBTED = 0.05
 # In a reference table, what others found for the same chi2.
 PREFIX = "chi2_"
 
@@ -35,7 +37,7 @@ def told(posterior: Posterior, transfer: Transfer, others: Mapping[str, object])
 
 
 def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
-    name = posterior.parameters[j]
+    name, doubted = posterior.parameters[j], transfer.p[j] < DOUBTED
     scale = f"log10 {name}" if name in posterior.log10_median else name
     each = ", ".join(
         f"{value:.3g} ± {error:.1g} ({experiment})"
@@ -44,13 +46,19 @@ def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, ot
         )
         if np.isfinite(value)
     )
-    verdict = "not one value for all" if moves else "one value for all will do"
+    verdict = "one value for all will do"
+    if moves or doubted:
+        verdict = "not one value for all" if moves else "hardly one value for all"
     other = others.get(PREFIX + name)
     beside = f"; the source has {other:g}" if isinstance(other, int | float) else ""
     return (
         f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {transfer.chi2[j]:.3g} with "
-        f"{int(transfer.freedom[j])} degrees of freedom (p = {transfer.p[j]:.2g}{beside}), {verdict}."
+        f"{_degrees(int(transfer.freedom[j]))} of freedom (p = {transfer.p[j]:.2g}{beside}), {verdict}."
     )
+
+
+def _degrees(count: int) -> str:
+    return "1 degree" if count == 1 else f"{count} degrees"
 
 
 def _misfits(transfer: Transfer) -> str:
