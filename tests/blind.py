@@ -47,10 +47,10 @@ TWO = (
     ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
-# Data sets of each kind at share 1.
+# Data sets of each kind at share 1; of those with an effect, up to a third cannot be made visible and are left out.
 SIZES = {
-    "null-white": 200, "null-ar1": 200, "null-understated": 200, "snr3": 200, "snr6": 200, "unlisted": 100, "two": 50,
-    "probe": 50,
+    "null-white": 200, "null-ar1": 200, "null-understated": 200, "snr3": 280, "snr6": 320, "unlisted": 100, "two": 50,
+    "probe": 70,
 }  # fmt: skip
 NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.

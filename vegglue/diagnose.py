@@ -96,9 +96,10 @@ def _alarm(seen: Look, strictness: float) -> str:
     effect, place, station = seen.effects.log_p, seen.places.log_p, seen.stations.log_p
     if station < np.log(0.01) and station < min(effect, place) - CLEARLY:
         return "station"
-    if place < np.log(strictness * ALARM_OF_PLACES) and place < effect - CLEARLY:
+    listed = effect < np.log(strictness * ALARM)
+    if place < np.log(strictness * ALARM_OF_PLACES) and (place < effect - CLEARLY or not listed):
         return "place"
-    return "effect" if effect < np.log(strictness * ALARM) else ""
+    return "effect" if listed else ""
 
 
 def _set_aside(base: Baseline, station: int) -> Baseline:
