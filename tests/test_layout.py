@@ -24,8 +24,8 @@ HOMES = {
     "pandas": {
         "adv", "candidates", "contract", "design", "diagnosis", "diagnosis_pictures", "ensemble", "extend",
         "figure_misfit", "figure_suspects", "figures", "flow_pictures", "groundwork", "infer", "layout",
-        "likelihood", "linearise", "measured_pictures", "noise", "observations", "posterior", "refine",
-        "report_tables", "sensor", "table", "twin", "twin_files", "verdict",
+        "likelihood", "linearise", "loop", "measured_pictures", "noise", "observations", "posterior",
+        "refine", "report_tables", "sensor", "table", "twin", "twin_files", "verdict",
     },
     "pydantic": {"config", "schema"},
     "rich": {"cli", "cli_effects", "cli_loop", "cli_twin"},

@@ -9,10 +9,12 @@ from rich.console import Console
 
 from vegglue.config import load_case
 from vegglue.contract import breaches
+from vegglue.diagnosis_pictures import save_fingerprint_figure
 from vegglue.effect import Effect
 from vegglue.effect_page import as_json, at_work, by_stage, page
 from vegglue.effects import effects_of, library
 from vegglue.errors import InputError
+from vegglue.loop import trace_of
 from vegglue.refusal import nearest
 from vegglue.schema import Case
 
@@ -27,6 +29,7 @@ def effects_command(
     check: Annotated[Path | None, typer.Option(help="Check the effects of a Python file of your own.")] = None,
     as_object: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")] = False,
     trust: Annotated[bool, typer.Option("--trust", help="Run the Python file of effects that is named.")] = False,
+    runs: Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")] = Path("runs"),
 ) -> None:
     """List the physical effects that can be added, or show one of them."""
     if check is not None:
@@ -38,6 +41,8 @@ def effects_command(
         _list(tuple(known.values()), as_object)
     elif name in known:
         _show(known[name], case, as_object)
+        if case is not None and not as_object:
+            _draw(known[name], case, runs)
     else:
         raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
 
@@ -59,6 +64,18 @@ def _show(effect: Effect, case: Case | None, as_object: bool) -> None:
         return
     for line in (*page(effect), *doing):
         console.print(line)
+
+
+def _draw(effect: Effect, case: Case, runs: Path) -> None:
+    """The effect's trace at the stations of the calibrated case, before calibration takes its part."""
+    if not case.observations:
+        return
+    path = runs / case.name / f"fingerprint_{effect.name}.png"
+    trace, station = trace_of(case, runs / case.name, effect)
+    amplitude = effect.amplitude
+    unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
+    save_fingerprint_figure(trace, station, unit, path)
+    console.print(f"Fingerprint drawn in {path}")
 
 
 def _check(file: Path, as_object: bool, trust: bool) -> None:

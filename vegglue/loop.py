@@ -8,19 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from vegglue.baseline import Baseline, baseline
-from vegglue.candidates import Candidate, start_of
+from vegglue.candidates import Candidate, start_of, with_effect
 from vegglue.config import as_yaml, case_hash, load_case, resolved_yaml
 from vegglue.design import Rival, Worth, worth_of_measurements
 from vegglue.diagnose import SEEN, diagnose
 from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.diagnosis_pictures import save_diagnosis_figure
-from vegglue.effect import Array
+from vegglue.effect import Array, Effect
 from vegglue.errors import InputError, StorageError
 from vegglue.extend import candidate_named, child_tree
 from vegglue.ladder import Rung, improvement, rung
-from vegglue.linearise import Model, model_of, theta_at, z_at
+from vegglue.linearise import Model, fingerprint, model_of, theta_at, z_at
 from vegglue.observations import read_observations
 from vegglue.schema import Case
 from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
@@ -174,6 +175,17 @@ def ladder(cases: Sequence[Case], runs: Path, say: Say) -> list[Rung]:
         say(f"calibrating {case.name}")
         rungs.append(_rung(case, runs / case.name))
     return rungs
+
+
+def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFrame]:
+    """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
+    unit of (amplitude - off)^power: (station,) and the stations.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    base, one = calibrated(case, folder), Candidate(effect)
+    shapes = {shape.name: shape.default for shape in effect.shapes}
+    changed = [(with_effect(base.model.case, one, shapes), one.parameter, effect.amplitude)]
+    return fingerprint(base.model, base.fitted.point, changed)[:, 0], base.model.station
 
 
 def _rung(case: Case, folder: Path) -> Rung:

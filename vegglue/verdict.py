@@ -108,7 +108,8 @@ def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int], 
     if noise.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {noise.scale:.2f}; this is allowed for.")
     if flagged:
-        remarks.append(f"{len(flagged)} station(s) stand alone against every effect and are set aside: see `flagged`.")
+        many = "1 station stands" if len(flagged) == 1 else f"{len(flagged)} stations stand"
+        remarks.append(f"{many} alone against every effect and every place; no effect is judged by it.")
     hidden = [suspect for suspect in suspects if not suspect.testable]
     if hidden:
         remarks.append(
