@@ -10,6 +10,7 @@ import xarray as xr
 import yaml
 from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
 
+from vegglue.cli import app
 from vegglue.config import case_hash, load_case, simulation_hash
 from vegglue.neighbourhood import SIZE
 from vegglue.store import read_ensemble, read_posterior, stored_hash
@@ -193,7 +194,7 @@ def test_the_readme_names_commands_and_targets_that_exist() -> None:
     named = set(re.findall(r"`make ([a-z ]+)`", README)) | set(re.findall(r"^make ([a-z]+)", README, re.MULTILINE))
     assert {"demo", "test", "paper"} <= {word for words in named for word in words.split()} <= targets
     commands = set(re.findall(r"^\| `vegglue ([a-z]+)", README, re.MULTILINE))
-    assert commands == {*STEPS, "version"}
+    assert commands == {str(command.name or command.callback.__name__) for command in app.registered_commands}
     members = re.search(r"^DEMO_MEMBERS \?= (\d+)$", makefile, re.MULTILINE)
     assert members
     demo = next(line for line in README.splitlines() if line.startswith("make demo"))
