@@ -75,7 +75,7 @@ def _misfit(refined: Refinement) -> list[str]:
     said += f"{refined.p_misfit:.2g})"
     if refined.p_misfit < UNBELIEVED:
         return [f"{said}: the errors do not explain what is left, something is missing in the model or in its data."]
-    return [f"{said}: the errors explain what is left."]
+    return [f"{said}: the errors {'hardly ' if refined.p_misfit < DOUBTED else ''}explain what is left."]
 
 
 def _scores(posterior: Posterior, refined: Refinement) -> list[str]:
