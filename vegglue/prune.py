@@ -1,6 +1,5 @@
 """Backwards: which effects accepted earlier a later one has made superfluous."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,7 +8,7 @@ import numpy as np
 from vegglue.baseline import Baseline
 from vegglue.fit import fit
 from vegglue.linearise import Model, linearise, z_at
-from vegglue.schema import Case
+from vegglue.schema import Case, Working
 
 # An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
 NEEDED = 2.0
@@ -53,8 +52,14 @@ def _without(base: Baseline, key: str, parameter: str) -> Baseline | None:
 
 def _amplitude_of(case: Case, name: str) -> tuple[str, str]:
     """Key and parameter of an accepted effect in a case."""
-    key = "_".join(part for part in re.split(r"[\[\],]", name) if part)
+    key = next(key for key, working in case.effects.items() if _label(key, working) == name)
     return key, next(value for value in case.effects[key].values.values() if isinstance(value, str))
+
+
+def _label(key: str, working: Working) -> str:
+    """The name of a candidate, as discharge_error[high], from its entry in a case."""
+    where = (*(working.experiments or ()), *working.sections, *working.devices)
+    return f"{working.effect or key}[{','.join(where)}]" if where else working.effect or key
 
 
 def _off(case: Case, parameter: str) -> float:
