@@ -1,5 +1,7 @@
 """The lie of the land as effects see it: the channel axis and floor, the banks, and how far patches are."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,15 +11,32 @@ from vegglue.site import Site, beyond
 
 # Steeper across than this [-], a cell is no longer floor.
 BREAK = 0.2
+# Sites and sets of patches whose fields are kept: those of a model and of its coarser ones.
+KEPT = 8
 
 
 def ground_of(case: Case, site: Site, experiment: str) -> Ground:
     """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
+    return _ground(site, _present(case, experiment))
+
+
+def half_width(site: Site) -> float:
+    """Half width of the floor [m], the median of its cross-sections."""
+    return float(np.median(_ground(site, ()).half_width))
+
+
+def cells_across(site: Site) -> float:
+    """How many cells lie across the floor."""
+    return 2.0 * half_width(site) / site.grid.dy
+
+
+@lru_cache(KEPT)  # every problem of every member asks for the same
+def _ground(site: Site, present: tuple[int, ...]) -> Ground:
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
     floor = ~beyond(side_slope > BREAK, bed)
     axis, half_width = _extent(floor, grid.y, grid.dy)
-    patch = np.where(np.isin(site.patch, _present(case, experiment)), site.patch, -1)
+    patch = np.where(np.isin(site.patch, present), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
     return Ground(
         x=grid.x[:, None, None],
@@ -51,11 +70,11 @@ def part(ground: Ground, columns: slice, rows: slice) -> Ground:
     return Ground(x=ground.x[columns], y=ground.y[:, rows], dx=ground.dx, dy=ground.dy, **cut)
 
 
-def _present(case: Case, experiment: str) -> list[int]:
+def _present(case: Case, experiment: str) -> tuple[int, ...]:
     plants = case.experiments[experiment].plants
-    return [
+    return tuple(
         index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
-    ]
+    )
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

@@ -25,9 +25,12 @@ class Grid:
     dy: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Site:
-    """Arrays (nx, ny): bed level [m], index into class_names, index into the patches of the case (-1: no plants)."""
+    """Arrays (nx, ny): bed level [m], index into class_names, index into the patches of the case (-1: no plants).
+
+    Two sites are the same only if they are one, so that what follows from a site can be kept with it.
+    """
 
     grid: Grid
     bed: Levels
