@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import scipy.stats
 
 from vegglue.effect import Array
 from vegglue.errors import InputError
 from vegglue.fit import Fitted, fit, objective
-from vegglue.ground import ground_of
+from vegglue.ground import cells_across
 from vegglue.linearise import Model, Point, linearise
 from vegglue.noise import Noise, noise_of, with_grid_error
 from vegglue.schema import Case
@@ -41,7 +40,7 @@ class Baseline:
         when cells of twice the size are too coarse for the floor.
         """
         point = self.fitted.point
-        if self.coarse is None or self.on_coarse is None or _across_floor(self.coarse) < ENOUGH_ACROSS:
+        if self.coarse is None or self.on_coarse is None or cells_across(self.coarse.site) < ENOUGH_ACROSS:
             return self.model, self.noise, point
         shift = self.noise.used(point.prediction - self.on_coarse.prediction)
         return self.coarse, replace(self.noise, value=self.noise.value - shift), self.on_coarse
@@ -82,12 +81,6 @@ def _refined(model: Model, noise: Noise, near: Point) -> Fitted:
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow on cells of half the size; refine `grid`.")
     return fit(model, noise, start)
-
-
-def _across_floor(model: Model) -> float:
-    """Cells across the floor."""
-    ground = ground_of(model.case, model.site, next(iter(model.case.experiments)))
-    return float(2.0 * np.median(ground.half_width) / model.site.grid.dy)
 
 
 def grid_difference(point: Point, on_coarse: Point | None) -> Array:

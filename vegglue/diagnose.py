@@ -18,7 +18,6 @@ from vegglue.cores import in_threads
 from vegglue.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
 from vegglue.effect import Array
 from vegglue.fit import Fitted, chi2, fit, objective
-from vegglue.ground import ground_of
 from vegglue.linearise import Model, linearise, theta_at
 from vegglue.noise import Noise, with_grid_error, without
 from vegglue.prune import pruned
@@ -62,7 +61,7 @@ def diagnose(
     place: Where | None = None
     while True:
         say(f"looking for what is missing after {' and '.join(step.accepted for step in steps) or 'nothing'}")
-        seen = look(base, _half_width(base.model), tuple(flagged))
+        seen = look(base, tuple(flagged))
         base = replace(base, noise=seen.noise)
         if seen_first is None:
             seen_first, first = seen, base
@@ -271,11 +270,6 @@ def _where(base: Baseline, seen: Look) -> Where:
     share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
     seen_in = tuple(name for name, part in share.items() if part > 0.1)
     return Where(float(spot.x[best]), float(spot.y[best]), seen_in, strength, float(seen.places.scores[best]))
-
-
-def _half_width(model: Model) -> float:
-    ground = ground_of(model.case, model.site, next(iter(model.case.experiments)))
-    return float(np.median(ground.half_width))
 
 
 def _written(

@@ -9,7 +9,6 @@ from vegglue.baseline import Baseline, coarser, grid_difference
 from vegglue.effect import Array
 from vegglue.ensemble import Ensemble
 from vegglue.fit import Fitted, fit
-from vegglue.ground import ground_of
 from vegglue.likelihood import fit_members
 from vegglue.linearise import Model, Point, linearise
 from vegglue.modes import distinct, modes_of
@@ -51,7 +50,7 @@ def groundwork(model: Model, ensemble: Ensemble, rule: str, jobs: int) -> Ground
     for _ in range(TURNS if rule != "known" else 0):
         noise = _sized(noise, fits[0], model.station)
         fits = _again(model, noise, fits)
-    seen = look(Baseline(model, noise, fits[0], coarse, on_coarse), _half_width(model), ())
+    seen = look(Baseline(model, noise, fits[0], coarse, on_coarse), ())
     noise = seen.noise if rule == "known" else replace(seen.noise, scale=1.0)
     fits = _again(model, noise, fits)
     surprise = unexplained(noise, fits[0].point)
@@ -89,8 +88,3 @@ def _sized(noise: Noise, fitted: Fitted, station: pd.DataFrame) -> Noise:
 def _again(model: Model, noise: Noise, fits: list[Fitted]) -> list[Fitted]:
     """Best places under other errors, a few steps from where they were."""
     return distinct([fit(model, noise, one.point) for one in fits])
-
-
-def _half_width(model: Model) -> float:
-    ground = ground_of(model.case, model.site, next(iter(model.case.experiments)))
-    return float(np.median(ground.half_width))

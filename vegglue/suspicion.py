@@ -9,6 +9,7 @@ from vegglue import score
 from vegglue.baseline import Baseline
 from vegglue.candidates import Candidate, candidates_of, start_of, with_effect
 from vegglue.effect import Amplitude, Array
+from vegglue.ground import half_width
 from vegglue.linearise import fingerprint, z_at
 from vegglue.noise import Noise, estimated
 from vegglue.places import Spots, spots
@@ -70,7 +71,7 @@ class Look:
         return score.family_p(float(self.scores[self.best_column(candidate)]), self.maxima)
 
 
-def look(base: Baseline, half_width: float, flagged: tuple[int, ...], seed: int = 1) -> Look:
+def look(base: Baseline, flagged: tuple[int, ...], seed: int = 1) -> Look:
     """Fingerprints of all candidates, of spots everywhere and of single stations, against the residual.
 
     Fingerprints and slopes are those of the quick model: they only have to point the right way. The correlation of the
@@ -79,7 +80,7 @@ def look(base: Baseline, half_width: float, flagged: tuple[int, ...], seed: int 
     model, _, point = base.quick
     candidates = candidates_of(model.case, model.station)
     changed, columns, settings = _changes(model.case, candidates)
-    there = spots(model, point, half_width)
+    there = spots(model, point, half_width(base.model.site))
     slope, prints, spot_prints = (
         base.noise.used(values) for values in (point.slope, fingerprint(model, point, changed), there.traces)
     )
