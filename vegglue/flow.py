@@ -27,7 +27,8 @@ LEVEL, ACROSS, ALONG = 0, 1, 2
 class Inflow:
     """Discharge [m3/s] of each member through the cells start..stop-1 of one side ('west', 'south' or 'north').
 
-    spread: what conveyance is multiplied by in each cell, (cell, m) or (cell, 1) [-].
+    spread: what conveyance is multiplied by in each cell, (cell, m) or (cell, 1) [-]; along: through a side, velocity
+    along x over that through the side, the cotangent of the angle it joins at [-].
     """
 
     side: str
@@ -36,6 +37,7 @@ class Inflow:
     discharge: Array
     by_conveyance: bool = True
     spread: Array = field(default_factory=lambda: np.ones((1, 1)))
+    along: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -198,11 +200,32 @@ def _side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
     beside = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}
     for inflow in problem.inflows:
         part = slice(inflow.start, inflow.stop)
-        width = problem.dy if inflow.side == "west" else problem.dx
-        there = beside[inflow.side][part]
-        weight = (there ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(there)) * inflow.spread
-        fluxes[inflow.side][part] += inflow.discharge * weight / (weight.sum(axis=0) * width)
+        fluxes[inflow.side][part] += _flux(problem, inflow, beside[inflow.side][part])
     return fluxes["west"], fluxes["south"], fluxes["north"]
+
+
+def _flux(problem: Problem, inflow: Inflow, depth: Array) -> Array:
+    """q [m2/s] in each cell of an inflow, of their depths (cell, m)."""
+    width = problem.dy if inflow.side == "west" else problem.dx
+    weight = (depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread
+    return np.asarray(inflow.discharge * weight / (weight.sum(axis=0) * width))
+
+
+def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
+    """Add c (u - u_in) / dy to R_u (nx, 3, ny, m) beside inflows through the sides, c their speed: what joins has to be
+    brought from its own u_in to that of the flow. Speeds of an east face are those of both its cells.
+    """
+    for inflow in problem.inflows:
+        if inflow.side == "west":
+            continue
+        row, part = 0 if inflow.side == "south" else -1, slice(inflow.start, inflow.stop)
+        entering, brought = np.zeros((2, problem.shape[0] + 1, problem.members))
+        entering[:-1][part] = _flux(problem, inflow, depth[part, row])
+        brought[:-1][part] = entering[:-1][part] ** 2 / depth[part, row] * inflow.along
+        h = np.concatenate([depth[:, row], depth[-1:, row]])
+        both = problem.dy * (h[:-1] + h[1:])
+        missing = (entering[:-1] + entering[1:]) * u[:, row] - (brought[:-1] + brought[1:])
+        out[:, ALONG, row] += missing / both
 
 
 def storage(problem: Problem, level: Array) -> Array:
@@ -296,6 +319,7 @@ def residual(problem: Problem, state: Array) -> Array:
         problem.dx,
         problem.dy,
     )
+    _join(problem, out, state[:, ALONG], depth)
     if problem.source.size:
         # What enters from the side has to be brought to speed.
         out[:, LEVEL] -= problem.source

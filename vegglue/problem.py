@@ -102,7 +102,8 @@ def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: 
 def _inflow(inflow: InflowPart, site: Site, discharge: Array, spread: Array) -> Inflow:
     cells = _inflow_cells(inflow, site)
     start, stop = int(cells[0]), int(cells[-1]) + 1
-    return Inflow(inflow.side, start, stop, discharge, inflow.spread == "conveyance", spread[: stop - start])
+    along = 0.0 if inflow.angle is None else 1.0 / float(np.tan(np.radians(inflow.angle)))
+    return Inflow(inflow.side, start, stop, discharge, inflow.spread == "conveyance", spread[: stop - start], along)
 
 
 def _inflow_cells(inflow: InflowPart, site: Site) -> np.ndarray:

@@ -168,6 +168,15 @@ class Inflow(Part):
     side: Literal["west", "south", "north"] = Field(description="side of the grid the water enters by")
     range: Interval | None = Field(default=None, description="part of that side, all of it when left out [m]")
     spread: Literal["conveyance", "uniform"] = Field(default="conveyance", description="by h^(5/3), or evenly")
+    angle: Annotated[Number, Field(gt=0, lt=180)] | None = Field(
+        default=None, description="south, north: from downstream to where the water heads, 90 if not given [degrees]"
+    )
+
+    @model_validator(mode="after")
+    def _straight_from_the_west(self) -> Self:
+        if self.side == "west" and self.angle is not None:
+            raise ValueError("no `angle` for an inflow from the west, which enters along x")
+        return self
 
 
 class Outlet(Part):
