@@ -17,8 +17,8 @@ from vegglue.candidates import Candidate, with_effect
 from vegglue.cores import in_threads
 from vegglue.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
 from vegglue.effect import Array
-from vegglue.fit import Fitted, chi2, fit, objective
-from vegglue.linearise import Model, linearise, theta_at
+from vegglue.fit import Fitted, chi2, fit, interval95, objective
+from vegglue.linearise import Model, linearise
 from vegglue.noise import Noise, with_grid_error, without
 from vegglue.prune import pruned
 from vegglue.suspicion import Look, look, refit_start
@@ -134,8 +134,8 @@ def _accept(
         chi2_after=further.fitted.chi2,
         p_family=seen.effects.p,
     )
-    amplitude, interval = _interval(further.model, further.fitted, best.candidate.parameter)
-    better = replace(best, amplitude=amplitude, interval95=interval)
+    amplitude, low, high = interval95(further.model, further.fitted, best.candidate.parameter)
+    better = replace(best, amplitude=amplitude, interval95=(low, high))
     return step, further, [better if one is best else one for one in refits]
 
 
@@ -156,18 +156,8 @@ def _refit(base: Baseline, seen: Look, candidate: int) -> _Refit | None:
     if start is None:
         return None
     fitted = fit(model, noise, start, REFIT_STEPS)
-    amplitude, interval = _interval(model, fitted, one.parameter)
-    return _Refit(one, column, fitted, amplitude, interval)
-
-
-def _interval(model: Model, fitted: Fitted, parameter: str) -> tuple[float, tuple[float, float]]:
-    """Value and 95 % interval of a parameter, from the covariance at the best place."""
-    j = model.names.index(parameter)
-    spread = 1.96 * float(np.sqrt(fitted.covariance[j, j]))
-    z = np.repeat(fitted.point.z[None], 3, axis=0)
-    z[:, j] += np.array([0.0, -spread, spread])
-    middle, low, high = (float(value) for value in theta_at(model.case, z)[parameter])
-    return middle, (low, high)
+    amplitude, low, high = interval95(model, fitted, one.parameter)
+    return _Refit(one, column, fitted, amplitude, (low, high))
 
 
 def _not_rejected(seen: Look, refits: list[_Refit]) -> list[_Refit]:
@@ -287,7 +277,7 @@ def _written(
     p_misfit = float(scipy.stats.chi2.sf(left, max(freedom, 1)))
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.refitted, -(one.score**2))))
     verdict, sentence, remarks = judged(last.model.case, noise, steps, ranked, place, p_misfit, left, freedom, flagged)
-    parameters = {name: _three(last, name) for name in last.model.names}
+    parameters = {name: interval95(last.model, last.fitted, name) for name in last.model.names}
     mapped = seen_first if place is None else seen  # a place is found in what the steps leave
     top = [seen_first.best_column(j) for j in _order(seen_first)[:12]]
     return Diagnosis(
@@ -308,7 +298,7 @@ def _written(
         flagged=tuple(int(noise.rows[row]) for row in flagged),
         threshold=float(np.sqrt(np.quantile(seen_first.maxima, 1.0 - ALARM))),
         first_scores={one.name: _best_score(seen_first, j) for j, one in enumerate(seen_first.candidates)},
-        first_parameters={name: _three(first, name)[0] for name in first.model.names},
+        first_parameters={name: interval95(first.model, first.fitted, name)[0] for name in first.model.names},
         parameters=parameters,
         zones=misfit_zones(first.model, first.noise, first.fitted.point),
         station=first.model.station,
@@ -337,8 +327,3 @@ def _at_stations(noise: Noise, stations: int) -> Array:
     error = np.full(stations, np.nan)
     error[noise.rows] = noise.scale * noise.error
     return error
-
-
-def _three(base: Baseline, name: str) -> tuple[float, float, float]:
-    middle, (low, high) = _interval(base.model, base.fitted, name)
-    return middle, low, high

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.effect import Array
-from vegglue.linearise import Model, Point, linearise
+from vegglue.linearise import Model, Point, linearise, theta_at
 from vegglue.noise import Noise
 
 # A step that promises less than this improvement of the misfit ends the search.
@@ -64,6 +64,15 @@ def covariance(noise: Noise, point: Point) -> Array:
     """(J' W' W J + I)^-1, of z around the best place (p, p)."""
     slope = noise.whiten(noise.used(point.slope))
     return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
+
+
+def interval95(model: Model, fitted: Fitted, name: str) -> tuple[float, float, float]:
+    """The best value of a parameter and the ends of its 95 % interval, from the covariance of z, in its own unit."""
+    j = model.names.index(name)
+    z = np.repeat(fitted.point.z[None], 3, axis=0)
+    z[:, j] += 1.96 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
+    middle, low, high = theta_at(model.case, z)[name]
+    return float(middle), float(low), float(high)
 
 
 def _step(noise: Noise, point: Point, damping: float) -> tuple[Array, float]:

@@ -13,7 +13,8 @@ import scipy.stats
 
 from vegglue.baseline import Baseline
 from vegglue.effect import Array
-from vegglue.linearise import Model, linearise, theta_at
+from vegglue.fit import interval95
+from vegglue.linearise import Model, linearise
 from vegglue.noise import Noise, covariance_of
 
 KINDS = ("velocity", "level")
@@ -73,7 +74,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
         log_score=float(np.nanmean(density)) if np.isfinite(density).any() else float("nan"),
         inside50=_share(surprise, 0.5),
         inside95=_share(surprise, 0.95),
-        values=_values(base),
+        values={name: interval95(model, base.fitted, name) for name in model.names},
         homogeneity=homogeneity(base),
         validation=float("nan") if validation is None else _validated(base, validation),
         velocity=velocity,
@@ -159,16 +160,6 @@ def _validated(base: Baseline, validation: Model) -> float:
     station = validation.station
     rows = (station["used"] & (station["kind"] == "velocity")).to_numpy(bool)
     return _rms(station["value"].to_numpy(float)[rows] - point.prediction[rows])
-
-
-def _values(base: Baseline) -> dict[str, tuple[float, float, float]]:
-    found = {}
-    for j, name in enumerate(base.model.names):
-        z = np.repeat(base.fitted.point.z[None], 3, axis=0)
-        z[:, j] += 1.96 * np.sqrt(base.fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
-        middle, low, high = (float(value) for value in theta_at(base.model.case, z)[name])
-        found[name] = (middle, low, high)
-    return found
 
 
 def _share(surprise: Array, level: float) -> float:
