@@ -5,7 +5,6 @@ Held out: each section, or each experiment, is left out in turn and the model ca
     dz = (J' C^-1 J + 1)^-1 (J' C^-1 r - z)   over the rows kept,   error r - J dz of those left out.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from vegglue.effect import Array
 from vegglue.fit import interval95
 from vegglue.linearise import Model, linearise
 from vegglue.noise import Noise, covariance_of
+from vegglue.transfer import alike, told_by_data
 
 KINDS = ("velocity", "level")
 
@@ -102,30 +102,20 @@ def improvement(before: Rung, after: Rung, by: str = "sections") -> tuple[float,
 
 
 def homogeneity(base: Baseline) -> dict[str, float]:
-    """For each parameter the chance p of chi2 = sum_e (z_e - z)^2 / s_e^2, z_e from each experiment alone [-].
+    """For each parameter the chance p that it is the same in all experiments, each moved to by one linear step [-].
 
-    One linear step from the joint fit. z_e is that of the data alone, the prior taken off again; experiments that say
-    little of a parameter (s_e above half the prior's) are left out; empty with fewer than two experiments.
+    The test of `transfer`; parameters of which fewer than two experiments say enough are left out.
     """
     noise, point = base.noise, base.fitted.point
+    slope, left = noise.used(point.slope), noise.residual(point.prediction)
     names = base.model.station["experiment"].to_numpy()[noise.rows]
-    found: dict[str, list[tuple[float, float]]] = {name: [] for name in base.model.names}
+    told = []
     for experiment in dict.fromkeys(names):
-        rows = np.flatnonzero(names == experiment)
-        step, spread = _step(noise, noise.used(point.slope), noise.residual(point.prediction), point.z, rows)
-        for j, name in enumerate(base.model.names):
-            variance = spread[j, j]
-            if variance < 0.25:
-                # Without the prior: precision less one, and the mean moved back accordingly.
-                own = 1.0 / (1.0 / variance - 1.0)
-                found[name].append((float((point.z[j] + step[j]) * own / variance), own))
-    return {name: _alike(pairs) for name, pairs in found.items() if len(pairs) > 1}
-
-
-def _alike(pairs: Sequence[tuple[float, float]]) -> float:
-    value, variance = np.array(pairs).T
-    mean = np.sum(value / variance) / np.sum(1.0 / variance)
-    return float(scipy.stats.chi2.sf(np.sum((value - mean) ** 2 / variance), value.size - 1))
+        step, spread = _step(noise, slope, left, point.z, np.flatnonzero(names == experiment))
+        told.append(told_by_data(base.model.case, point.z + step, np.diag(spread)))
+    value, error = (np.array(part) for part in zip(*told, strict=True))
+    chances = {name: alike(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
+    return {name: p for name, p in chances.items() if np.isfinite(p)}
 
 
 def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
