@@ -18,6 +18,7 @@ from vegglue.cores import in_threads
 from vegglue.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
 from vegglue.effect import Array
 from vegglue.fit import Fitted, chi2, fit, interval95, objective
+from vegglue.likelihood import root_mean_square
 from vegglue.linearise import Model, linearise
 from vegglue.noise import Noise, with_grid_error, without
 from vegglue.prune import pruned
@@ -294,7 +295,7 @@ def _written(
         p_misfit=p_misfit,
         correlation=noise.correlation,
         scale=noise.scale,
-        grid_error=float(np.sqrt(np.mean(noise.grid**2))),
+        grid_error=root_mean_square(noise.grid),
         flagged=tuple(int(noise.rows[row]) for row in flagged),
         threshold=float(np.sqrt(np.quantile(seen_first.maxima, 1.0 - ALARM))),
         first_scores={one.name: _best_score(seen_first, j) for j, one in enumerate(seen_first.candidates)},

@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.effect import Array
+from vegglue.likelihood import root_mean_square
 from vegglue.summary import KeyNumber
 from vegglue.typography import NARROW, as_given, fixed, interval, short, unit_html
 
@@ -107,8 +108,7 @@ def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = "velocity") ->
     station = diagnosis.station
     counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
     counted[list(diagnosis.flagged)] = False
-    left = (station["value"].to_numpy(float) - prediction)[counted]
-    return float(np.sqrt(np.mean(left**2))) if left.size else float("nan")
+    return root_mean_square((station["value"].to_numpy(float) - prediction)[counted])
 
 
 def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:

@@ -13,6 +13,7 @@ import scipy.stats
 from vegglue.baseline import Baseline
 from vegglue.effect import Array
 from vegglue.fit import interval95
+from vegglue.likelihood import root_mean_square
 from vegglue.linearise import Model, linearise
 from vegglue.noise import Noise, covariance_of
 from vegglue.transfer import alike, told_by_data
@@ -65,10 +66,10 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
         title=model.case.title,
         effects=tuple(model.case.effects),
         parameters=len(model.names),
-        rmse={kind: _rms(left[(used["kind"] == kind).to_numpy()]) for kind in KINDS},
+        rmse={kind: root_mean_square(left[(used["kind"] == kind).to_numpy()]) for kind in KINDS},
         chi2=float(np.sum((left / noise.error) ** 2)),
         stations=int(noise.rows.size),
-        noise_floor=_rms(noise.error[velocity]),
+        noise_floor=root_mean_square(noise.error[velocity]),
         sections=section,
         experiments=experiment,
         log_score=float(np.nanmean(density)) if np.isfinite(density).any() else float("nan"),
@@ -84,7 +85,8 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
 
 def held_out(rung: Rung, by: str = "sections") -> float:
     """Root mean square held-out error of velocities [m/s]."""
-    return _rms(getattr(rung, by)[rung.velocity])
+    error = getattr(rung, by)[rung.velocity]
+    return root_mean_square(error[np.isfinite(error)])
 
 
 def improvement(before: Rung, after: Rung, by: str = "sections") -> tuple[float, float]:
@@ -149,14 +151,9 @@ def _validated(base: Baseline, validation: Model) -> float:
         return float("nan")
     station = validation.station
     rows = (station["used"] & (station["kind"] == "velocity")).to_numpy(bool)
-    return _rms(station["value"].to_numpy(float)[rows] - point.prediction[rows])
+    return root_mean_square(station["value"].to_numpy(float)[rows] - point.prediction[rows])
 
 
 def _share(surprise: Array, level: float) -> float:
     known = surprise[np.isfinite(surprise)]
     return float(np.mean(known < scipy.stats.norm.ppf(0.5 + 0.5 * level))) if known.size else float("nan")
-
-
-def _rms(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")

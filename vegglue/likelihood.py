@@ -130,5 +130,5 @@ def member_weights(fit: Fit, likelihood: str, threshold: float) -> Floats:
 
 
 def root_mean_square(values: Floats) -> float:
-    """sqrt(mean x^2), in the unit of the values."""
-    return float(np.sqrt(np.mean(values**2)))
+    """sqrt(mean x^2), in the unit of the values; NaN without any, or with one that is unknown."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

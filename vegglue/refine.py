@@ -131,7 +131,7 @@ def _refinement(base: Groundwork, drawn: Sample, best: int) -> Refinement:
     misfit = float(np.sum(noise.whiten(noise.residual(drawn.values[best])) ** 2))
     freedom = count - len(base.model.names)
     near = np.argmin([np.linalg.norm(drawn.z - one.point.z, axis=1) for one in base.fits], axis=0)
-    grid = float(np.sqrt(np.mean(noise.grid**2))) if base.grid_known else float("nan")
+    grid = root_mean_square(noise.grid) if base.grid_known else float("nan")
     modes = theta_at(case, np.stack([one.point.z for one in base.fits]))
     at_all = partial(_at_stations, noise=noise, stations=len(station))
     return Refinement(

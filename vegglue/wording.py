@@ -3,6 +3,7 @@
 import numpy as np
 
 from vegglue.ensemble import FAILED, Ensemble
+from vegglue.likelihood import root_mean_square
 from vegglue.posterior import Posterior
 from vegglue.schema import Case
 from vegglue.typography import NARROW, plus_minus, short, symbol_html, unit_html
@@ -39,7 +40,7 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
     """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
     station = posterior.station
     error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
-    return float(np.sqrt(np.mean(error**2)))
+    return root_mean_square(error)
 
 
 def pressed_side(posterior: Posterior, name: str) -> str:
