@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from vegglue.config import as_yaml, load_case
+from vegglue.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.design import SEPARATES, Worth
 from vegglue.diagnosis import Diagnosis, as_json
 from vegglue.errors import InputError
@@ -40,20 +41,21 @@ Trust = Annotated[bool, typer.Option("--trust", help="Run the effects of the con
 
 
 def import_command(
-    folder: Annotated[Path, typer.Argument(help="Folder with site.json, velocities.csv, levels.csv.")],
+    folder: Annotated[Path, typer.Argument(help="Folder with site.json, velocities.csv, levels.csv; or a known set.")],
     to: Annotated[
         Path | None, typer.Option(help="Config to write; configs/<folder>.yaml or <folder>.yaml if not given.")
     ] = None,
 ) -> None:
-    """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand."""
+    """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
+
+    The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
+    """
     target = to or _default_target(folder)
-    tree = case_from_folder(folder, target)
-    text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror}); give another file by --to.") from None
+    if holds_confluence(folder):
+        _write_config(target, folder, case_from_confluence(folder, target))
+        _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target))
+    else:
+        _write_config(target, folder, case_from_folder(folder, target))
     case = load_case(target)
     console.print(
         f"{target}: {len(case.experiments)} experiment(s), {len(case.plants.patches)} patches, "
@@ -158,6 +160,14 @@ COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("next", next_command),
     ("run", run_command),
 )
+
+
+def _write_config(path: Path, folder: Path, tree: dict[str, Any]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another file by --to.") from None
 
 
 def _default_target(folder: Path) -> Path:
