@@ -178,9 +178,7 @@ def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosi
     for name in found.steps[0].rivals:
         suspect = next(one for one in found.suspects if one.name == name)
         candidate = candidate_named(model.case, model.station, name)
-        amplitude = candidate.effect.amplitude
-        above = suspect.amplitude - amplitude.off
-        rivals.append((candidate, suspect.shapes, float(np.sign(above) * np.abs(above) ** amplitude.power)))
+        rivals.append((candidate, suspect.shapes, candidate.effect.amplitude.gain(suspect.amplitude)))
     best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
         return None

@@ -31,6 +31,17 @@ def test_the_library_covers_all_stages():
         assert not effect.checked or effect.source.startswith("definition"), f"{effect.name}: was the source read?"
 
 
+@pytest.mark.parametrize("value", [-1.9, -0.5, 0.5, 0.8, 2.5])
+def test_an_amplitude_and_its_gain_undo_each_other(value):
+    amplitude = Amplitude("strength", "1/m", "drag c", 0.1, -2.0, 3.0, off=0.5, power=2)
+    gain = amplitude.gain(value)
+    assert gain == pytest.approx((value - 0.5) * abs(value - 0.5))
+    assert amplitude.at(gain) == pytest.approx(value)
+    assert amplitude.size(gain) == pytest.approx(value - 0.5)
+    assert amplitude.at(gain + 100.0) == 3.0
+    assert amplitude.gain(0.5 + amplitude.scale) == pytest.approx(amplitude.plausible)
+
+
 def drag(cells, strength):
     return {"rate": cells.rate + strength}
 

@@ -105,8 +105,7 @@ def prior_of(effect: Effect) -> Parameter:
 
 
 def start_of(effect: Effect, gain: float) -> float:
-    """The amplitude whose power above off is `gain`, kept within the support and off its ends."""
+    """The amplitude of that gain, kept off the ends of its support."""
     amplitude = effect.amplitude
-    size = float(np.sign(gain) * np.abs(gain) ** (1.0 / amplitude.power))
     margin = 0.01 * min(amplitude.scale, amplitude.high - amplitude.low)
-    return float(np.clip(amplitude.off + size, amplitude.low + margin, amplitude.high - margin))
+    return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))

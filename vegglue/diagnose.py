@@ -167,9 +167,7 @@ def _not_rejected(seen: Look, refits: list[_Refit]) -> list[_Refit]:
     family = [seen.columns[seen.candidates.index(one.candidate)] for one in order]
     gains = np.zeros(seen.scores.size)
     for one in order:
-        amplitude = one.candidate.effect.amplitude
-        above = one.amplitude - amplitude.off
-        gains[one.column] = np.sign(above) * np.abs(above) ** amplitude.power
+        gains[one.column] = one.candidate.effect.amplitude.gain(one.amplitude)
     slack = score.rivals(seen.projected, family, gains, seed=2)
     best = order[0].fitted.objective
     return [one for one, most in zip(order, slack, strict=True) if one.fitted.objective - best <= most]
@@ -211,13 +209,13 @@ def _suspects(base: Baseline, seen: Look, known: dict[str, Suspect]) -> dict[str
         trace = seen.traces[:, column]
         alike = (trace @ slopes) / (lengths * max(float(np.linalg.norm(trace)), 1e-300))
         nearest = int(np.argmax(np.abs(alike)))
-        smallest = (SEEN / length) ** (1.0 / amplitude.power)
-        low, high = (_amplitude(one, gain + side * 1.96 / length) for side in (-1.0, 1.0))
+        smallest = amplitude.size(SEEN / length)
+        low, high = (amplitude.at(gain + side * 1.96 / length) for side in (-1.0, 1.0))
         now[one.name] = Suspect(
             name=one.name,
             title=one.effect.title,
             unit=amplitude.unit,
-            amplitude=_amplitude(one, gain),
+            amplitude=amplitude.at(gain),
             interval95=(low, high),
             score=float(seen.scores[column]),
             p_family=seen.family_p(j),
@@ -231,12 +229,6 @@ def _suspects(base: Baseline, seen: Look, known: dict[str, Suspect]) -> dict[str
             shapes=seen.settings[column],
         )
     return now | {name: suspect for name, suspect in known.items() if suspect.refitted or name not in now}
-
-
-def _amplitude(one: Candidate, gain: float) -> float:
-    amplitude = one.effect.amplitude
-    size = float(np.sign(gain) * np.abs(gain) ** (1.0 / amplitude.power))
-    return float(np.clip(amplitude.off + size, amplitude.low, amplitude.high))
 
 
 def _refitted(base: Baseline, seen: Look, one: _Refit) -> Suspect:

@@ -51,6 +51,23 @@ class Amplitude:
     off: float = 0.0
     power: int = 1
 
+    def gain(self, value: float) -> float:
+        """What predictions answer to: (value - off)^power, of the sign of the difference."""
+        return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)
+
+    def size(self, gain: float) -> float:
+        """How far from off the value of that gain lies."""
+        return float(np.sign(gain) * np.abs(gain) ** (1.0 / self.power))
+
+    def at(self, gain: float) -> float:
+        """The value of that gain, kept within the support."""
+        return float(np.clip(self.off + self.size(gain), self.low, self.high))
+
+    @property
+    def plausible(self) -> float:
+        """Gain of a plausible size."""
+        return self.scale**self.power
+
 
 @dataclass(frozen=True)
 class Shape:

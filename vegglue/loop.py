@@ -155,7 +155,7 @@ def _start_child(
     folder.mkdir(parents=True, exist_ok=True)
     theta = {name: values[0] for name, values in found.parameters.items() if name in child.parameters}
     for one, _ in added:
-        theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.scale))
+        theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.plausible))
     remember_place(child, folder, theta)
 
 
@@ -232,8 +232,8 @@ def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple
 def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
     """Length of the trace of a plausible amplitude before projection, in standard errors."""
     amplitude = candidate_named(case, found.station, suspect.name).effect.amplitude
-    sizes = (amplitude.scale / suspect.smallest_detectable) ** amplitude.power
-    return SEEN * sizes / max(suspect.visibility, 1e-6)
+    seen = amplitude.gain(amplitude.off + suspect.smallest_detectable)
+    return SEEN * amplitude.plausible / seen / max(suspect.visibility, 1e-6)
 
 
 def _rivals(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
@@ -241,8 +241,8 @@ def _rivals(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool 
     for suspect in (one for one in found.suspects if one.name in names):
         candidate = candidate_named(case, found.station, suspect.name)
         amplitude = candidate.effect.amplitude
-        above = amplitude.scale if plausible else suspect.amplitude - amplitude.off
-        rivals.append((candidate, suspect.shapes, float(np.sign(above) * np.abs(above) ** amplitude.power)))
+        gain = amplitude.plausible if plausible else amplitude.gain(suspect.amplitude)
+        rivals.append((candidate, suspect.shapes, gain))
     return rivals
 
 

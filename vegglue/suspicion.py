@@ -85,7 +85,7 @@ def look(base: Baseline, flagged: tuple[int, ...], seed: int = 1) -> Look:
         base.noise.used(values) for values in (point.slope, fingerprint(model, point, changed), there.traces)
     )
     left = base.noise.residual(base.fitted.point.prediction)
-    sizes = np.array([amplitude.scale**amplitude.power for _, _, amplitude in changed])
+    sizes = np.array([amplitude.plausible for _, _, amplitude in changed])
     explained = np.hstack([slope, prints * sizes, spot_prints * PLAUSIBLE_SPOT])
     noise = _set_aside(estimated(base.noise, left, explained), slope, left, base.fitted.point.z, explained)
 

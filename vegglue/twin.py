@@ -261,7 +261,7 @@ def _first_size(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hid
     case = _knowing(ground.model.case, hidden)
     changed = with_effect(case, candidate, hidden.shapes)
     trace = fingerprint(replace(ground.model, case=case), ground.here, [(changed, candidate.parameter, amplitude)])
-    return float((snr / max(_visible(ground, errors, trace[:, 0]), 1e-300)) ** (1.0 / amplitude.power))
+    return amplitude.size(snr / max(_visible(ground, errors, trace[:, 0]), 1e-300))
 
 
 def _signal(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hidden) -> float:
