@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from reach import said_to, vegglue
 
+from vegglue.candidates import at_work, candidates_of, with_effect
 from vegglue.config import load_case
 from vegglue.extend import candidate_named
 from vegglue.fit import fit
@@ -87,6 +88,16 @@ def test_a_child_says_what_it_adds_and_reads_back(tmp_path: Path) -> None:
     assert child.effects["discharge_error_high"].experiments == ("high",)
     assert set(child.parameters) - set(case.parameters) == {"discharge_error_high_relative_error"}
     assert child.observations == case.observations
+
+
+def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    station = read_observations(case).table
+    every = candidates_of(case, station)
+    assert {one.effect.each for one in every} >= {"case", "experiment", "section"}
+    for one in every:
+        assert at_work(with_effect(case, one, {})) == {one.key: one}
+        assert candidate_named(case, station, one.name) == one
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import pandas as pd
 
 from vegglue.effect import Effect
 from vegglue.effects import library
-from vegglue.schema import Case, Parameter, Working
+from vegglue.schema import Case, Parameter, Value, Working
+from vegglue.workings import effect_of
 
 # Combinations of shapes that a search tries at most.
 MOST_SHAPES = 12
@@ -52,13 +53,7 @@ class Candidate:
 def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
     """All effects of the library that could act in the case and do not yet, once for each place they may act in."""
     found = []
-    used = station[station["used"].to_numpy(bool)]
-    velocity = used[used["kind"] == "velocity"]
-    places: Mapping[str, list[str]] = {
-        "experiment": list(case.experiments),
-        "section": [str(name) for name in velocity["section"].unique()],
-        "device": [str(name) for name in used["device"].unique() if str(name)],
-    }
+    places = places_of(case, station)
     for effect in library(case.effect_file).values():
         if "search" in effect.tags or (effect.stage == "plants" and not case.plants.patches):
             continue
@@ -70,21 +65,45 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
     return [one for one in found if one.key not in case.effects]
 
 
-def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float], name: str | None = None) -> Case:
-    """The case with one effect more; its amplitude is a parameter, its shapes are numbers."""
-    effect, parameter = candidate.effect, candidate.parameter
-    working = Working(
+def places_of(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
+    """Where a cause of its own may act: experiments, sections of velocities, and devices, as far as they are used."""
+    used = station[station["used"].to_numpy(bool)]
+    velocity = used[used["kind"] == "velocity"]
+    return {
+        "experiment": list(case.experiments),
+        "section": [str(name) for name in velocity["section"].unique()],
+        "device": [str(name) for name in used["device"].unique() if str(name)],
+    }
+
+
+def at_work(case: Case) -> dict[str, Candidate]:
+    """What the effects of a case once were, by their keys."""
+    return {
+        key: Candidate(effect_of(case, key), working.experiments or (), working.sections, working.devices)
+        for key, working in case.effects.items()
+    }
+
+
+def working_of(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> Working:
+    """The entry of a candidate in a case; amplitude: a number or the name of a parameter."""
+    effect = candidate.effect
+    return Working(
         effect=effect.name if candidate.key != effect.name else None,
-        values={effect.amplitude.name: parameter, **shapes},
+        values={effect.amplitude.name: amplitude}
+        | {shape.name: float(shapes.get(shape.name, shape.default)) for shape in effect.shapes},
         experiments=candidate.experiments or None,
         sections=candidate.sections,
         devices=candidate.devices,
     )
+
+
+def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Case:
+    """The case with one effect more; its amplitude is a parameter, its shapes are numbers."""
+    parameter = candidate.parameter
     return case.model_copy(
         update={
-            "name": name or case.name,
-            "effects": {**case.effects, candidate.key: working},
-            "parameters": {**case.parameters, parameter: prior_of(effect)},
+            "effects": {**case.effects, candidate.key: working_of(candidate, parameter, shapes)},
+            "parameters": {**case.parameters, parameter: prior_of(candidate.effect)},
         }
     )
 

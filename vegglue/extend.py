@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from vegglue.candidates import Candidate, prior_of
+from vegglue.candidates import Candidate, places_of, prior_of, working_of
 from vegglue.effects import library
 from vegglue.errors import InputError
 from vegglue.refusal import nearest
@@ -28,11 +28,7 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
         raise InputError(f"--add: `{name}` is not an effect of the library: {nearest(name.split('[')[0], known)}")
     effect = known[found[1]]
     where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
-    places = {
-        "experiment": list(case.experiments),
-        "section": [str(text) for text in station["section"].unique() if str(text)],
-        "device": [str(text) for text in station["device"].unique() if str(text)],
-    }
+    places = places_of(case, station)
     kind = next((kind for kind, names in places.items() if where and set(where) <= set(names)), None)
     if where and (kind is None or (kind in ("section", "device") and effect.stage != "sensor")):
         raise InputError(
@@ -60,7 +56,8 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
         if unknown:
             names = [shape.name for shape in candidate.effect.shapes]
             raise InputError(f"--shape: `{min(unknown)}` is not a shape of {candidate.name}: it has {names or 'none'}.")
-        tree["effects"][candidate.key] = _working(candidate, shapes)
+        working = working_of(candidate, candidate.parameter, shapes)
+        tree["effects"][candidate.key] = working.model_dump(mode="json", exclude_defaults=True)
         prior = prior_of(candidate.effect).model_dump(exclude_none=True, exclude={"symbol"})
         tree["parameters"][candidate.parameter] = prior
     return tree
@@ -70,16 +67,3 @@ def child_name(parent: str, added: Sequence[Candidate]) -> str:
     """A name for the child's folder of results."""
     words = "-".join([parent, *(candidate.key for candidate in added)])
     return re.sub(r"[^a-z0-9_-]+", "-", words.lower())[:100]
-
-
-def _working(candidate: Candidate, shapes: Mapping[str, float]) -> Tree:
-    effect = candidate.effect
-    values: Tree = {effect.amplitude.name: candidate.parameter}
-    values |= {shape.name: float(shapes.get(shape.name, shape.default)) for shape in effect.shapes}
-    working: Tree = {"values": values}
-    if candidate.key != effect.name:
-        working["effect"] = effect.name
-    for place in ("experiments", "sections", "devices"):
-        if getattr(candidate, place):
-            working[place] = list(getattr(candidate, place))
-    return working

@@ -20,14 +20,14 @@ import pandas as pd
 
 from vegglue import score, strangers
 from vegglue.baseline import coarser
-from vegglue.candidates import Candidate, candidates_of, with_effect
+from vegglue.candidates import Candidate, candidates_of, with_effect, working_of
 from vegglue.effect import Array
 from vegglue.errors import InputError
 from vegglue.extend import candidate_named
 from vegglue.linearise import Model, Point, fingerprint, linearise, theta_at
 from vegglue.noise import Noise, noise_of, with_correlation, with_grid_error
 from vegglue.refusal import nearest
-from vegglue.schema import Case, Working
+from vegglue.schema import Case
 from vegglue.site import build_site
 
 FINER = 1.5
@@ -163,13 +163,7 @@ def measured(ground: Ground, wanted: Sequence[str], snr: float, noise: str, seed
 
 def hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
     """The case with the effect at work at its true size; one that stands in no list is read from its own file."""
-    working = Working(
-        effect=candidate.effect.name,
-        values={candidate.effect.amplitude.name: hidden.amplitude, **hidden.shapes},
-        experiments=candidate.experiments or None,
-        sections=candidate.sections,
-        devices=candidate.devices,
-    )
+    working = working_of(candidate, hidden.amplitude, hidden.shapes)
     return _knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
 
 
