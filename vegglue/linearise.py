@@ -18,7 +18,7 @@ from vegglue.neighbourhood import overflows, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
 from vegglue.problem import build_problem
-from vegglue.schema import Case
+from vegglue.schema import Case, Parameter
 from vegglue.sensor import read_sensors
 from vegglue.site import Site, build_site
 from vegglue.steady import Factors, chord
@@ -79,8 +79,17 @@ def theta_at(case: Case, z: Array) -> dict[str, Array]:
 
 def z_at(case: Case, theta: dict[str, Array]) -> Array:
     """The inverse of `theta_at`, (m, p)."""
-    columns = [probability(prior, theta[name]) for name, prior in case.parameters.items()]
-    return np.clip(ndtri(np.column_stack(columns)), -FURTHEST, FURTHEST)
+    columns = [_normal(prior, theta[name]) for name, prior in case.parameters.items()]
+    return np.column_stack(columns)
+
+
+def z_of(prior: Parameter, value: float) -> float:
+    """z of one value of one parameter."""
+    return float(_normal(prior, np.array([value]))[0])
+
+
+def _normal(prior: Parameter, values: Array) -> Array:
+    return np.clip(ndtri(probability(prior, values)), -FURTHEST, FURTHEST)
 
 
 def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None:

@@ -23,11 +23,11 @@ from vegglue.extend import candidate_named, child_tree
 from vegglue.ladder import Rung, improvement, rung
 from vegglue.linearise import Model, fingerprint, model_of, theta_at, z_at
 from vegglue.observations import read_observations
+from vegglue.prune import NEEDED
 from vegglue.schema import Case
 from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
+from vegglue.workings import amplitude_of, effect_of
 
-# An effect whose amplitude lies closer to off than this, in standard errors, is no longer needed.
-NEEDED = 2.0
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
 Say = Callable[[str], None]
@@ -160,11 +160,11 @@ def _start_child(
 
 
 def _needed(case: Case, rung: Rung, name: str) -> bool:
-    parameter = next(iter(value for value in case.effects[name].values.values() if isinstance(value, str)), None)
+    parameter = amplitude_of(case, name)
     if parameter is None:
         return True
     middle, low, high = rung.values[parameter]
-    off = float(case.parameters[parameter].mean or 0.0)
+    off = effect_of(case, name).amplitude.off
     return abs(middle - off) > NEEDED * (high - low) / 3.92
 
 

@@ -10,7 +10,7 @@ from vegglue.baseline import Baseline
 from vegglue.candidates import Candidate, candidates_of, start_of, with_effect
 from vegglue.effect import Amplitude, Array
 from vegglue.ground import half_width
-from vegglue.linearise import fingerprint, z_at
+from vegglue.linearise import fingerprint, z_of
 from vegglue.noise import Noise, estimated
 from vegglue.places import Spots, spots
 from vegglue.schema import Case
@@ -158,8 +158,7 @@ def refit_start(base: Baseline, seen: Look, candidate: int, changed: Case) -> Ar
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ left - point.z)
     step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
-    alone = changed.model_copy(update={"parameters": {one.parameter: changed.parameters[one.parameter]}})
-    return np.append(point.z + step, z_at(alone, {one.parameter: np.array([amplitude])})[0])
+    return np.append(point.z + step, z_of(changed.parameters[one.parameter], amplitude))
 
 
 def _family(scores: Array, maxima: Array) -> Family:

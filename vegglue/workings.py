@@ -24,6 +24,12 @@ def effect_of(case: Case, name: str) -> Effect:
     return library(case.effect_file)[case.effects[name].effect or name]
 
 
+def amplitude_of(case: Case, name: str) -> str | None:
+    """The parameter that is the amplitude of an entry of `effects`; None when it is a number."""
+    value = case.effects[name].values.get(effect_of(case, name).amplitude.name)
+    return value if isinstance(value, str) else None
+
+
 def acting_in(case: Case, experiment: str, theta: Theta, members: int) -> tuple[Acting, ...]:
     """Effects at work in one experiment, in the order of the library."""
     order = list(library(case.effect_file))
