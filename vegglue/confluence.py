@@ -1,12 +1,12 @@
 """The open-channel confluence set of R.B. Canelas (GitHub, Confluence-velocity-dataset-2021, GPL-3.0) -> a case.
 
 The set is not part of this project: a user downloads it. Its folder holds bed.csv (x_m, y_m, z_bed_m), water_level.csv
-(x_m, y_m, z_ws_m) and depth_averaged.csv (verticals: x_m, y_m, h_m, U_depthavg_ms, bed_extrapolated). x runs
-downstream from the upstream corner of the junction; the side inflow comes through the wall at y = 0. What the
+(x_m, y_m, z_ws_m) and depth_averaged.csv (verticals: x_m, y_m, h_m, U_depthavg_ms, V_depthavg_ms, bed_extrapolated).
+x runs downstream from the upstream corner of the junction; the side inflow comes through the wall at y = 0. What the
 calibration needs of it is written into a folder beside the config.
 """
 
-import math
+import csv
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,8 +23,8 @@ Tree = dict[str, Any]
 EXPERIMENT = "measured"
 # Length of a cell, and about its width [m].
 CELL = 0.05
-# Of the tributary the authors give neither width [m] nor angle [degrees]; both are assumed.
-WIDTH, ANGLE = 0.15, 70.0
+# The authors do not give the width of the tributary [m]: assumed.
+WIDTH = 0.15
 # No errors are given. Velocities: a share for the rule of averaging over the depth, and so much besides [m/s].
 RULE, BESIDES = 0.02, 0.01
 # Levels are means of so many blocks across, and as long; what is left of their error [m].
@@ -48,6 +48,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
     vertical = _columns(folder / "depth_averaged.csv", "x_m", "y_m", "h_m", "U_depthavg_ms", "bed_extrapolated")
     width = float(bed[:, 1].max())
     grid = _grid(bed, vertical, width)
+    angle = _angle(folder / "depth_averaged.csv")
     # Where the bed is not known there is no depth to average over; and the tributary itself is not modelled.
     vertical = vertical[(vertical[:, 4] == 0) & (vertical[:, 1] > 0.0) & (vertical[:, 1] < width)]
     sections = np.unique(vertical[:, 0])
@@ -65,8 +66,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
         "friction": {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"},
         "inflows": {
             "upstream": {"side": "west", "spread": "conveyance"},
-            "side": {"side": "south", "range": [0.0, round(WIDTH / math.sin(math.radians(ANGLE)), 3)],
-                     "spread": "uniform", "angle": ANGLE},
+            "side": {"side": "south", "range": [0.0, WIDTH], "spread": "uniform", "angle": angle},
         },
         "outlet": {},
         "eddy_viscosity": "eddy_viscosity",
@@ -137,11 +137,27 @@ def _normal(mean: float, sd: float, unit: str, symbol: str, meaning: str) -> Tre
     return {"distribution": "normal", **numbers, "unit": unit, "symbol": symbol, "meaning": meaning}
 
 
+def _angle(path: Path) -> float:
+    """Where the water heads in the mouth of the tributary, y <= 0, from downstream [degrees]; 90 where none was
+    measured.
+    """
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = [(row["y_m"], row["U_depthavg_ms"], row.get("V_depthavg_ms")) for row in csv.DictReader(file)]
+    # Some verticals have no V; outside the mouth it is not needed.
+    inside = [(float(u), float(v)) for y, u, v in rows if float(y) <= 0.0 and v]
+    along, across = np.array(inside).reshape(-1, 2).sum(axis=0)
+    return round(float(np.degrees(np.arctan2(across, along))), 1) if across > 0.0 else 90.0
+
+
 def _grid(bed: Array, vertical: Array, width: float) -> Tree:
-    """From where the bed is known to some cells beyond the last section; edges of coarser cells meet the junction."""
+    """From just above the first section to just beyond the last one; edges of coarser cells meet the junction.
+
+    Smooth flumes are too short to change how water is spread across (C^2 h / 2 g is some metres), and the bed at the
+    end of the map need not show it: so it enters where its spread is measured.
+    """
     coarse = 4.0 * CELL
-    low, high = np.ceil(bed[:, 0].min() / coarse - 1e-9), np.ceil(vertical[:, 0].max() / coarse) + 1
-    high = min(high, np.floor(bed[:, 0].max() / coarse + 1e-9))
+    low = max(np.floor((vertical[:, 0].min() - 0.5 * width) / coarse), np.ceil(bed[:, 0].min() / coarse - 1e-9))
+    high = min(np.ceil(vertical[:, 0].max() / coarse) + 1, np.floor(bed[:, 0].max() / coarse + 1e-9))
     rows = 2 * round(width / CELL / 2)
     return {
         "x": [round(float(low) * coarse, 6), round(float(high) * coarse, 6)],
