@@ -51,7 +51,9 @@ def validation_of(case: Case) -> Model | None:
     if case.validation is None:
         return None
     seen = {"experiments": case.validation.experiments, "observations": case.validation.observations}
-    return model_in(case.model_copy(update=seen))
+    there = case.model_copy(update=seen)
+    # An effect on a section or device that was calibrated to need not be in what was not.
+    return model_of(there, read_observations(there.model_copy(update={"effects": {}})))
 
 
 def known_place(case: Case, folder: Path) -> Array | None:
