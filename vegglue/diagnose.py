@@ -207,7 +207,7 @@ def _suspects(base: Baseline, seen: Look, known: dict[str, Suspect]) -> dict[str
         amplitude, length = one.effect.amplitude, max(float(seen.projected.length[column]), 1e-300)
         gain = float(seen.scores[column]) / length
         trace = seen.traces[:, column]
-        alike = (trace @ slopes) / (lengths * max(float(np.linalg.norm(trace)), 1e-300))
+        alike = (trace / max(float(np.linalg.norm(trace)), 1e-300)) @ (slopes / lengths)
         nearest = int(np.argmax(np.abs(alike)))
         smallest = amplitude.size(SEEN / length)
         low, high = (amplitude.at(gain + side * 1.96 / length) for side in (-1.0, 1.0))
