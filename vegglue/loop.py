@@ -125,7 +125,9 @@ def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, floa
 
 
 def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
-    """Add what the diagnosis accepts, one effect after the other, while errors of held-out measurements fall."""
+    """Add what the diagnosis accepts, one effect after the other, while errors of held-out measurements fall and the
+    misfit with all others.
+    """
     found = diagnosed(case, runs / case.name, jobs, say)
     paths, rungs = [case.source], [_rung(case, runs / case.name)]
     parent, added = case, []
@@ -137,9 +139,11 @@ def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
         _start_child(child, runs / child.name, found, added)
         next_rung = _rung(child, runs / child.name)
         gain, _ = improvement(rungs[-1], next_rung)
-        if not gain > 0:
+        # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
+        if not (gain > 0 and next_rung.chi2 < rungs[-1].chi2):
             child.source.unlink()
-            return Grown(tuple(paths), tuple(rungs), f"{step.accepted} was not kept: held-out errors did not fall")
+            what = "the misfit with what was seen rose" if gain > 0 else "held-out errors did not fall"
+            return Grown(tuple(paths), tuple(rungs), f"{step.accepted} was not kept: {what}")
         paths.append(child.source)
         rungs.append(next_rung)
         parent = child
