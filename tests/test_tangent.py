@@ -69,6 +69,15 @@ def test_refinement_meets_the_equation(solved):
     assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-5 * np.abs(causes).max(axis=(0, 1, 2))).all()
 
 
+def test_refinement_meets_the_equation_with_factors_of_a_state_nearby(solved):
+    """Cells at the waterline are wet in one state and dry in the other: repetition alone runs away there."""
+    problem, state, _ = solved
+    shared = factors(problem, newton(with_level(0.95), state, 1e-8).state)
+    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    left = causes + along(problem, state, tangents(problem, state, shared, causes))
+    assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-4 * np.abs(causes).max(axis=(0, 1, 2))).all()
+
+
 def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):
     """l . dR = -g . dx for a mean velocity in the wake of the patch; the adjoint is of single precision."""
     problem, state, shared = solved

@@ -3,8 +3,10 @@
     J dx = -dR        (tangent: one solve for each cause)
     J' l = g          (adjoint: one solve for each prediction; l . dR is then -g . dx for every cause at once)
 
-J is the Jacobian at the steady state. Its single-precision factors are the preconditioner; the tangent is refined with
-differences of the residual itself, so it is exact to their precision, effects and boundary conditions included.
+J is the Jacobian at the steady state, known by differences of the residual itself, effects and boundary conditions
+included. Its single-precision factors, which may be those of a state nearby, are the preconditioner of generalised
+conjugate residuals (Eisenstat, Elman and Schultz 1983, doi:10.1137/0720023): where a cell is about to fall dry they can
+be so far off that mere repetition runs away.
 """
 
 import numpy as np
@@ -16,6 +18,8 @@ from vegglue.steady import Factors
 # Step [m, m/s] of the central difference along a direction scaled to one.
 STEP = 1e-5
 ROUNDS = 12
+# Causes answered together: what has been tried for each is kept.
+LANES = 16
 
 
 def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tolerance: float = 1e-7) -> Array:
@@ -23,14 +27,29 @@ def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tol
 
     Each column is refined until its next correction is below `tolerance` of its largest entry.
     """
-    answer = np.zeros_like(causes)
-    left = -causes
+    answer = np.empty_like(causes)
+    for first in range(0, causes.shape[3], LANES):
+        lanes = slice(first, first + LANES)
+        answer[..., lanes] = _answer(problem, state, shared, np.ascontiguousarray(causes[..., lanes]), tolerance)
+    return answer
+
+
+def _answer(problem: Problem, state: Array, shared: Factors, causes: Array, tolerance: float) -> Array:
+    answer, left = np.zeros_like(causes), -causes
+    tried: list[tuple[Array, Array]] = []
     for _ in range(ROUNDS):
-        correction = shared.solve(left)
-        answer += correction
-        if (_largest(correction) <= tolerance * _largest(answer)).all():
-            break
-        left = -causes - along(problem, state, answer)
+        step = shared.solve(left)
+        if (_largest(step) <= tolerance * _largest(answer)).all():
+            return answer + step
+        moved = along(problem, state, step)
+        for earlier, its in tried:
+            share = _product(its, moved)
+            step, moved = step - share * earlier, moved - share * its
+        length = np.maximum(np.sqrt(_product(moved, moved)), 1e-300)
+        step, moved = step / length, moved / length
+        tried.append((step, moved))
+        gain = _product(moved, left)
+        answer, left = answer + gain * step, left - gain * moved
     return answer
 
 
@@ -49,6 +68,10 @@ def adjoints(shared: Factors, weights: Array) -> Array:
     work = weights.astype(np.float32).reshape(nx, 3 * ny, p)
     blocks.solve_transposed(shared.columns, shared.far, work)
     return work.reshape(weights.shape).astype(np.float64)
+
+
+def _product(one: Array, other: Array) -> Array:
+    return np.asarray(np.einsum("ikjp,ikjp->p", one, other))
 
 
 def _largest(values: Array) -> Array:
