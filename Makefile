@@ -13,7 +13,7 @@ SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo paper test check bench blind clean simulate infer report setup
+.PHONY: help demo paper test check bench blind confluence clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -61,6 +61,9 @@ bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
 
 blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/blind.py --jobs $(JOBS)
+
+confluence: $(READY)  # the numbers of docs/confluence.md, from the published set in the folder DATA
+	$(BIN)/python -m tests.confluence "$(DATA)" --jobs $(JOBS)
 
 clean:  # remove the environment and all runs
 	rm -rf $(VENV) build dist *.egg-info runs/*/

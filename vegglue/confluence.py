@@ -71,7 +71,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
         "outlet": {},
         "eddy_viscosity": "eddy_viscosity",
         "experiments": {EXPERIMENT: _setting()},
-        "parameters": _priors(vertical, blocks, width),
+        "parameters": _priors(vertical[np.isin(vertical[:, 0], sections[::2])], blocks, width),
         "observations": [_observation("velocity", into, "velocities"), _observation("level", into, "levels")],
         "validation": {
             "experiments": {EXPERIMENT: _setting()}, "observations": [_observation("velocity", into, "held_out")],
