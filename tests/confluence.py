@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.config import as_yaml, load_case
-from vegglue.confluence import case_from_confluence, flat_bed
+from vegglue.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.diagnosis import Diagnosis
 from vegglue.extend import candidate_named
 from vegglue.ground import half_width
@@ -144,6 +144,8 @@ def main() -> None:
     ask.add_argument("--runs", type=Path, default=ROOT / "runs" / "confluence")
     ask.add_argument("--jobs", type=int, default=1)
     given = ask.parse_args()
+    if not holds_confluence(given.data):
+        ask.error(f"{given.data} has no depth_averaged.csv; give the folder of the set, DATA=folder")
     surveyed, plane = given.runs / "confluence.yaml", given.runs / "confluence-flat.yaml"
     tree = case_from_confluence(given.data, surveyed)
     surveyed.write_text(as_yaml(tree), encoding="utf-8")
