@@ -40,10 +40,15 @@ def _depth(above: float, reach: float, film: float) -> float:
 
 
 @compiled
+def _sheared(above: float, film: float) -> float:
+    """max(a, 0) [m], rounded off within a film: the depth of the point itself, for land drags at no water beside it."""
+    share = min(max(0.5 * (above + film) / film, 0.0), 1.0)
+    return film * share * share + max(above - film, 0.0)
+
+
+@compiled
 def _afloat(depth: float, half_per_film: float) -> float:
-    """Share of advection and mixing kept, 1 - O((2 f / h)^4): none in the film on dry land, where friction rules
-    alone.
-    """
+    """Share of advection kept, 1 - O((2 f / h)^4): none in the film on dry land, where friction rules alone."""
     ratio = (depth * half_per_film) ** 2
     ratio *= ratio
     return ratio / (1.0 + ratio)
@@ -51,7 +56,8 @@ def _afloat(depth: float, half_per_film: float) -> float:
 
 @compiled
 def depths(level, bed, lift, reach, outlet_level, film):
-    """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed.
+    """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed, at corners
+    that of the point itself.
 
     reach (nx, ny): half the range of the bed within a cell [m]; lift (nx, ny, m): by how much members' beds lie higher
     [m], or empty.
@@ -77,7 +83,7 @@ def depths(level, bed, lift, reach, outlet_level, film):
                 cell[i, j, k] = _depth(here, reach[i, j], film)
                 face_x[i, j, k] = _depth(0.5 * (here + west), reach_x, film)
                 face_y[i, j, k] = _depth(0.5 * (here + south), reach_y, film)
-                corner[i, j, k] = _depth(0.25 * (here + west + south + diagonal), 0.5 * (reach_x + reach_y), film)
+                corner[i, j, k] = _sheared(0.25 * (here + west + south + diagonal), film)
         for k in range(m):
             face_y[i, ny, k] = cell[i, ny - 1, k]
             corner[i, 0, k] = 0.0
@@ -198,7 +204,8 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 stress = drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]
                 rough = stress / (cell[a, j, k] + cell[b, j, k]) * speed * here
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
-                moved = (carried - mixed / face_x[f, j, k]) * _afloat(face_x[f, j, k], half_per_film)
+                mixed *= 2.0 / (cell[a, j, k] + cell[b, j, k])
+                moved = carried * _afloat(face_x[f, j, k], half_per_film) - mixed
                 out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_x + rough
 
 
@@ -240,7 +247,8 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                 stress = drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k]
                 rough = stress / (cell[i, j, k] + cell[i, j - 1, k]) * speed * here
                 slope = (level[i, j, k] - level[i, j - 1, k]) * per_y
-                moved = (carried - mixed / face_y[i, j, k]) * _afloat(face_y[i, j, k], half_per_film)
+                mixed *= 2.0 / (cell[i, j, k] + cell[i, j - 1, k])
+                moved = carried * _afloat(face_y[i, j, k], half_per_film) - mixed
                 out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + rough
 
 

@@ -70,7 +70,9 @@ def _damping(problem: Problem, now: Faces, rough: Array, viscosity: Array) -> tu
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
     cell = 2.0 * rough * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
-    cell += 4.0 * viscosity * (1.0 / problem.dx**2 + 1.0 / problem.dy**2)
+    # Shear acts on a thin cell over the depth of its deeper corners.
+    sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
+    cell += 4.0 * viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
     across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])
