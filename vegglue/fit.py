@@ -1,6 +1,6 @@
 """The best place of a prior: maximum a posteriori by least squares with exact slopes.
 
-    minimise |W (y - f(z))|^2 + |z|^2,   W' W the inverse covariance of the errors
+minimise |W (y - f(z))|^2 + |z|^2,   W' W the inverse covariance of the errors
 """
 
 from dataclasses import dataclass
@@ -16,6 +16,8 @@ SETTLED = 0.02
 MOST_STEPS = 14
 # Longest step [standard deviations of the prior].
 LONGEST = 1.5
+# Added to the curvature, in that of the prior, until a step is short enough: what the data determine well stays free.
+DAMPINGS = (0.0, *np.geomspace(1e-2, 1e10, 49))
 
 
 @dataclass(frozen=True)
@@ -30,24 +32,22 @@ class Fitted:
 
 
 def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> Fitted:
-    """From a point downhill (Levenberg 1944, Marquardt 1963) until no step promises to help."""
-    point, damping = start, 1e-3
-    now = objective(noise, point)
-    settled = False
+    """From a point downhill, as far as the slopes can be trusted (More 1978, doi:10.1007/BFb0067700), until no step
+    promises to help.
+    """
+    point, longest, settled = start, LONGEST, False
     for _ in range(steps):
-        step, promised = _step(noise, point, damping)
-        if promised < SETTLED:
-            settled = True
+        step, promised = _step(noise, point, longest)
+        settled = promised < SETTLED
+        if settled:
             break
         moved = linearise(model, point.z + step, point)
-        there = np.inf if moved is None else objective(noise, moved)
-        if moved is None or not there < now:
-            damping = max(10.0 * damping, 1e-2)
-            if damping > 1e6:
-                break
-            continue
-        point, now, damping = moved, there, damping / 10.0
-    return Fitted(point, chi2(noise, point), now, covariance(noise, point), settled)
+        gained = -np.inf if moved is None else objective(noise, point) - objective(noise, moved)
+        length = float(np.abs(step).max())
+        longest = length / 4.0 if gained < promised / 4.0 else min(max(longest, 2.0 * length), LONGEST)
+        if moved is not None and gained > 0.0:
+            point = moved
+    return Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), settled)
 
 
 def chi2(noise: Noise, point: Point) -> float:
@@ -75,13 +75,13 @@ def interval95(model: Model, fitted: Fitted, name: str) -> tuple[float, float, f
     return float(middle), float(low), float(high)
 
 
-def _step(noise: Noise, point: Point, damping: float) -> tuple[Array, float]:
-    """The damped step, no longer than LONGEST, and by how much it should lower the misfit."""
+def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:
+    """The step (Levenberg 1944), damped until it is no longer than `longest`, and what it should gain."""
     slope = noise.whiten(noise.used(point.slope))
     left = noise.whiten(noise.residual(point.prediction))
     matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ left - point.z
-    step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
-    step *= min(1.0, LONGEST / float(np.abs(step).max() + 1e-300))
+    for damping in DAMPINGS:
+        step = np.linalg.solve(matrix + damping * np.eye(point.z.size), right)
+        if np.abs(step).max() <= longest:
+            break
     return np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
-
-

@@ -1,0 +1,54 @@
+"""The search for the best place, on a model whose answer to one parameter dies out towards the bound of its prior."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.optimize
+import scipy.stats
+
+from vegglue.effect import Array
+from vegglue.fit import MOST_STEPS, SETTLED, fit, objective
+from vegglue.linearise import Point
+from vegglue.noise import noise_of
+
+MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
+                         "value": [1.1, 1.05, 0.3], "standard_error": 0.005, "used": True})  # fmt: skip
+NOISE = noise_of(MEASURED)
+
+
+def at(z: Array) -> Point:
+    """More is measured than the first parameter can give; the second is plain."""
+    slope = scipy.stats.norm.pdf(z[0])
+    prediction = np.array([scipy.stats.norm.cdf(z[0])] * 2 + [0.5 * z[1]])
+    return Point(z, prediction, np.array([[slope, 0.0], [slope, 0.0], [0.0, 0.5]]), {})
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Array]:
+    """The places that a search looked at."""
+    places: list[Array] = []
+
+    def linearise(model: Any, z: Array, near: Point) -> Point:
+        places.append(z)
+        return at(z)
+
+    monkeypatch.setattr("vegglue.fit.linearise", linearise)
+    return places
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (1.0, 0.0), (2.5, -1.0), (4.0, 1.0), (6.0, 3.0)])
+def test_a_search_ends_beside_a_bound(asked: list[Array], start: tuple[float, float]) -> None:
+    found = fit(None, NOISE, at(np.array(start)))  # type: ignore[arg-type]
+    best = scipy.optimize.minimize(lambda z: objective(NOISE, at(z)), found.point.z, method="Nelder-Mead")
+    assert found.settled
+    assert found.objective < best.fun + 2.0 * SETTLED
+    assert len(asked) < MOST_STEPS
+
+
+def test_a_place_without_flow_is_stepped_back_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vegglue.fit.linearise", lambda model, z, near: at(z) if z[0] < 2.0 else None)
+    found = fit(None, NOISE, at(np.array([1.5, 0.0])))  # type: ignore[arg-type]
+    assert 1.9 < found.point.z[0] < 2.0
+    assert found.point.z[1] == pytest.approx(0.6, abs=0.02)
