@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vegglue.effect import Effect
+from vegglue.effect import Amplitude, Effect
 from vegglue.effects import library
 from vegglue.schema import Case, Parameter, Value, Working
 from vegglue.workings import effect_of
@@ -106,6 +106,11 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
             "parameters": {**case.parameters, parameter: prior_of(candidate.effect)},
         }
     )
+
+
+def change_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Case, str, Amplitude]:
+    """What a fingerprint is asked of: the case with one effect more, the parameter that is added, its amplitude."""
+    return with_effect(case, candidate, shapes), candidate.parameter, candidate.effect.amplitude
 
 
 def prior_of(effect: Effect) -> Parameter:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vegglue.candidates import Candidate, with_effect
+from vegglue.candidates import Candidate, change_of
 from vegglue.effect import Array
 from vegglue.linearise import Model, fingerprint, linearise
 from vegglue.noise import Noise
@@ -71,7 +71,7 @@ def worth_of_measurements(
     if point is None:
         return [[] for _ in questions]
     every = [rival for question in questions for rival in question]
-    changed = [(with_effect(wide.case, one, shapes), one.parameter, one.effect.amplitude) for one, shapes, _ in every]
+    changed = [change_of(wide.case, one, shapes) for one, shapes, _ in every]
     errors = _errors(wide.station, noise)[:, None]
     slope = point.slope / errors
     traces = fingerprint(wide, point, changed) / errors * np.array([gain for _, _, gain in every])

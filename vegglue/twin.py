@@ -20,7 +20,7 @@ import pandas as pd
 
 from vegglue import score, strangers
 from vegglue.baseline import coarser
-from vegglue.candidates import Candidate, candidates_of, with_effect, working_of
+from vegglue.candidates import Candidate, candidates_of, change_of, working_of
 from vegglue.effect import Array
 from vegglue.errors import InputError
 from vegglue.extend import candidate_named
@@ -253,8 +253,8 @@ def _first_size(ground: Ground, errors: Noise, candidate: Candidate, hidden: Hid
     """(snr / |S_perp|)^(1/power), to first order."""
     amplitude = candidate.effect.amplitude
     case = _knowing(ground.model.case, hidden)
-    changed = with_effect(case, candidate, hidden.shapes)
-    trace = fingerprint(replace(ground.model, case=case), ground.here, [(changed, candidate.parameter, amplitude)])
+    changed = change_of(case, candidate, hidden.shapes)
+    trace = fingerprint(replace(ground.model, case=case), ground.here, [changed])
     return amplitude.size(snr / max(_visible(ground, errors, trace[:, 0]), 1e-300))
 
 
