@@ -50,7 +50,7 @@ def groundwork(model: Model, ensemble: Ensemble, rule: str, jobs: int) -> Ground
     for _ in range(TURNS if rule != "known" else 0):
         noise = _sized(noise, fits[0], model.station)
         fits = _again(model, noise, fits)
-    seen = look(Baseline(model, noise, fits[0], coarse, on_coarse), ())
+    seen = look(Baseline(model, noise, fits[0], coarse, on_coarse))
     noise = seen.noise if rule == "known" else replace(seen.noise, scale=1.0)
     fits = _again(model, noise, fits)
     surprise = unexplained(noise, fits[0].point)

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from vegglue.baseline import Baseline, baseline
-from vegglue.candidates import Candidate, start_of, with_effect
+from vegglue.candidates import Candidate, change_of, start_of
 from vegglue.config import as_yaml, case_hash, load_case, resolved_yaml
 from vegglue.design import Rival, Worth, worth_of_measurements
-from vegglue.diagnose import SEEN, diagnose
+from vegglue.diagnose import diagnose
 from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.diagnosis_pictures import save_diagnosis_figure
 from vegglue.effect import Array, Effect
@@ -26,6 +26,7 @@ from vegglue.observations import read_observations
 from vegglue.prune import NEEDED
 from vegglue.schema import Case
 from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
+from vegglue.suspects import SEEN
 from vegglue.workings import amplitude_of, effect_of
 
 # Effects hidden behind calibration that measurements are proposed for.
@@ -190,8 +191,8 @@ def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFr
     folder.mkdir(parents=True, exist_ok=True)
     base, one = calibrated(case, folder), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
-    changed = [(with_effect(base.model.case, one, shapes), one.parameter, effect.amplitude)]
-    return fingerprint(base.model, base.fitted.point, changed)[:, 0], base.model.station
+    changed = change_of(base.model.case, one, shapes)
+    return fingerprint(base.model, base.fitted.point, [changed])[:, 0], base.model.station
 
 
 def _rung(case: Case, folder: Path) -> Rung:

@@ -1,19 +1,18 @@
 """One look at a calibrated model: which effect, place or single station the misfit points at, and how surely."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.stats
 
 from vegglue import score
 from vegglue.baseline import Baseline
-from vegglue.candidates import Candidate, candidates_of, start_of, with_effect
-from vegglue.effect import Amplitude, Array
-from vegglue.ground import half_width
-from vegglue.linearise import fingerprint, z_of
+from vegglue.candidates import start_of
+from vegglue.effect import Array
+from vegglue.linearise import z_of
 from vegglue.noise import Noise, estimated
-from vegglue.places import Spots, spots
 from vegglue.schema import Case
+from vegglue.traces import Traces, traces_of
 
 # Size [1/m] of unlisted drag that is set aside when the noise is estimated.
 PLAUSIBLE_SPOT = 0.3
@@ -43,122 +42,117 @@ class Family:
 
 @dataclass(frozen=True)
 class Look:
-    """Fingerprints at a baseline and what the residual says of them.
+    """What the residual of a baseline says of all that could be missing. base: with the errors as estimated here.
 
-    columns: for each candidate, its columns among `traces`; settings: shapes of each column; own: candidate of each.
+    white, slopes: whitened traces of candidates (n, c) and slopes (n, p); flagged: stations that count for nothing,
+    places among the used ones; maxima: largest squares of scores under errors alone.
     """
 
-    noise: Noise
-    candidates: list[Candidate]
-    columns: list[np.ndarray]
-    settings: list[dict[str, float]]
-    traces: Array  # whitened (n, c)
-    slopes: Array  # whitened (n, p)
+    base: Baseline
+    flagged: tuple[int, ...]
+    traces: Traces
+    white: Array
+    slopes: Array
     projected: score.Projected
     scores: Array
     maxima: Array
     effects: Family
     places: Family
     stations: Family
-    spots: Spots
     spot_length: Array
 
+    @property
+    def noise(self) -> Noise:
+        return self.base.noise
+
     def best_column(self, candidate: int) -> int:
-        columns = self.columns[candidate]
+        columns = self.traces.columns[candidate]
         return int(columns[np.argmax(self.scores[columns] ** 2)])
 
+    def best_score(self, candidate: int) -> float:
+        return float(self.scores[self.best_column(candidate)])
+
     def family_p(self, candidate: int) -> float:
-        return score.family_p(float(self.scores[self.best_column(candidate)]), self.maxima)
+        return score.family_p(self.best_score(candidate), self.maxima)
+
+    @property
+    def order(self) -> list[int]:
+        """Candidates, the best score first."""
+        squares = [self.best_score(j) ** 2 for j in range(len(self.traces.candidates))]
+        return [int(j) for j in np.argsort(-np.array(squares))]
 
 
-def look(base: Baseline, flagged: tuple[int, ...], seed: int = 1) -> Look:
-    """Fingerprints of all candidates, of spots everywhere and of single stations, against the residual.
+def look(base: Baseline, flagged: tuple[int, ...] = (), before: Look | None = None, seed: int = 1) -> Look:
+    """Traces of all candidates, of spots everywhere and of single stations, against the residual.
 
-    Fingerprints and slopes are those of the quick model: they only have to point the right way. The correlation of the
-    errors is estimated first, with all that could be missing set aside.
+    The correlation of the errors is estimated first, with all that could be missing set aside. before: an earlier look,
+    whose traces are taken if they are those of the same point.
     """
-    model, _, point = base.quick
-    candidates = candidates_of(model.case, model.station)
-    changed, columns, settings = _changes(model.case, candidates)
-    there = spots(model, point, half_width(base.model.site))
-    slope, prints, spot_prints = (
-        base.noise.used(values) for values in (point.slope, fingerprint(model, point, changed), there.traces)
-    )
-    left = base.noise.residual(base.fitted.point.prediction)
-    sizes = np.array([amplitude.plausible for _, _, amplitude in changed])
-    explained = np.hstack([slope, prints * sizes, spot_prints * PLAUSIBLE_SPOT])
-    noise = _set_aside(estimated(base.noise, left, explained), slope, left, base.fitted.point.z, explained)
+    point = base.quick[2]
+    traces = before.traces if before is not None and before.traces.point is point else traces_of(base)
+    slope, prints, spots = (base.noise.used(values) for values in (point.slope, traces.prints, traces.spots.traces))
+    left, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
+    noise = _noise(base.noise, traces, (slope, prints, spots), left, z)
 
-    def against(traces: Array) -> score.Projected:
-        return score.project(noise.whiten(slope), noise.whiten(left), base.fitted.point.z, noise.whiten(traces))
+    def against(values: Array) -> score.Projected:
+        return score.project(noise.whiten(slope), noise.whiten(left), z, noise.whiten(values))
 
-    one_sided = np.array([amplitude.low >= amplitude.off for _, _, amplitude in changed])
-    projected, of_spots, of_stations = against(prints), against(spot_prints), against(np.eye(left.size))
-    maxima = _maxima(projected, one_sided, seed)
-    seen, alone = score.scores(projected, one_sided), score.scores(of_stations, np.zeros(left.size, bool))
-    alone[list(flagged)] = 0.0
+    one_sided = np.array([amplitude.low >= amplitude.off for amplitude in traces.amplitudes], bool)
+    projected, of_spots, of_stations = against(prints), against(spots), against(np.eye(left.size))
+    maxima, scores = _maxima(projected, one_sided, seed), score.scores(projected, one_sided)
     return Look(
-        noise=noise,
-        candidates=candidates,
-        columns=columns,
-        settings=settings,
-        traces=noise.whiten(prints),
+        base=replace(base, noise=noise),
+        flagged=flagged,
+        traces=traces,
+        white=noise.whiten(prints),
         slopes=noise.whiten(slope),
         projected=projected,
-        scores=seen,
+        scores=scores,
         maxima=maxima,
-        effects=_family(seen, maxima),
-        places=_both_ways(of_spots, seed),
-        stations=_family(alone, _maxima(of_stations, np.zeros(left.size, bool), seed)),
-        spots=there,
+        effects=_family(scores, maxima),
+        places=_both_ways(of_spots, (), seed),
+        stations=_both_ways(of_stations, flagged, seed),
         spot_length=of_spots.length,
     )
 
 
-def _set_aside(noise: Noise, slope: Array, left: Array, z: Array, explained: Array) -> Noise:
-    """The noise estimated again, with the one trace that the residual points at set aside whatever its size."""
-    seen = score.project(noise.whiten(slope), noise.whiten(left), z, noise.whiten(explained))
+def _noise(noise: Noise, traces: Traces, used: tuple[Array, Array, Array], left: Array, z: Array) -> Noise:
+    """The noise of a residual `left` with all that could be missing set aside, slopes, prints and spots (n, ...).
+
+    Estimated twice: for good with the one trace that the residual points at set aside whatever its size.
+    """
+    slope, prints, spots = used
+    sizes = np.array([amplitude.plausible for amplitude in traces.amplitudes])
+    explained = np.hstack([slope, prints * sizes, spots * PLAUSIBLE_SPOT])
+    first = estimated(noise, left, explained)
+    seen = score.project(first.whiten(slope), first.whiten(left), z, first.whiten(explained))
     best = int(np.argmax((seen.units.T @ seen.residual) ** 2))
     free = explained[:, best : best + 1] * (FREE / max(float(seen.length[best]), 1e-300))
-    return estimated(noise, left, np.hstack([explained, free]))
-
-
-def _changes(
-    case: Case, candidates: list[Candidate]
-) -> tuple[list[tuple[Case, str, Amplitude]], list[np.ndarray], list[dict[str, float]]]:
-    """The case with each candidate at each of its settings, which columns are whose, and the settings."""
-    changed: list[tuple[Case, str, Amplitude]] = []
-    columns: list[np.ndarray] = []
-    settings: list[dict[str, float]] = []
-    for one in candidates:
-        tried = one.settings()
-        columns.append(np.arange(len(changed), len(changed) + len(tried)))
-        changed += [(with_effect(case, one, shapes), one.parameter, one.effect.amplitude) for shapes in tried]
-        settings += tried
-    return changed, columns, settings
+    return estimated(first, left, np.hstack([explained, free]))
 
 
 def _maxima(projected: score.Projected, one_sided: np.ndarray, seed: int) -> Array:
     return np.asarray((score.null_draws(projected, one_sided, seed) ** 2).max(axis=1))
 
 
-def _both_ways(projected: score.Projected, seed: int) -> Family:
+def _both_ways(projected: score.Projected, flagged: tuple[int, ...], seed: int) -> Family:
+    """Traces of either sign; those flagged score nothing."""
     two = np.zeros(projected.length.size, bool)
-    return _family(score.scores(projected, two), _maxima(projected, two, seed))
+    scores = score.scores(projected, two)
+    scores[list(flagged)] = 0.0
+    return _family(scores, _maxima(projected, two, seed))
 
 
-def refit_start(base: Baseline, seen: Look, candidate: int, changed: Case) -> Array:
+def refit_start(seen: Look, candidate: int, changed: Case) -> Array:
     """Where in z (p + 1,) to begin the refit with a candidate: the joint linear step of all parameters."""
-    column = seen.best_column(candidate)
-    point, one = base.fitted.point, seen.candidates[candidate]
+    column, one = seen.best_column(candidate), seen.traces.candidates[candidate]
     gain = float(seen.scores[column] / max(seen.projected.length[column], 1e-300))
-    amplitude = start_of(one.effect, gain)
-    slope, noise = seen.slopes, seen.noise
-    left = noise.whiten(noise.residual(point.prediction)) - seen.traces[:, column] * gain
+    point, slope, noise = seen.base.fitted.point, seen.slopes, seen.noise
+    left = noise.whiten(noise.residual(point.prediction)) - seen.white[:, column] * gain
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ left - point.z)
     step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
-    return np.append(point.z + step, z_of(changed.parameters[one.parameter], amplitude))
+    return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_of(one.effect, gain)))
 
 
 def _family(scores: Array, maxima: Array) -> Family:

@@ -1,15 +1,17 @@
 """What was found, in words: one verdict in one sentence, remarks, and where the model misses."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy.stats
 
 from vegglue.diagnosis import Step, Suspect, Verdict, Where
+from vegglue.effect import Array, Ground
 from vegglue.ground import ground_of
 from vegglue.linearise import Model, Point
 from vegglue.noise import Noise
-from vegglue.schema import Case
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -19,20 +21,32 @@ POOR = 1e-3
 AT_EDGE = 0.2
 
 
+@dataclass(frozen=True)
+class Misfit:
+    """Whitened chi2 of the last model and its degrees of freedom [-]."""
+
+    chi2: float
+    freedom: int
+
+    @property
+    def p(self) -> float:
+        """Chance of a chi2 as large under errors alone."""
+        return float(scipy.stats.chi2.sf(self.chi2, max(self.freedom, 1)))
+
+    def __str__(self) -> str:
+        return f"chi2 is {self.chi2:.0f} for {self.freedom} degrees of freedom"
+
+
 def judged(
-    case: Case,
     noise: Noise,
     steps: Sequence[Step],
     suspects: Sequence[Suspect],
     place: Where | None,
-    p_misfit: float,
-    chi2: float,
-    freedom: int,
+    fit: Misfit,
     flagged: Sequence[int],
 ) -> tuple[Verdict, str, list[str]]:
     """The verdict, its sentence, and what else should be known."""
-    remarks = _remarks(noise, suspects, flagged, case)
-    fit = f"chi2 is {chi2:.0f} for {freedom} degrees of freedom"
+    remarks = _remarks(noise, suspects, flagged)
     if place is not None:
         before = f", after {_names(steps)}" if steps else ""
         return (
@@ -42,22 +56,20 @@ def judged(
             remarks,
         )
     if not steps:
-        return _without_steps(suspects, p_misfit, fit, remarks)
+        return _without_steps(suspects, fit, remarks)
     if len(steps[0].groups) > MOST_GROUPS:
         names = ", ".join(steps[0].rivals)
         return "cannot-tell", f"Something is missing, but these data cannot tell which of {names} it is.", remarks
-    if p_misfit < POOR:
-        remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {p_misfit:.1g}).")
+    if fit.p < POOR:
+        remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {fit.p:.1g}).")
     sentences = " and ".join(_step_words(step, suspects) for step in steps)
     single = all(len(step.rivals) == 1 for step in steps)
     return ("identified" if single else "one-of"), f"Missing: {sentences}; {fit} with it.", remarks
 
 
-def _without_steps(
-    suspects: Sequence[Suspect], p_misfit: float, fit: str, remarks: list[str]
-) -> tuple[Verdict, str, list[str]]:
+def _without_steps(suspects: Sequence[Suspect], fit: Misfit, remarks: list[str]) -> tuple[Verdict, str, list[str]]:
     testable = [suspect for suspect in suspects if suspect.testable]
-    if p_misfit < POOR:
+    if fit.p < POOR:
         return (
             "cannot-tell",
             f"The misfit is larger than the errors allow ({fit}), but no known effect and no place stands out.",
@@ -101,7 +113,7 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     return words
 
 
-def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int], case: Case) -> list[str]:
+def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int]) -> list[str]:
     remarks = []
     if noise.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {noise.correlation:.2f}; this is allowed for.")
@@ -112,15 +124,12 @@ def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int], 
         remarks.append(f"{many} alone against every effect and every place; no effect is judged by it.")
     hidden = [suspect for suspect in suspects if not suspect.testable]
     if hidden:
-        remarks.append(
-            "Untestable with these data, neither present nor absent: "
-            + ", ".join(_untestable(suspect, case) for suspect in hidden)
-            + "."
-        )
+        names = ", ".join(_untestable(suspect) for suspect in hidden)
+        remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
     return remarks
 
 
-def _untestable(suspect: Suspect, case: Case) -> str:
+def _untestable(suspect: Suspect) -> str:
     if abs(suspect.likeness) > 0.8:
         return f"{suspect.name} (looks like a change of {suspect.mimicked_by})"
     return suspect.name
@@ -157,19 +166,22 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
 
 
 def _zones(model: Model, used: pd.DataFrame) -> list[str]:
-    grid = model.site.grid
-    grounds = {name: ground_of(model.case, model.site, name) for name in model.case.experiments}
-    zones = []
-    for row in used.itertuples():
-        ground = grounds[str(row.experiment)]
-        i = int(np.clip(round((float(row.x) - grid.x[0]) / grid.dx), 0, grid.x.size - 1))
-        j = int(np.clip(round((float(row.y) - grid.y[0]) / grid.dy), 0, grid.y.size - 1))
-        if row.kind == "level":
-            zones.append("level")
-        elif abs(ground.edge[i, j, 0]) < AT_EDGE * ground.half_width[i, j, 0]:
-            zones.append("edge")
-        elif ground.planted[i, j, 0]:
-            zones.append("plants")
-        else:
-            zones.append("bank" if ground.bank[i, j, 0] else "floor")
-    return zones
+    grid, x, y = model.site.grid, used["x"].to_numpy(float), used["y"].to_numpy(float)
+    cells = zip(_cell(x, grid.x, grid.dx), _cell(y, grid.y, grid.dy), strict=True)
+    return [
+        "level" if kind == "level" else _zone(ground_of(model.case, model.site, str(experiment)), *cell)
+        for experiment, kind, cell in zip(used["experiment"], used["kind"], cells, strict=True)
+    ]
+
+
+def _cell(points: Array, centres: Array, step: float) -> np.ndarray:
+    """The cell each point lies in, the outermost beyond."""
+    return np.clip(np.rint((points - centres[0]) / step), 0, centres.size - 1).astype(np.int64)
+
+
+def _zone(ground: Ground, i: int, j: int) -> str:
+    if abs(ground.edge[i, j, 0]) < AT_EDGE * ground.half_width[i, j, 0]:
+        return "edge"
+    if ground.planted[i, j, 0]:
+        return "plants"
+    return "bank" if ground.bank[i, j, 0] else "floor"

@@ -1,0 +1,53 @@
+"""Effects under suspicion as a look sees them: how large to first order, how surely, and what hides them."""
+
+import numpy as np
+
+from vegglue.diagnosis import Suspect
+from vegglue.suspicion import Look
+
+# Amplitude seen in 19 of 20 tries at the 5 % level, over its standard error.
+SEEN = 3.5
+
+
+def suspects_of(seen: Look) -> dict[str, Suspect]:
+    """All effects of a look by name, none of them refitted."""
+    return {one.name: _suspect(seen, j) for j, one in enumerate(seen.traces.candidates)}
+
+
+def _suspect(seen: Look, candidate: int) -> Suspect:
+    one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
+    amplitude, length = one.effect.amplitude, max(float(seen.projected.length[column]), 1e-300)
+    gain = float(seen.scores[column]) / length
+    smallest = amplitude.size(SEEN / length)
+    mimic, likeness = _mimic(seen, column)
+    return Suspect(
+        name=one.name,
+        title=one.effect.title,
+        unit=amplitude.unit,
+        amplitude=amplitude.at(gain),
+        interval95=(amplitude.at(gain - 1.96 / length), amplitude.at(gain + 1.96 / length)),
+        score=float(seen.scores[column]),
+        p_family=seen.family_p(candidate),
+        visibility=float(seen.projected.visible[column]),
+        smallest_detectable=smallest,
+        testable=smallest < 2.0 * amplitude.scale,
+        refitted=False,
+        objective=seen.base.fitted.objective - float(seen.scores[column] ** 2),
+        mimicked_by=mimic,
+        likeness=likeness,
+        shapes=seen.traces.settings[column],
+    )
+
+
+def _mimic(seen: Look, column: int) -> tuple[str, float]:
+    """The parameter whose slope is most like a trace, and the cosine between both."""
+    names = seen.base.model.names
+    if not names:
+        return "", 0.0
+    alike = _unit(seen.white[:, column]) @ _unit(seen.slopes)
+    nearest = int(np.argmax(np.abs(alike)))
+    return names[nearest], float(alike[nearest])
+
+
+def _unit(columns: np.ndarray) -> np.ndarray:
+    return columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)

@@ -1,0 +1,46 @@
+"""What could be missing, as traces in the predictions at one point: of every candidate, and of drag at every place."""
+
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from vegglue.baseline import Baseline
+from vegglue.candidates import Candidate, candidates_of, change_of
+from vegglue.effect import Amplitude, Array
+from vegglue.ground import half_width
+from vegglue.linearise import Point, fingerprint
+from vegglue.places import Spots, spots
+
+
+@dataclass(frozen=True)
+class Traces:
+    """prints (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain.
+
+    columns: for each candidate, its columns among the prints; settings, amplitudes: those of each column.
+    """
+
+    point: Point
+    candidates: list[Candidate]
+    columns: list[np.ndarray]
+    settings: list[dict[str, float]]
+    amplitudes: list[Amplitude]
+    prints: Array
+    spots: Spots
+
+
+def traces_of(base: Baseline) -> Traces:
+    """Those of the quick model: they only have to point the right way. Spots are sized by the model itself."""
+    model, _, point = base.quick
+    candidates = candidates_of(model.case, model.station)
+    tried = [one.settings() for one in candidates]
+    every = [(one, shapes) for one, settings in zip(candidates, tried, strict=True) for shapes in settings]
+    return Traces(
+        point=point,
+        candidates=candidates,
+        columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
+        settings=[shapes for _, shapes in every],
+        amplitudes=[one.effect.amplitude for one, _ in every],
+        prints=fingerprint(model, point, [change_of(model.case, one, shapes) for one, shapes in every]),
+        spots=spots(model, point, half_width(base.model.site)),
+    )
