@@ -17,7 +17,15 @@ KEPT = 8
 
 def ground_of(case: Case, site: Site, experiment: str) -> Ground:
     """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
-    return _ground(site, _present(case, experiment))
+    return _ground(site, present(case, experiment))
+
+
+def present(case: Case, experiment: str) -> tuple[int, ...]:
+    """Which patches stand in an experiment."""
+    plants = case.experiments[experiment].plants
+    return tuple(
+        index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
+    )
 
 
 def half_width(site: Site) -> float:
@@ -68,13 +76,6 @@ def part(ground: Ground, columns: slice, rows: slice) -> Ground:
         for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
     }
     return Ground(x=ground.x[columns], y=ground.y[:, rows], dx=ground.dx, dy=ground.dy, **cut)
-
-
-def _present(case: Case, experiment: str) -> tuple[int, ...]:
-    plants = case.experiments[experiment].plants
-    return tuple(
-        index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
-    )
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ import numpy as np
 from vegglue import canopy, kernels
 from vegglue.effect import Array, Boundary, Ground
 from vegglue.flow import Inflow, Plants, Problem
-from vegglue.ground import ground_of
+from vegglue.ground import ground_of, present
 from vegglue.schema import Case, Experiment, Stand, StandOverride
 from vegglue.schema import Inflow as InflowPart
 from vegglue.site import Site
@@ -29,7 +29,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         friction_class=site.friction_class,
         law=np.array([LAWS[item.law][0] for item in classes], dtype=np.int64),
         coefficient=np.array([value_of(getattr(item, LAWS[item.law][1]), theta, members) for item in classes]),
-        plants=_plants(case, site, setting, theta, members),
+        plants=_plants(case, site, experiment, theta, members),
         viscosity=value_of(case.eddy_viscosity, theta, members),
         inflows=tuple(
             _inflow(inflow, site, discharge, spread)
@@ -72,21 +72,18 @@ def _source(lateral: Array, ground: Ground) -> Array:
     return np.ascontiguousarray(floor * lateral / (floor.sum() * ground.dx * ground.dy))
 
 
-def _plants(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> Plants:
+def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> Plants:
     """Vegetated cells of the patches present; phi is proportional to stems."""
-    column, row = np.nonzero(site.patch >= 0)
-    patches = [case.plants.patches[index] for index in site.patch[column, row]]
-    present = np.array([setting.plants is True or (setting.plants and p.name in setting.plants) for p in patches], bool)
-    column, row, patches = column[present], row[present], [p for p, here in zip(patches, present, strict=True) if here]
-    values = {
-        name: _stand(stand, setting.stands.get(name), theta, members) for name, stand in case.plants.stands.items()
-    }
-    fields = np.empty((3, column.size, members))
-    for cell, patch in enumerate(patches):
-        phi, height, chezy = values[patch.stand]
-        fields[:, cell] = phi * patch.stems / case.plants.stands[patch.stand].stems, height, chezy
-    law = [canopy.LAWS.index(case.plants.stands[patch.stand].law) for patch in patches]
-    return Plants(column, row, fields[0], fields[1], fields[2], np.array(law, dtype=np.int64))
+    column, row = np.nonzero(np.isin(site.patch, present(case, experiment)))
+    index = site.patch[column, row]
+    fields, law = np.empty((3, column.size, members)), np.empty(column.size, dtype=np.int64)
+    for patch in np.unique(index):
+        stems, name = case.plants.patches[patch].stems, case.plants.patches[patch].stand
+        stand = case.plants.stands[name]
+        phi, height, chezy = _stand(stand, case.experiments[experiment].stands.get(name), theta, members)
+        fields[:, index == patch] = np.stack([phi * stems / stand.stems, height, chezy])[:, None]
+        law[index == patch] = canopy.LAWS.index(stand.law)
+    return Plants(column, row, fields[0], fields[1], fields[2], law)
 
 
 def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: int) -> tuple[Array, Array, Array]:
