@@ -3,10 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
-from channels import river
+from channels import centres, river
 
 from vegglue.flow import ALONG, residual
+from vegglue.sensor import read_sensors, reading_weights
+from vegglue.site import Grid
 from vegglue.start import backwater
 from vegglue.steady import factors, newton
 from vegglue.tangent import adjoints, along, tangents
@@ -76,6 +79,17 @@ def test_refinement_meets_the_equation_with_factors_of_a_state_nearby(solved):
     causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
     left = causes + along(problem, state, tangents(problem, state, shared, causes))
     assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-4 * np.abs(causes).max(axis=(0, 1, 2))).all()
+
+
+def test_weights_of_a_reading_give_the_reading(solved):
+    problem, state, _ = solved
+    nx, ny = problem.shape
+    grid = Grid(centres(30.0, nx), centres(9.0, ny), problem.dx, problem.dy)
+    station = pd.DataFrame({
+        "kind": ["velocity", "level"] * 3, "x": [3.1, 14.0, 29.9, 0.1, 7.77, 14.6], "y": [4.6, 5.2, 4.4, 4.5, 0.1, 3.9],
+    })  # fmt: skip
+    read = read_sensors(problem, state, grid, station, ()).prediction[0]
+    assert np.einsum("ikjn,ikj->n", reading_weights(station, grid), state[..., 0]) == pytest.approx(read)
 
 
 def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):

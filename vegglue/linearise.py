@@ -13,13 +13,13 @@ from scipy.special import ndtr, ndtri
 
 from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
-from vegglue.flow import Problem, crop, residual
+from vegglue.flow import ACROSS, ALONG, Problem, crop, residual
 from vegglue.neighbourhood import overflows, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
 from vegglue.problem import build_problem
 from vegglue.schema import Case, Parameter
-from vegglue.sensor import read_sensors
+from vegglue.sensor import read_sensors, reading_weights
 from vegglue.site import Site, build_site
 from vegglue.steady import Factors, chord
 from vegglue.tangent import adjoints, tangents
@@ -172,8 +172,8 @@ def force_response(model: Model, point: Point, experiment: str) -> Array:
     """
     flow = point.flows[experiment]
     rows = _rows(model, experiment)
-    weights = _reading_weights(model, experiment, flow)
-    sensitivity = adjoints(flow.factors, weights)[:, 2]
+    weights = reading_weights(model.station.iloc[rows], model.site.grid)[:, :, slice(*flow.band)]
+    sensitivity = adjoints(flow.factors, weights)[:, ALONG]
     faces = np.moveaxis(sensitivity, -1, 0)
     # A force in a cell pushes the faces on both sides of it by half; R_u falls by what pushes.
     cells = 0.5 * faces
@@ -227,8 +227,8 @@ def _warm(near: Point, before: Flowing, z: Array, shape: tuple[int, int]) -> Arr
 def _prolonged(coarse: Array) -> Array:
     """A state (nx, 3, ny, 1) on cells of half the size: velocities between faces are the mean of both."""
     fine = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=2)
-    fine[2::2, 2] = 0.5 * (fine[1:-1:2, 2] + fine[3::2, 2])
-    fine[:, 1, 1:-1:2] = 0.5 * (fine[:, 1, :-2:2] + fine[:, 1, 2::2])
+    fine[2::2, ALONG] = 0.5 * (fine[1:-1:2, ALONG] + fine[3::2, ALONG])
+    fine[:, ACROSS, 1:-1:2] = 0.5 * (fine[:, ACROSS, :-2:2] + fine[:, ACROSS, 2::2])
     return fine
 
 
@@ -255,26 +255,5 @@ def _read_slopes(model: Model, experiment: str, z: Array, flow: Flowing) -> tupl
     ahead = read(problem_at(model, experiment, z + steps), flow.state + STEP * flow.slopes)
     behind = read(problem_at(model, experiment, z - steps), flow.state - STEP * flow.slopes)
     return here, (ahead - behind).T / (2.0 * STEP)
-
-
-def _reading_weights(model: Model, experiment: str, flow: Flowing) -> Array:
-    """d prediction / d state (nx, 3, rows, n): bilinear between cell centres, u of a cell the mean of its faces."""
-    station, grid = model.station.iloc[_rows(model, experiment)], model.site.grid
-    weights = np.zeros((*flow.state.shape[:3], len(station)))
-    for n, row in enumerate(station.itertuples()):
-        a = np.clip((row.x - grid.x[0]) / grid.dx, 0.0, grid.x.size - 1.0)
-        b = np.clip((row.y - grid.y[0]) / grid.dy, 0.0, grid.y.size - 1.0)
-        i, j = min(int(a), grid.x.size - 2), min(int(b), grid.y.size - 2)
-        for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            share = (a - i if di else 1.0 - a + i) * (b - j if dj else 1.0 - b + j)
-            k = j + dj - flow.band[0]
-            if not 0 <= k < weights.shape[2]:
-                continue
-            if row.kind == "level":
-                weights[i + di, 0, k, n] += share
-            else:
-                weights[i + di, 2, k, n] += 0.5 * share
-                weights[max(i + di - 1, 0), 2, k, n] += 0.5 * share
-    return weights
 
 

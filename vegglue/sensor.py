@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.effect import Reading, across, applied
-from vegglue.flow import Array, Faces, FlowFields, Problem, closed, faces
+from vegglue.flow import ALONG, LEVEL, Array, Faces, FlowFields, Problem, closed, faces
 from vegglue.site import Grid
 
 
@@ -116,6 +116,21 @@ def _bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
     south = (1.0 - along)[:, None] * field[i, j] + along[:, None] * field[i + 1, j]
     north = (1.0 - along)[:, None] * field[i, j + 1] + along[:, None] * field[i + 1, j + 1]
     return (1.0 - across)[:, None] * south + across[:, None] * north
+
+
+def reading_weights(station: pd.DataFrame, grid: Grid) -> Array:
+    """d prediction / d state (nx, 3, ny, n) of the flow itself, whatever instruments make of it."""
+    weights = np.zeros((grid.x.size, 3, grid.y.size, len(station)))
+    i, along = between(station["x"].to_numpy(), grid.x[0], grid.dx, grid.x.size)
+    j, across = between(station["y"].to_numpy(), grid.y[0], grid.dy, grid.y.size)
+    velocity, n = (station["kind"] == "velocity").to_numpy(), np.arange(len(station))
+    for column, of_column in ((i, 1.0 - along), (i + 1, along)):
+        for row, of_row in ((j, 1.0 - across), (j + 1, across)):
+            share = of_column * of_row
+            weights[column, LEVEL, row, n] += np.where(velocity, 0.0, share)
+            for face in (column, np.maximum(column - 1, 0)):  # u of a cell is the mean of its faces
+                weights[face, ALONG, row, n] += np.where(velocity, 0.5 * share, 0.0)
+    return weights
 
 
 def between(points: Array, first: float, step: float, size: int) -> tuple[np.ndarray, Array]:
