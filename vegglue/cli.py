@@ -23,6 +23,7 @@ from vegglue.describe import describe
 from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError, StorageError
 from vegglue.infer import glue
+from vegglue.loop import folder_of
 from vegglue.observations import Observations, read_observations
 from vegglue.posterior import Posterior
 from vegglue.refine import refinable, refine
@@ -66,7 +67,7 @@ def check(config: Config, runs: Runs = Path("runs"), trust: Trust = False) -> No
     """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
     case, observations = _read(config, trust)
     site = build_site(case)
-    figure = _folder(runs, case) / "channel.png"
+    figure = folder_of(runs, case) / "channel.png"
     oddities = check_case(case, site, observations)
     for sentence in oddities:
         console.print(f"- {sentence}")
@@ -86,7 +87,7 @@ def simulate_command(
     if jobs == 0:
         raise InputError("--jobs: expected the number of processes, or -1 for one on every core, got 0.")
     case, observations = _read(config, trust, members)
-    path = _folder(runs, case) / "ensemble.h5"
+    path = folder_of(runs, case) / "ensemble.h5"
     if _is_current(path, case):
         console.print(f"{path} is up to date.")
         return
@@ -114,7 +115,7 @@ def infer(
 ) -> None:
     """Infer the parameters from the measurements and say what was found."""
     case, observations = _read(config, trust, members)
-    folder = _folder(runs, case)
+    folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = _inferred(case, observations, ensemble, method, jobs)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
@@ -138,7 +139,7 @@ def _inferred(case: Case, observations: Observations, ensemble: Ensemble, method
 def report(config: Config, members: Members = None, runs: Runs = Path("runs"), trust: Trust = False) -> None:
     """Make the page and the figures of a run."""
     case, observations = _read(config, trust, members)
-    folder = _folder(runs, case)
+    folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = read_posterior(folder / "posterior.h5", case_hash(case))
     flow = solve_flow(case, posterior.median)
@@ -157,12 +158,6 @@ def _read(config: Path, trust: bool, members: int | None = None) -> tuple[Case, 
     if members is not None:
         case = case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
     return case, read_observations(case)
-
-
-def _folder(runs: Path, case: Case) -> Path:
-    folder = runs / case.name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def _is_current(path: Path, case: Case) -> bool:

@@ -23,13 +23,14 @@ from vegglue.ladder import Rung, held_out, improvement
 from vegglue.loop import (
     child_path,
     diagnosed,
+    folder_of,
     grow,
     ladder,
     named_candidates,
     next_measurements,
     write_child,
 )
-from vegglue.schema import Case
+from vegglue.text_files import write_text
 
 # Into a file or a pipe, lines as long as they need to be.
 console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
@@ -68,12 +69,12 @@ def diagnose_command(
 ) -> None:
     """Say where the model fails, which effect is missing, and how sure that is."""
     case = load_case(config, trust)
-    found = diagnosed(case, _folder(runs, case), jobs, _say(as_object))
+    found = diagnosed(case, folder_of(runs, case), jobs, _say(as_object))
     if as_object:
         print(json.dumps(as_json(found), ensure_ascii=False))
         return
     _tell(found)
-    folder = _folder(runs, case)
+    folder = folder_of(runs, case)
     console.print(f"Written to {folder / 'diagnosis.h5'}, drawn in {folder / 'diagnosis.png'}.")
 
 
@@ -113,7 +114,7 @@ def compare_command(
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
     rungs = ladder([load_case(config, trust) for config in configs], runs, _say(as_object))
-    picture = _folder(runs, load_case(configs[-1], trust)) / "ladder.png"
+    picture = folder_of(runs, load_case(configs[-1], trust)) / "ladder.png"
     save_ladder_figure(rungs, picture)
     if as_object:
         print(json.dumps({"rungs": [_rung_json(one) for one in rungs]}, ensure_ascii=False))
@@ -132,7 +133,7 @@ def next_command(
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
     case = load_case(config, trust)
-    found = next_measurements(case, _folder(runs, case), jobs, _say(as_object), between or [])
+    found = next_measurements(case, folder_of(runs, case), jobs, _say(as_object), between or [])
     if as_object:
         print(json.dumps({"questions": [_question_json(*one) for one in found]}, ensure_ascii=False))
         return
@@ -142,12 +143,12 @@ def next_command(
 def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
     """The whole loop: diagnose, add what is missing, watch the error fall, say what to measure next."""
     case = load_case(config, trust)
-    folder = _folder(runs, case)
+    folder = folder_of(runs, case)
     _tell(diagnosed(case, folder, jobs, _say()))
     grown = grow(case, runs, jobs, _say())
     _show_ladder(grown.rungs)
     _show_next(next_measurements(case, folder, jobs, _say(), []))
-    picture = _folder(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
+    picture = folder_of(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
     save_ladder_figure(grown.rungs, picture)
     console.print(f"Ladder drawn in {picture}; last config: {grown.paths[-1]}")
 
@@ -163,22 +164,13 @@ COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
 
 
 def _write_config(path: Path, folder: Path, tree: dict[str, Any]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another file by --to.") from None
+    text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
+    write_text(path, text, "give another file by --to")
 
 
 def _default_target(folder: Path) -> Path:
     name = f"{folder.resolve().name}.yaml"
     return Path("configs") / name if Path("configs").is_dir() else Path(name)
-
-
-def _folder(runs: Path, case: Case) -> Path:
-    folder = runs / case.name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def _say(quiet: bool = False) -> Callable[[str], None]:

@@ -7,7 +7,6 @@ calibration needs of it is written into a folder beside the config.
 """
 
 import csv
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vegglue.errors import StorageError
 from vegglue.table import read_table
+from vegglue.text_files import case_name, write_text
 
 Array = NDArray[np.float64]
 Tree = dict[str, Any]
@@ -59,7 +58,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
     _write(into / "velocities.csv", "section,x,y,u,u_se", _stations(vertical, sections[::2]))
     _write(into / "held_out.csv", "section,x,y,u,u_se", _stations(vertical, sections[1::2]))
     return {
-        "name": re.sub(r"[^a-z0-9_-]+", "-", target.stem.lower()),
+        "name": case_name(target.stem),
         "title": "Open-channel confluence, measured by others",
         "grid": grid,
         "bed": [{"points": f"{into.name}/bed.csv"}],
@@ -93,7 +92,7 @@ def flat_bed(folder: Path, parent: Path) -> Tree:
     plane |= {"bed_slope": round(float(-slope), 6), "level": round(float(level), 5)}
     return {
         "extends": parent.name,
-        "name": re.sub(r"[^a-z0-9_-]+", "-", parent.stem.lower()) + "-flat",
+        "name": f"{case_name(parent.stem)}-flat",
         "title": "Open-channel confluence, its bed taken as a plane",
         "bed": [{"trapezoid": plane}],
     }
@@ -215,8 +214,4 @@ def _rounded(value: float, digits: int = 5) -> float:
 
 def _write(path: Path, heading: str, rows: Sequence[Sequence[float | str]] | Array) -> None:
     lines = [",".join(cell if isinstance(cell, str) else f"{cell:.5f}" for cell in row) for row in rows]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("\n".join([heading, *lines]) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written ({error.strerror}); give another place by --to.") from None
+    write_text(path, "\n".join([heading, *lines]) + "\n", "give another place by --to")

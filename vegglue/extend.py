@@ -13,6 +13,7 @@ from vegglue.effects import library
 from vegglue.errors import InputError
 from vegglue.refusal import nearest
 from vegglue.schema import Case
+from vegglue.text_files import case_name
 
 Tree = dict[str, Any]
 
@@ -65,5 +66,4 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
 
 def child_name(parent: str, added: Sequence[Candidate]) -> str:
     """A name for the child's folder of results."""
-    words = "-".join([parent, *(candidate.key for candidate in added)])
-    return re.sub(r"[^a-z0-9_-]+", "-", words.lower())[:100]
+    return case_name("-".join([parent, *(candidate.key for candidate in added)]))

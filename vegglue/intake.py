@@ -8,12 +8,12 @@ downstream_level_m). What is not said there is left at the defaults below.
 import json
 import math
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from vegglue.errors import InputError
+from vegglue.text_files import case_name
 
 # Cells across the floor, and how much longer than wide a cell is.
 CELLS_ACROSS, LENGTHENED = 16, 4.0 / 3.0
@@ -33,7 +33,7 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     channel, experiments = site["channel"], site["experiments"]
     patches = site.get("patches", [])
     tree: Tree = {
-        "name": re.sub(r"[^a-z0-9_-]+", "-", folder.resolve().name.lower()).strip("-") or "case",
+        "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
         "grid": _grid(channel, experiments),
         "bed": [{"trapezoid": _trapezoid(channel)}],

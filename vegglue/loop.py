@@ -1,7 +1,6 @@
 """The loop in files: calibrated places, diagnoses and child configs beside the results they belong to."""
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from vegglue.diagnose import diagnose
 from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.diagnosis_pictures import save_diagnosis_figure
 from vegglue.effect import Array, Effect
-from vegglue.errors import InputError, StorageError
+from vegglue.errors import InputError
 from vegglue.extend import candidate_named, child_tree
 from vegglue.ladder import Rung, improvement, rung
 from vegglue.linearise import Model, fingerprint, model_of, theta_at, z_at
@@ -27,10 +26,12 @@ from vegglue.prune import NEEDED
 from vegglue.schema import Case
 from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
 from vegglue.suspects import SEEN
+from vegglue.text_files import write_text
 from vegglue.workings import amplitude_of, effect_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
+ROOM = "make room and run it again"
 Say = Callable[[str], None]
 
 
@@ -41,6 +42,13 @@ class Grown:
     paths: tuple[Path, ...]
     rungs: tuple[Rung, ...]
     reason: str
+
+
+def folder_of(runs: Path, case: Case) -> Path:
+    """Where the results of a case lie; made if need be."""
+    folder = runs / case.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def model_in(case: Case) -> Model:
@@ -76,7 +84,7 @@ def known_place(case: Case, folder: Path) -> Array | None:
 def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None:
     """Keep the best place for the next command. Errors: StorageError."""
     text = json.dumps({"config_hash": case_hash(case), "theta": {name: float(theta[name]) for name in case.parameters}})
-    _write(folder / "best.json", text)
+    write_text(folder / "best.json", text, ROOM)
 
 
 def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
@@ -103,7 +111,7 @@ def write_child(parent: Case, target: Path, added: Sequence[tuple[Candidate, Map
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
-    _write(target, text + as_yaml(tree))
+    write_text(target, text + as_yaml(tree), ROOM)
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 
@@ -159,7 +167,6 @@ def _start_child(
     child: Case, folder: Path, found: Diagnosis, added: Sequence[tuple[Candidate, Mapping[str, float]]]
 ) -> None:
     """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
-    folder.mkdir(parents=True, exist_ok=True)
     theta = {name: values[0] for name, values in found.parameters.items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.plausible))
@@ -188,7 +195,6 @@ def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFr
     """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
     unit of (amplitude - off)^power: (station,) and the stations.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     base, one = calibrated(case, folder), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
     changed = change_of(base.model.case, one, shapes)
@@ -196,7 +202,6 @@ def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFr
 
 
 def _rung(case: Case, folder: Path) -> Rung:
-    folder.mkdir(parents=True, exist_ok=True)
     return rung(calibrated(case, folder), validation_of(case))
 
 
@@ -255,12 +260,3 @@ def _rivals(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool 
 
 def _theta(base: Baseline) -> dict[str, float]:
     return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}
-
-
-def _write(path: Path, text: str) -> None:
-    new = path.with_name(path.name + ".new")
-    try:
-        new.write_text(text, encoding="utf-8")
-        os.replace(new, path)
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written ({error}); make room and run it again.") from error
