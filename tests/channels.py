@@ -3,7 +3,7 @@
 import numpy as np
 
 from vegglue import kernels
-from vegglue.flow import ACROSS, ALONG, LEVEL, Array, Inflow, Plants, Problem, faces
+from vegglue.flow import LEVEL, Array, Inflow, Plants, Problem, faces
 from vegglue.start import backwater
 from vegglue.steady import newton
 
@@ -106,11 +106,3 @@ def filled(problem: Problem, level: float) -> Array:
     state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
     state[:, LEVEL] = level
     return state
-
-
-def mirrored(state: Array) -> Array:
-    """The state seen in a mirror along the axis."""
-    other = np.zeros_like(state)
-    other[:, LEVEL], other[:, ALONG] = state[:, LEVEL, ::-1], state[:, ALONG, ::-1]
-    other[:, ACROSS, 1:] = -state[:, ACROSS, :0:-1]
-    return other

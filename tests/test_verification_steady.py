@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import GRAVITY, centres, discharge, make_problem, mirrored, river, sloping, solved
+from channels import GRAVITY, centres, discharge, make_problem, river, sloping, solved
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from vegglue import kernels
+from vegglue.contract import mirrored
 from vegglue.flow import ACROSS, ALONG, LEVEL, Inflow, faces, residual, take
 from vegglue.march import march, settle
 from vegglue.neighbourhood import solve_members
