@@ -14,14 +14,14 @@ from scipy.special import ndtr, ndtri
 from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
 from vegglue.flow import ACROSS, ALONG, Problem, crop, residual
-from vegglue.neighbourhood import overflows, settled, widen
+from vegglue.neighbourhood import chord_in_band, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
 from vegglue.problem import build_problem
 from vegglue.schema import Case, Parameter
 from vegglue.sensor import read_sensors, reading_weights
 from vegglue.site import Site, build_site
-from vegglue.steady import Factors, chord
+from vegglue.steady import Factors
 from vegglue.tangent import adjoints, tangents
 
 # Step of differences in z, small against the prior and large against rounding.
@@ -121,10 +121,9 @@ def _few_near(model: Model, point: Point, z: Array) -> Array:
         rows = _rows(model, experiment)
         problem = problem_at(model, experiment, z)
         start = flow.state + flow.slopes @ (z - point.z).T
-        part = crop(problem, *flow.band)
-        solution = chord(part, start, flow.factors, model.case.numerics.tolerance)
+        solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
         found[:, rows] = _read(model, experiment, problem, solution.state, flow.band)
-        found[~solution.converged | overflows(part, solution.state, flow.band, problem.shape[1])] = np.nan
+        found[~solution.converged] = np.nan
     return found
 
 
@@ -255,5 +254,3 @@ def _read_slopes(model: Model, experiment: str, z: Array, flow: Flowing) -> tupl
     ahead = read(problem_at(model, experiment, z + steps), flow.state + STEP * flow.slopes)
     behind = read(problem_at(model, experiment, z - steps), flow.state - STEP * flow.slopes)
     return here, (ahead - behind).T / (2.0 * STEP)
-
-

@@ -89,7 +89,9 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Sol
             if pending.size == 0:
                 continue
             start = lead.tangents.predict(lead.state, places[centre], places[pending])
-            followers = _chord_in_band(take(whole, pending), start, lead, tolerance)
+            assert lead.factors is not None
+            within = inside(start, lead.band)
+            followers = chord_in_band(take(whole, pending), within, lead.factors, lead.band, tolerance)
             iterations[pending] += followers.iterations
             there = followers.converged
             status[pending[there]] = SOLVED_BY_NEWTON
@@ -209,9 +211,7 @@ def _lead(
     spent: int,
 ) -> _Lead:
     ny = problem_of(place[None]).shape[1]
-    slopes = tuple(
-        widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared)
-    )
+    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared))
     state = widen(solution.state, ny, band)
     return _Lead(state, SOLVED_BY_NEWTON, "", spent, _Tangents(place, slopes), shared, band)
 
@@ -238,12 +238,11 @@ def _marched(problem: Problem, spent: int, tolerance: float) -> _Lead:
     return _Lead(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))
 
 
-def _chord_in_band(problem: Problem, start: Array, lead: _Lead, tolerance: float) -> Solution:
-    """Followers in the band of their centre; one that outgrows it counts as not converged."""
-    assert lead.factors is not None
-    part = crop(problem, *lead.band)
-    solution = chord(part, inside(start, lead.band), lead.factors, tolerance)
-    overflowing = overflows(part, solution.state, lead.band, problem.shape[1])
+def chord_in_band(problem: Problem, start: Array, shared: Factors, band: tuple[int, int], tolerance: float) -> Solution:
+    """All members from starts in a band of rows; one that outgrows it counts as not converged."""
+    part = crop(problem, *band)
+    solution = chord(part, start, shared, tolerance)
+    overflowing = overflows(part, solution.state, band, problem.shape[1])
     return replace(solution, converged=solution.converged & ~overflowing)
 
 
