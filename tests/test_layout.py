@@ -22,7 +22,7 @@ HOMES = {
     },
     "numba": {"blocks", "kernels", "sweeps"},
     "pandas": {
-        "adv", "candidates", "contract", "design", "diagnosis", "diagnosis_pictures", "ensemble", "extend",
+        "adv", "aside", "candidates", "contract", "design", "diagnosis", "diagnosis_pictures", "ensemble", "extend",
         "figure_misfit", "figure_suspects", "figures", "flow_pictures", "groundwork", "infer", "layout",
         "likelihood", "linearise", "loop", "measured_pictures", "noise", "observations", "posterior",
         "refine", "report_tables", "sensor", "table", "twin", "twin_files", "verdict",

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from vegglue.aside import aside_in_words
 from vegglue.config import as_yaml, load_case
 from vegglue.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.design import SEPARATES, Worth
@@ -26,6 +27,7 @@ from vegglue.loop import (
     folder_of,
     grow,
     ladder,
+    left_out,
     named_candidates,
     next_measurements,
     write_child,
@@ -96,7 +98,7 @@ def extend_command(
         raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
     if auto:
         grown = grow(case, runs, jobs, _say())
-        _show_ladder(grown.rungs)
+        _show_ladder(grown.rungs, aside_in_words(grown.aside))
         console.print(grown.reason)
         console.print(f"Last config: {grown.paths[-1]}")
         return
@@ -113,13 +115,16 @@ def compare_command(
     trust: Trust = False,
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
-    rungs = ladder([load_case(config, trust) for config in configs], runs, _say(as_object))
-    picture = folder_of(runs, load_case(configs[-1], trust)) / "ladder.png"
+    cases = [load_case(config, trust) for config in configs]
+    aside = left_out(cases, runs)
+    rungs = ladder(cases, runs, aside, _say(as_object))
+    picture = folder_of(runs, cases[-1]) / "ladder.png"
     save_ladder_figure(rungs, picture)
     if as_object:
-        print(json.dumps({"rungs": [_rung_json(one) for one in rungs]}, ensure_ascii=False))
+        told = {"rungs": [_rung_json(one) for one in rungs], "left_out": aside.to_dict("records")}
+        print(json.dumps(told, ensure_ascii=False))
         return
-    _show_ladder(rungs)
+    _show_ladder(rungs, aside_in_words(aside))
     console.print(f"Drawn in {picture}")
 
 
@@ -146,7 +151,7 @@ def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trus
     folder = folder_of(runs, case)
     _tell(diagnosed(case, folder, jobs, _say()))
     grown = grow(case, runs, jobs, _say())
-    _show_ladder(grown.rungs)
+    _show_ladder(grown.rungs, aside_in_words(grown.aside))
     _show_next(next_measurements(case, folder, jobs, _say(), []))
     picture = folder_of(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
     save_ladder_figure(grown.rungs, picture)
@@ -213,7 +218,7 @@ def _tell(found: Diagnosis) -> None:
             console.print(f"- set aside: {place}, measured {station['value']:g}")
 
 
-def _show_ladder(rungs: Sequence[Rung]) -> None:
+def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
     table = Table(box=None, pad_edge=False, header_style="bold")
     headings = ("model", "parameters", "RMSE", "levels", "chi2 / n", "held out (section)", "fell by", "held out (exp.)",
                 "log score", "in 50 %", "in 95 %", "validation")  # fmt: skip
@@ -232,6 +237,8 @@ def _show_ladder(rungs: Sequence[Rung]) -> None:
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
             f"{rungs[-1].noise_floor:.4f} m/s."
         )
+    if note:
+        console.print(note)
     for one in rungs:
         moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < 0.01]
         if moving:

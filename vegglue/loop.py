@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from vegglue.aside import aside_of, without
 from vegglue.baseline import Baseline, baseline
 from vegglue.candidates import Candidate, change_of, start_of
 from vegglue.config import as_yaml, case_hash, load_case, resolved_yaml
@@ -24,7 +25,7 @@ from vegglue.linearise import Model, fingerprint, model_of, theta_at, z_at
 from vegglue.observations import read_observations
 from vegglue.prune import NEEDED
 from vegglue.schema import Case
-from vegglue.store import read_diagnosis, read_posterior, stored_hash, write_diagnosis
+from vegglue.store import diagnosis_that_fits, read_diagnosis, read_posterior, stored_hash, write_diagnosis
 from vegglue.suspects import SEEN
 from vegglue.text_files import write_text
 from vegglue.workings import amplitude_of, effect_of
@@ -37,10 +38,13 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Grown:
-    """How a case was extended: its configs from the first to the last, their rungs, and why it ended."""
+    """How a case was extended: its configs from the first to the last, their rungs, the measurements that none of them
+    uses, and why it ended.
+    """
 
     paths: tuple[Path, ...]
     rungs: tuple[Rung, ...]
+    aside: pd.DataFrame
     reason: str
 
 
@@ -99,11 +103,17 @@ def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
     return found
 
 
-def calibrated(case: Case, folder: Path) -> Baseline:
-    """The case at its best place, which is kept for the next command."""
-    base = baseline(model_in(case), known_place(case, folder))
+def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
+    """The case at its best place, which is kept for the next command; aside: measurements that are left out."""
+    base = baseline(without(model_in(case), aside), known_place(case, folder))
     remember_place(case, folder, _theta(base))
     return base
+
+
+def left_out(cases: Sequence[Case], runs: Path) -> pd.DataFrame:
+    """The measurements that the diagnosis of any of the cases has set aside, where it fits the case."""
+    found = (diagnosis_that_fits(runs / case.name / "diagnosis.h5", case_hash(case)) for case in cases)
+    return aside_of(*(one for one in found if one is not None))
 
 
 def write_child(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:
@@ -138,7 +148,8 @@ def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
     misfit with all others.
     """
     found = diagnosed(case, runs / case.name, jobs, say)
-    paths, rungs = [case.source], [_rung(case, runs / case.name)]
+    aside = aside_of(found)
+    paths, rungs = [case.source], [_rung(case, runs / case.name, aside)]
     parent, added = case, []
     for step in found.steps:
         suspect = next(one for one in found.suspects if one.name == step.accepted)
@@ -146,21 +157,26 @@ def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
         say(f"adding {step.accepted}")
         child = write_child(case, child_path(case.source, [one for one, _ in added]), added)
         _start_child(child, runs / child.name, found, added)
-        next_rung = _rung(child, runs / child.name)
-        gain, _ = improvement(rungs[-1], next_rung)
-        # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
-        if not (gain > 0 and next_rung.chi2 < rungs[-1].chi2):
+        next_rung = _rung(child, runs / child.name, aside)
+        worse = _worse(rungs[-1], next_rung)
+        if worse:
             child.source.unlink()
-            what = "the misfit with what was seen rose" if gain > 0 else "held-out errors did not fall"
-            return Grown(tuple(paths), tuple(rungs), f"{step.accepted} was not kept: {what}")
+            return Grown(tuple(paths), tuple(rungs), aside, f"{step.accepted} was not kept: {worse}")
         paths.append(child.source)
         rungs.append(next_rung)
         parent = child
     unneeded = [name for name in parent.effects if not _needed(parent, rungs[-1], name)]
-    reason = found.sentence
-    if unneeded:
-        reason += f" No longer needed: {', '.join(unneeded)}."
-    return Grown(tuple(paths), tuple(rungs), reason)
+    ended = f"{found.sentence} No longer needed: {', '.join(unneeded)}." if unneeded else found.sentence
+    return Grown(tuple(paths), tuple(rungs), aside, ended)
+
+
+def _worse(before: Rung, after: Rung) -> str:
+    """Why an effect is not kept, '' if it is."""
+    gain, _ = improvement(before, after)
+    if not gain > 0:
+        return "held-out errors did not fall"
+    # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
+    return "" if after.chi2 < before.chi2 else "the misfit with what was seen rose"
 
 
 def _start_child(
@@ -182,12 +198,12 @@ def _needed(case: Case, rung: Rung, name: str) -> bool:
     return abs(middle - off) > NEEDED * (high - low) / 3.92
 
 
-def ladder(cases: Sequence[Case], runs: Path, say: Say) -> list[Rung]:
-    """One rung for each case, in their order."""
+def ladder(cases: Sequence[Case], runs: Path, aside: pd.DataFrame, say: Say) -> list[Rung]:
+    """One rung for each case, in their order, all without the measurements set aside."""
     rungs = []
     for case in cases:
         say(f"calibrating {case.name}")
-        rungs.append(_rung(case, runs / case.name))
+        rungs.append(_rung(case, runs / case.name, aside))
     return rungs
 
 
@@ -195,14 +211,14 @@ def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFr
     """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
     unit of (amplitude - off)^power: (station,) and the stations.
     """
-    base, one = calibrated(case, folder), Candidate(effect)
+    base, one = calibrated(case, folder, aside_of()), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
     changed = change_of(base.model.case, one, shapes)
     return fingerprint(base.model, base.fitted.point, [changed])[:, 0], base.model.station
 
 
-def _rung(case: Case, folder: Path) -> Rung:
-    return rung(calibrated(case, folder), validation_of(case))
+def _rung(case: Case, folder: Path, aside: pd.DataFrame) -> Rung:
+    return rung(calibrated(case, folder, aside), validation_of(case))
 
 
 def next_measurements(
@@ -221,7 +237,7 @@ def next_measurements(
     asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
     if not asked:
         return []
-    base = calibrated(case, folder)
+    base = calibrated(case, folder, aside_of(found))
     point = base.fitted.point
     worths = worth_of_measurements(base.model, base.noise, point.z, [rivals for _, rivals in asked])
     return [(what, worth) for (what, _), worth in zip(asked, worths, strict=True)]
