@@ -172,8 +172,7 @@ def _off_is_off(tried: Trial) -> Iterator[str]:
 def _acts(tried: Trial) -> Iterator[str]:
     """It does something, and answers to (amplitude - off)^power where it is small."""
     a = tried.effect.amplitude
-    step = (0.02 if a.power == 1 else 0.2) * a.scale * (1.0 if a.off + 0.2 * a.scale <= a.high else -1.0)
-    problem = tried.problem(a.off, a.off + 0.5 * step, a.off + step)
+    problem = tried.problem(a.off, a.off + 0.5 * a.small, a.off + a.small)
     told = answer(tried, problem, moving(problem))
     half, whole = (np.concatenate([(t[..., k] - t[..., 0]).ravel() for t in told]) for k in (1, 2))
     largest = np.abs(whole).max()

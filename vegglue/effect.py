@@ -64,6 +64,12 @@ class Amplitude:
         return float(np.clip(self.off + self.size(gain), self.low, self.high))
 
     @property
+    def small(self) -> float:
+        """A step from off into the support, small but large against rounding in its power."""
+        step = (0.02 if self.power == 1 else 0.2) * self.scale
+        return step if self.off + step <= self.high else -step
+
+    @property
     def plausible(self) -> float:
         """Gain of a plausible size."""
         return self.scale**self.power

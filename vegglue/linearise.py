@@ -151,8 +151,8 @@ def _prints(model: Model, point: Point, experiment: str, changed: Sequence[tuple
     built, causes = [], np.empty((*flow.state.shape[:3], len(here)))
     for lane, j in enumerate(here):
         case, name, amplitude = changed[j]
-        step, gain = _step(amplitude)
-        problem = build_problem(case, model.site, experiment, theta | {name: np.array([amplitude.off + step])})
+        gain, value = amplitude.small**amplitude.power, np.array([amplitude.off + amplitude.small])
+        problem = build_problem(case, model.site, experiment, theta | {name: value})
         causes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
         built.append((problem, gain))
     answers = tangents(base, flow.state, flow.factors, causes, EXACT)
@@ -189,13 +189,6 @@ def problem_at(model: Model, experiment: str, z: Array) -> Problem:
 def _acts_in(case: Case, experiment: str) -> bool:
     last = list(case.effects.values())[-1]
     return last.experiments is None or experiment in last.experiments
-
-
-def _step(amplitude: Amplitude) -> tuple[float, float]:
-    """A small amplitude and its power, into the support."""
-    step = (0.02 if amplitude.power == 1 else 0.2) * amplitude.scale
-    step = step if amplitude.off + step <= amplitude.high else -step
-    return step, step**amplitude.power
 
 
 def _rows(model: Model, experiment: str) -> np.ndarray:
