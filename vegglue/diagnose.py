@@ -152,8 +152,6 @@ def _before(seen: Look) -> dict[str, Any]:
 def _after(seen: Look) -> dict[str, Any]:
     """What it keeps of the last model."""
     base, noise = seen.base, seen.noise
-    error = np.full(len(base.model.station), np.nan)
-    error[noise.rows] = noise.scale * noise.error
     return {
         "correlation": noise.correlation,
         "scale": noise.scale,
@@ -161,5 +159,5 @@ def _after(seen: Look) -> dict[str, Any]:
         "flagged": tuple(int(noise.rows[row]) for row in seen.flagged),
         "parameters": {name: interval95(base.model, base.fitted, name) for name in base.model.names},
         "prediction": base.fitted.point.prediction,
-        "error": error,
+        "error": noise.among_all(noise.of_data, len(base.model.station)),
     }

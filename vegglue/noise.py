@@ -40,6 +40,17 @@ class Noise:
         """Rows of the used stations, of (station, ...)."""
         return values[self.rows]
 
+    def among_all(self, values: Array, stations: int) -> Array:
+        """Values of the used stations (n,) among all, (station,), NaN for the others."""
+        wide = np.full(stations, np.nan)
+        wide[self.rows] = values
+        return wide
+
+    @property
+    def of_data(self) -> Array:
+        """Standard errors of the data (n,), made larger where they look too small."""
+        return self.scale * self.error
+
     def residual(self, prediction: Array) -> Array:
         """Measured minus predicted (n,) of predictions (station,)."""
         return self.value - prediction[self.rows]

@@ -7,7 +7,6 @@ z are places of the prior in which it is standard normal, f the model itself: ev
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -84,7 +83,7 @@ def _posterior(base: Groundwork, drawn: Sample, moved: Transfer | None, ensemble
     case, station, noise, weights = base.model.case, base.model.station, base.noise, drawn.weights
     theta, seed = theta_at(case, drawn.z), case.simulate.seed
     residual = station["value"].to_numpy(float) - drawn.values
-    own = _at_stations(np.sqrt(np.diag(covariance_of(noise))), noise, len(station), np.nan)
+    own = noise.among_all(np.sqrt(np.diag(covariance_of(noise))), len(station))
     kinds = stations_by_kind(station)
     likelihoods = np.full(drawn.values.shape, np.nan)
     likelihoods[:, noise.rows] = log_likelihoods(residual[:, noise.rows], _precision(noise))
@@ -133,7 +132,7 @@ def _refinement(base: Groundwork, drawn: Sample, best: int) -> Refinement:
     near = np.argmin([np.linalg.norm(drawn.z - one.point.z, axis=1) for one in base.fits], axis=0)
     grid = root_mean_square(noise.grid) if base.grid_known else float("nan")
     modes = theta_at(case, np.stack([one.point.z for one in base.fits]))
-    at_all = partial(_at_stations, noise=noise, stations=len(station))
+    at_all = partial(noise.among_all, stations=len(station))
     return Refinement(
         errors="stated" if case.infer.sigma == "known" else "estimated",
         correlation=noise.correlation,
@@ -159,7 +158,7 @@ def _refinement(base: Groundwork, drawn: Sample, best: int) -> Refinement:
         score_k=at_all(alone.k),
         below=at_all(alone.below),
         surprise=at_all(base.surprise),
-        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2 < NO_CHANCE, otherwise=False),
+        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2) < NO_CHANCE,
         left_out=np.array(list(groups), object),
         left_out_stations=np.array([rows.size for rows in groups.values()]),
         left_out_score=np.array([one.score for one in without]),
@@ -176,13 +175,6 @@ def _spread(noise: Noise, stations: int) -> Array:
     wide = np.full((stations, stations), np.nan)
     wide[noise.rows] = 0.0
     wide[np.ix_(noise.rows, noise.rows)] = noise.lower
-    return wide
-
-
-def _at_stations(values: Array, noise: Noise, stations: int, otherwise: Any = np.nan) -> Array:
-    """Values of the used stations (n,) among all, (station,)."""
-    wide = np.full(stations, otherwise)
-    wide[noise.rows] = values
     return wide
 
 

@@ -144,7 +144,7 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
             "section": np.where(used["kind"] == "level", "gauges", used["section"]),
             "zone": _zones(model, used),
             "left": noise.residual(point.prediction),
-            "error": noise.scale * noise.error,
+            "error": noise.of_data,
         }
     )
     rows = []
