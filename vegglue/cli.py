@@ -15,7 +15,7 @@ from vegglue import __version__
 from vegglue.channel_figure import save_channel_figure
 from vegglue.check import check_case
 from vegglue.cli_effects import effects_command
-from vegglue.cli_loop import COMMANDS, Trust
+from vegglue.cli_loop import COMMANDS, Config, Runs, Trust
 from vegglue.cli_twin import COMMANDS as OF_TWINS
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.cores import alone
@@ -37,8 +37,6 @@ from vegglue.survey import read_survey, rigid_cylinder
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 console = Console(highlight=False, soft_wrap=True)
 
-Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
-Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
 Jobs = Annotated[
     int, typer.Option(min=-1, help="Processes at once; -1 for one on every core. Results do not depend on it.")
 ]

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from vegglue.cli_loop import Json, Runs
 from vegglue.config import load_case
 from vegglue.contract import breaches
 from vegglue.diagnosis_pictures import save_fingerprint_figure
@@ -27,9 +28,9 @@ def effects_command(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Say also what this case does with it.")] = None,
     check: Annotated[Path | None, typer.Option(help="Check the effects of a Python file of your own.")] = None,
-    as_object: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")] = False,
+    as_object: Json = False,
     trust: Annotated[bool, typer.Option("--trust", help="Run the Python file of effects that is named.")] = False,
-    runs: Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")] = Path("runs"),
+    runs: Runs = Path("runs"),
 ) -> None:
     """List the physical effects that can be added, or show one of them."""
     if check is not None:

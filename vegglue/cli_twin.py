@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from vegglue.cli_loop import Runs
 from vegglue.config import case_hash, load_case
 from vegglue.errors import InputError
 from vegglue.loop import model_in
@@ -42,7 +43,7 @@ def twin_command(
 
 def reveal_command(
     folder: Annotated[Path, typer.Argument(help="Folder that `vegglue twin` made.", show_default=False)],
-    runs: Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")] = Path("runs"),
+    runs: Runs = Path("runs"),
 ) -> None:
     """Open the seal of a twin, and say how well its diagnosis guessed."""
     answer = opened(folder / SEAL)
