@@ -16,7 +16,7 @@ from vegglue.neighbourhood import leaves
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
-from vegglue.simulate import chunk_size, solve_chunk, unit_places
+from vegglue.simulate import begin_at, chunk_size, solve_chunk, unit_places
 from vegglue.site import build_site
 from vegglue.start import backwater
 
@@ -59,10 +59,11 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
     site, observations = build_site(case), read_observations(case)
     places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
     chunk = places[leaves(places, chunk_size(len(places)))[7]]
-    solve_chunk(case, site, observations, chunk[:2])
+    begin = begin_at(case, site)
+    solve_chunk(case, site, observations, chunk[:2], begin)
     profile = cProfile.Profile()
     began = time.perf_counter()
-    rows = profile.runcall(solve_chunk, case, site, observations, chunk)
+    rows = profile.runcall(solve_chunk, case, site, observations, chunk, begin)
     seconds = time.perf_counter() - began
     print(
         f"steady, 1142 x 40 cells: {len(chunk) / seconds:.1f} members/s on one core, "
@@ -81,12 +82,13 @@ def cores(case) -> None:  # type: ignore[no-untyped-def]
     site, observations = build_site(case), read_observations(case)
     places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
     chunks = leaves(places, chunk_size(len(places)))[8:10]
+    begin = begin_at(case, site)
     members, spent = sum(chunk.size for chunk in chunks), []
     for jobs in (1, 2):
         with Parallel(n_jobs=jobs) as pool:
-            pool(delayed(solve_chunk)(case, site, observations, places[chunk[:2]]) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, places[chunk[:2]], begin) for chunk in chunks)
             began = time.perf_counter()
-            pool(delayed(solve_chunk)(case, site, observations, places[chunk]) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, places[chunk], begin) for chunk in chunks)
             spent.append(time.perf_counter() - began)
     gain = spent[0] / spent[1]
     print(f"{members} members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two: {gain:.2f} times faster")

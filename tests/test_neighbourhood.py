@@ -56,7 +56,7 @@ def test_leaves_cope_with_members_at_one_place() -> None:
 
 
 def test_leaves_are_neighbours_and_follow_each_other() -> None:
-    places = np.random.default_rng(5).random((2048, 3))
+    places = np.random.default_rng(5).random((128 * SIZE, 3))
     cut = leaves(places, SIZE)
     widths = np.array([np.ptp(places[leaf], axis=0) for leaf in cut])
     assert widths.max() <= 0.35, "128 leaves of a cube: about a fifth of the prior each way"

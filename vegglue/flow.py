@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vegglue import canopy, kernels
+from vegglue import canopy, easing, kernels
 from vegglue.acting import closures, push, stages_of, stand_values
 from vegglue.effect import Acting, Ground
 from vegglue.ground import rows
@@ -171,9 +171,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         plants.bare_chezy[inside],
         plants.law[inside] if plants.law.size else plants.law,
     )
-    inflows = tuple(
-        _cropped(inflow, south, north) if inflow.side == "west" else inflow for inflow in problem.inflows
-    )
+    inflows = tuple(_cropped(inflow, south, north) if inflow.side == "west" else inflow for inflow in problem.inflows)
     return replace(
         problem,
         bed=np.ascontiguousarray(problem.bed[:, south:north]),
@@ -303,8 +301,36 @@ def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, 
 
 def residual(problem: Problem, state: Array) -> Array:
     """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
-    depth = kernels.cell_depth(state, problem.bed, problem.lift, problem.reach, problem.film)
+    depth = _depth(problem, state)
+    return _residual(problem, state, depth, *closed(problem, state, depth))
+
+
+def eased(problem: Problem, state: Array, slope: Array) -> Array:
+    """R(state) with its rows of thin water as chord steps need them, see `easing`; zero when R is.
+
+    slope (nx, 3, ny, 1): `friction_slope` of the state whose factors are in use.
+    """
+    depth = _depth(problem, state)
     rate, viscosity, momentum = closed(problem, state, depth)
+    out = _residual(problem, state, depth, rate, viscosity, momentum)
+    easing.ease(out, state, depth, rate, _side_fluxes(problem, depth)[0], slope, problem.film)
+    return out
+
+
+def friction_slope(problem: Problem, state: Array) -> Array:
+    """d(k |U| u)/du and d(k |U| v)/dv [1/s] where u and v stand in a state, (nx, 3, ny, m)."""
+    depth = _depth(problem, state)
+    rate, _, _ = closed(problem, state, depth)
+    return easing.friction_slope(state, depth, rate, _side_fluxes(problem, depth)[0])
+
+
+def _depth(problem: Problem, state: Array) -> Array:
+    return kernels.cell_depth(state, problem.bed, problem.lift, problem.reach, problem.film)
+
+
+def _residual(
+    problem: Problem, state: Array, depth: Array, rate: Array, viscosity: Array, momentum: dict[str, Array]
+) -> Array:
     out = kernels.rates(
         state,
         problem.bed,

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual, take
@@ -14,7 +15,12 @@ from vegglue.march import settle
 from vegglue.start import backwater
 from vegglue.steady import CLOSE, Factors, Solution, chord, finish, newton
 
-SIZE = 16
+# Neighbours that one factorisation serves, and how many are solved at once.
+SIZE, LANES = 64, 16
+# Who is not there after so many steps waits for the others, so many times.
+STEPS, ROUNDS = 8, 4
+# Solved members that a start is drawn from.
+NEAREST = 48
 TANGENT_STEP = 1e-4
 # Rows whose bed lies further than this [m] above the water are left out of the band that is solved.
 MARGIN = 0.1
@@ -33,17 +39,18 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class _Tangents:
-    """d state / d s_p (nx, 3, ny, 1) at one place of the unit cube."""
+class Known:
+    """A state (nx, 3, ny, 1) solved at one place of the unit cube, and d state / d s_p there."""
 
     place: Array
+    state: Array
     slopes: tuple[Array, ...]
 
-    def predict(self, state: Array, origin: Array, places: Array) -> Array:
-        """state + sum_p slope_p (s_p - origin_p), (nx, 3, ny, m), from the state (nx, 3, ny, 1) solved at origin."""
-        predicted = np.repeat(state, len(places), axis=3)
+    def predict(self, places: Array) -> Array:
+        """state + sum_p slope_p (s_p - place_p), (nx, 3, ny, m)."""
+        predicted = np.repeat(self.state, len(places), axis=3)
         for p, slope in enumerate(self.slopes):
-            predicted += slope * (places[:, p] - origin[p])
+            predicted += slope * (places[:, p] - self.place[p])
         return predicted
 
 
@@ -66,47 +73,97 @@ def leaves(places: Array, size: int) -> list[np.ndarray]:
     return cut(np.arange(len(places)), -(-len(places) // size), True)
 
 
-def solve_members(problem_of: ProblemOf, places: Array, tolerance: float) -> Solved:
-    """Steady states of all places; a member's does not depend on who else is asked for, beyond `tolerance`."""
+def known_middle(problem_of: ProblemOf, parameters: int, tolerance: float) -> Known | None:
+    """The member in the middle of the prior, for all others to begin from; None if it has to be marched."""
+    middle = np.full(parameters, 0.5)
+    return _solve_centre(problem_of, middle, None, tolerance).known
+
+
+def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin: Known | None = None) -> Solved:
+    """Steady states of all places; a member's does not depend on who else is asked for, beyond `tolerance`.
+
+    begin: where to come from; from a rough estimate if not given.
+    """
     whole = problem_of(places)
     (nx, ny), m = whole.shape, len(places)
-    state = np.full((nx, 3, ny, m), np.nan)
-    status, reason, iterations = np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64)
-    known: list[_Tangents] = []
+    solved = Solved(np.full((nx, 3, ny, m), np.nan), np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
+    known = [] if begin is None else [begin]
     for leaf in leaves(places, SIZE):
         pending = leaf
         while pending.size:
-            solved = np.flatnonzero(status != FAILED)
-            centre = _next_centre(places, pending, leaf, solved)
-            warm = _warm_start(places, centre, solved, state, known)
-            lead = _solve_centre(problem_of, whole, centre, places[centre], warm, tolerance)
-            iterations[centre] += lead.iterations
-            status[centre], reason[centre], state[..., centre] = lead.status, lead.reason, lead.state[..., 0]
+            there = np.flatnonzero(solved.status != FAILED)
+            centre = _next_centre(places, pending, leaf, there)
+            warm = _warm_start(places, centre, there, solved.state, known)
+            lead = _solve_centre(problem_of, places[centre], warm, tolerance)
+            solved.iterations[centre] += lead.iterations
+            solved.status[centre], solved.reason[centre] = lead.status, lead.reason
+            solved.state[..., centre] = lead.state[..., 0]
             pending = pending[pending != centre]
-            if lead.tangents is None:
-                continue
-            known.append(lead.tangents)
-            if pending.size == 0:
-                continue
-            start = lead.tangents.predict(lead.state, places[centre], places[pending])
-            assert lead.factors is not None
+            if lead.known is not None:
+                known.append(lead.known)
+                _follow(whole, places, pending, lead, solved, tolerance)
+                pending = pending[solved.status[pending] == FAILED]
+    return solved
+
+
+def _follow(
+    whole: Problem, places: Array, pending: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
+) -> None:
+    """Solve the neighbours of a centre with its factors, LANES at a time, and note them in `solved`.
+
+    Those that are not there after a round wait for the others, so that no lanes are kept for the slow.
+    """
+    assert lead.known is not None and lead.factors is not None
+    ny = solved.state.shape[2]
+    waiting = _spread(places, lead.known.place, pending)
+    for turn in range(ROUNDS):
+        left = []
+        for batch in np.split(waiting, range(LANES, waiting.size, LANES)):
+            start = solved.state[..., batch] if turn else _starts(places, lead, solved, batch)
             within = inside(start, lead.band)
-            followers = chord_in_band(take(whole, pending), within, lead.factors, lead.band, tolerance)
-            iterations[pending] += followers.iterations
-            there = followers.converged
-            status[pending[there]] = SOLVED_BY_NEWTON
-            state[..., pending[there]] = widen(followers.state[..., there], ny, lead.band)
-            pending = pending[~there]
-    return Solved(state, status, reason, iterations)
+            end = chord_in_band(take(whole, batch), within, lead.factors, lead.band, tolerance, STEPS)
+            solved.iterations[batch] += end.iterations
+            solved.status[batch[end.converged]] = SOLVED_BY_NEWTON
+            solved.state[..., batch] = widen(end.state, ny, lead.band)
+            left.append(batch[~end.converged & (end.correction < CLOSE)])
+        waiting = np.concatenate(left)
+        if not waiting.size:
+            break
 
 
-def _warm_start(places: Array, centre: int, solved: np.ndarray, state: Array, known: list[_Tangents]) -> Array | None:
+def _spread(places: Array, centre: Array, pending: np.ndarray) -> np.ndarray:
+    """Pending members, the furthest from all before first, so that most of them lie between others."""
+    chosen, order = places[pending], []
+    distance = ((chosen - centre) ** 2).sum(axis=1)
+    for _ in range(pending.size):
+        order.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((chosen - chosen[order[-1]]) ** 2).sum(axis=1))
+        distance[order] = -1.0
+    return pending[order]
+
+
+def _starts(places: Array, lead: "_Lead", solved: Solved, batch: np.ndarray) -> Array:
+    """Cubic splines through the solved members nearest to the centre, its tangents while there are too few."""
+    assert lead.known is not None
+    there = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
+    near = there[np.argsort(((places[there] - lead.known.place) ** 2).sum(axis=1), kind="stable")[:NEAREST]]
+    if near.size < 3 * (places.shape[1] + 1):
+        return lead.known.predict(places[batch])
+    spline = RBFInterpolator(places[near], np.eye(near.size), kernel="cubic", degree=1)
+    found = solved.state[..., near].reshape(-1, near.size) @ spline(places[batch]).T
+    return found.reshape(*solved.state.shape[:3], batch.size)
+
+
+def _warm_start(places: Array, centre: int, there: np.ndarray, state: Array, known: list[Known]) -> Array | None:
     """From the nearest solved member, along the nearest tangents."""
-    if solved.size == 0 or not known:
+    if not known:
         return None
-    nearest = int(solved[np.argmin(((places[solved] - places[centre]) ** 2).sum(axis=1))])
-    tangents = min(known, key=lambda some: float(((some.place - places[centre]) ** 2).sum()))
-    return tangents.predict(state[..., nearest : nearest + 1], places[nearest], places[centre][None])
+    here = places[centre]
+    tangents = min(known, key=lambda some: float(((some.place - here) ** 2).sum()))
+    if there.size == 0:
+        return tangents.predict(here[None])
+    nearest = there[np.argmin(((places[there] - here) ** 2).sum(axis=1))]
+    return replace(tangents, place=places[nearest], state=state[..., nearest : nearest + 1]).predict(here[None])
 
 
 @dataclass(frozen=True)
@@ -117,7 +174,7 @@ class _Lead:
     status: int
     reason: str
     iterations: int
-    tangents: _Tangents | None
+    known: Known | None
     factors: Factors | None
     band: tuple[int, int]
 
@@ -131,11 +188,9 @@ def _next_centre(places: Array, pending: np.ndarray, leaf: np.ndarray, solved: n
     return int(pending[np.argmin(distance)])
 
 
-def _solve_centre(
-    problem_of: ProblemOf, whole: Problem, centre: int, place: Array, warm: Array | None, tolerance: float
-) -> _Lead:
+def _solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolerance: float) -> _Lead:
     """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
-    problem = take(whole, np.array([centre]))
+    problem = problem_of(place[None])
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
         solution, shared, band = settled(problem, start, tolerance)
@@ -213,7 +268,7 @@ def _lead(
     ny = problem_of(place[None]).shape[1]
     slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared))
     state = widen(solution.state, ny, band)
-    return _Lead(state, SOLVED_BY_NEWTON, "", spent, _Tangents(place, slopes), shared, band)
+    return _Lead(state, SOLVED_BY_NEWTON, "", spent, Known(place, state, slopes), shared, band)
 
 
 def _tangents(
@@ -238,12 +293,17 @@ def _marched(problem: Problem, spent: int, tolerance: float) -> _Lead:
     return _Lead(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))
 
 
-def chord_in_band(problem: Problem, start: Array, shared: Factors, band: tuple[int, int], tolerance: float) -> Solution:
-    """All members from starts in a band of rows; one that outgrows it counts as not converged."""
+def chord_in_band(
+    problem: Problem, start: Array, shared: Factors, band: tuple[int, int], tolerance: float, most: int = 25
+) -> Solution:
+    """Members from their starts (nx, 3, rows, m) in the band of a centre, with its factors; one that outgrows the band
+    counts as not converged.
+    """
     part = crop(problem, *band)
-    solution = chord(part, start, shared, tolerance)
+    solution = chord(part, start, shared, tolerance, most)
     overflowing = overflows(part, solution.state, band, problem.shape[1])
-    return replace(solution, converged=solution.converged & ~overflowing)
+    correction = np.where(overflowing, np.inf, solution.correction)
+    return replace(solution, converged=solution.converged & ~overflowing, correction=correction)
 
 
 def _band(problem: Problem, start: Array) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from vegglue.ensemble import FAILED, Header
 from vegglue.errors import InputError
 from vegglue.fields import QUANTITIES, Window, excess, window_of
 from vegglue.flow import FlowFields, Problem
-from vegglue.neighbourhood import SIZE, leaves, solve_members
+from vegglue.neighbourhood import SIZE, Known, known_middle, leaves, solve_members
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile, sample_prior
 from vegglue.problem import build_problem
@@ -32,6 +32,7 @@ from vegglue.store import ensemble_writer
 # Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 Rows = dict[str, np.ndarray]
+Begin = dict[str, Known | None]
 
 
 @dataclass(frozen=True)
@@ -85,19 +86,32 @@ def _solve_all(
     todo: list[int],
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    tasks = ((index, case, site, observations, places[chunks[index]]) for index in todo)
+    begin = begin_at(case, site) if len(chunks) > 1 else {}
+    tasks = ((index, case, site, observations, places[chunks[index]], begin) for index in todo)
     yield from as_finished(_solve_numbered, tasks, jobs)
 
 
 def _solve_numbered(
-    index: int, case: Case, site: Site, observations: Observations, places: np.ndarray
+    index: int, case: Case, site: Site, observations: Observations, places: np.ndarray, begin: Begin
 ) -> tuple[int, Rows]:
-    return index, solve_chunk(case, site, observations, places)
+    return index, solve_chunk(case, site, observations, places, begin)
 
 
-def solve_chunk(case: Case, site: Site, observations: Observations, places: np.ndarray) -> Rows:
+def begin_at(case: Case, site: Site) -> Begin:
+    """Of every experiment, the member in the middle of the prior."""
+    return {
+        experiment: known_middle(
+            partial(_problem_at, case, site, experiment), len(case.parameters), case.numerics.tolerance
+        )
+        for experiment in case.experiments
+    }
+
+
+def solve_chunk(
+    case: Case, site: Site, observations: Observations, places: np.ndarray, begin: Begin | None = None
+) -> Rows:
     """The rows of the ensemble file for members at `places` of the unit cube, every experiment of the case, and as
-    `fields` (member, experiment, quantity, x, y) what is kept of their flow.
+    `fields` (member, experiment, quantity, x, y) what is kept of their flow. begin: where members come from.
     """
     station, sections = observations.table, section_places(observations)
     members, window = len(places), window_of(case, site.grid)
@@ -116,7 +130,7 @@ def solve_chunk(case: Case, site: Site, observations: Observations, places: np.n
     for number, experiment in enumerate(case.experiments):
         began = time.perf_counter()
         build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(build, places, case.numerics.tolerance)
+        solved = solve_members(build, places, case.numerics.tolerance, (begin or {}).get(experiment))
         here = (station["experiment"] == experiment).to_numpy()
         readings = read_sensors(build(places), solved.state, site.grid, station[here], sections, kept)
         rows["prediction"][:, here] = readings.prediction

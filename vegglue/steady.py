@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue import blocks
-from vegglue.flow import LEVEL, Array, Problem, residual, storage, take
+from vegglue.flow import LEVEL, Array, Problem, eased, friction_slope, residual, storage, take
 
 Single = NDArray[np.float32]
 
@@ -29,10 +29,11 @@ FRESH = 0.3
 
 @dataclass(frozen=True)
 class Factors:
-    """The eliminated Jacobian of one member: J^-1 costs three products a column."""
+    """The eliminated Jacobian of one member: J^-1 costs three products a column; and its slopes of friction [1/s]."""
 
     columns: Single
     far: Single
+    slope: Array
 
     def solve(self, right: Array) -> Array:
         """J^-1 right, (nx, 3, ny, m)."""
@@ -73,7 +74,9 @@ def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
 
 def factors(problem: Problem, state: Array) -> Factors:
     """Factors of J at one state."""
-    return _eliminate(*jacobian(problem, state))
+    columns, far = jacobian(problem, state)
+    blocks.factor(columns, far)
+    return Factors(columns, far, friction_slope(problem, state))
 
 
 def _stored(problem: Problem, state: Array) -> Single:
@@ -84,18 +87,13 @@ def _stored(problem: Problem, state: Array) -> Single:
     return stored.reshape(nx, 3 * ny)
 
 
-def _eliminate(columns: Single, far: Single) -> Factors:
-    """Factors in the place of the blocks."""
-    blocks.factor(columns, far)
-    return Factors(columns, far)
-
-
 def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, time_step: float = 10.0) -> Solution:
     """One member (m = 1) from a start that may be far away."""
     state, size = start, np.inf
     for iteration in range(1, most + 1):
-        rates, columns_far, stored = residual(problem, state), jacobian(problem, state), _stored(problem, state)
-        step, time_step = _bounded_step(rates, columns_far, stored, time_step)
+        slope = friction_slope(problem, state)
+        rates, columns_far, stored = eased(problem, state, slope), jacobian(problem, state), _stored(problem, state)
+        step, time_step = _bounded_step(rates, columns_far, stored, slope, time_step)
         size = float(np.abs(step).max())
         if not size < LONGEST:
             return _alone(state, size, iteration, False)
@@ -127,7 +125,7 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
 
 
 def _bounded_step(
-    rates: Array, columns_far: tuple[Single, Single], stored: Single, time_step: float
+    rates: Array, columns_far: tuple[Single, Single], stored: Single, slope: Array, time_step: float
 ) -> tuple[Array, float]:
     """-(D/dt + J)^-1 R with dt cut until no entry is longer than LONGEST; the last one tried if none is."""
     columns, far = columns_far
@@ -135,7 +133,8 @@ def _bounded_step(
     for _ in range(12):
         shifted = columns.copy()
         shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
-        step = -_eliminate(shifted, far).solve(rates)
+        blocks.factor(shifted, far)
+        step = -Factors(shifted, far, slope).solve(rates)
         if np.abs(step).max() < LONGEST:
             break
         time_step /= 4.0
@@ -193,7 +192,7 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
     active, running = np.arange(members), np.ones(members, dtype=bool)
     state, part, memory = start, problem, _Memory(start.shape)
     for iteration in range(1, most + 1):
-        step = -shared.solve(residual(part, state))
+        step = -shared.solve(eased(part, state, shared.slope))
         size = np.abs(step).max(axis=(0, 1, 2))
         now = active[running]
         iterations[now] = iteration
