@@ -113,7 +113,8 @@ def _follow(
 
     Those that are not there after a round wait for the others, so that no lanes are kept for the slow.
     """
-    assert lead.known is not None and lead.factors is not None
+    assert lead.known is not None
+    assert lead.factors is not None
     ny = solved.state.shape[2]
     waiting = _spread(places, lead.known.place, pending)
     for turn in range(ROUNDS):
