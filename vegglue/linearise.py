@@ -5,7 +5,7 @@ Places are z = Phi^-1(F(theta)), in which every prior is a standard normal: the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
@@ -43,6 +43,12 @@ class Model:
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self.case.parameters)
+
+    @cached_property
+    def rows(self) -> dict[str, np.ndarray]:
+        """Which stations stand in each experiment."""
+        names = self.station["experiment"].to_numpy()
+        return {experiment: np.flatnonzero(names == experiment) for experiment in self.case.experiments}
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None
         if flow is None:
             return None
         flows[experiment] = flow
-        rows = _rows(model, experiment)
+        rows = model.rows[experiment]
         prediction[rows], slope[rows] = _read_slopes(model, experiment, z, flow)
     return Point(z, prediction, slope, flows)
 
@@ -118,7 +124,7 @@ def predict_near(model: Model, point: Point, z: Array, lanes: int = 16) -> Array
 def _few_near(model: Model, point: Point, z: Array) -> Array:
     found = np.full((len(z), len(model.station)), np.nan)
     for experiment, flow in point.flows.items():
-        rows = _rows(model, experiment)
+        rows = model.rows[experiment]
         problem = problem_at(model, experiment, z)
         start = flow.state + flow.slopes @ (z - point.z).T
         solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
@@ -135,13 +141,13 @@ def fingerprint(model: Model, point: Point, changed: Sequence[tuple[Case, str, A
     found = np.zeros((len(model.station), len(changed)))
     tasks = [(model, point, experiment, changed) for experiment in point.flows]
     for experiment, prints in zip(point.flows, in_threads(_prints, tasks, -1), strict=True):
-        found[_rows(model, experiment)] = prints
+        found[model.rows[experiment]] = prints
     return found
 
 
 def _prints(model: Model, point: Point, experiment: str, changed: Sequence[tuple[Case, str, Amplitude]]) -> Array:
     """Fingerprints of one experiment, (stations of it, c); zero for what does not act in it."""
-    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), _rows(model, experiment)
+    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
     found = np.zeros((rows.size, len(changed)))
     here = [j for j, (case, _, _) in enumerate(changed) if _acts_in(case, experiment)]
     if not here:
@@ -170,7 +176,7 @@ def force_response(model: Model, point: Point, experiment: str) -> Array:
     By adjoints in single precision: one solve for each station.
     """
     flow = point.flows[experiment]
-    rows = _rows(model, experiment)
+    rows = model.rows[experiment]
     weights = reading_weights(model.station.iloc[rows], model.site.grid)[:, :, slice(*flow.band)]
     sensitivity = adjoints(flow.factors, weights)[:, ALONG]
     faces = np.moveaxis(sensitivity, -1, 0)
@@ -189,10 +195,6 @@ def problem_at(model: Model, experiment: str, z: Array) -> Problem:
 def _acts_in(case: Case, experiment: str) -> bool:
     last = list(case.effects.values())[-1]
     return last.experiments is None or experiment in last.experiments
-
-
-def _rows(model: Model, experiment: str) -> np.ndarray:
-    return np.flatnonzero((model.station["experiment"] == experiment).to_numpy())
 
 
 def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> Flowing | None:
@@ -235,7 +237,7 @@ def _causes(model: Model, experiment: str, z: Array, state: Array, band: tuple[i
 
 def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
     """Predictions (m, stations of the experiment) of states in a band."""
-    station = model.station.iloc[_rows(model, experiment)]
+    station = model.station.iloc[model.rows[experiment]]
     wide = widen(state, model.site.grid.y.size, band)
     return read_sensors(problem, wide, model.site.grid, station, ()).prediction
 

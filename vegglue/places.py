@@ -43,8 +43,7 @@ def spots(model: Model, point: Point, half_width: float) -> Spots:
         v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
         wet |= now.cell[..., 0] > 0.05
         pushed = -force_response(model, point, experiment) * (np.hypot(u, v) * u)
-        rows = np.flatnonzero((model.station["experiment"] == experiment).to_numpy())
-        traces[rows] = np.einsum("ai,nij,bj->nab", along, pushed, across, optimize=True)
+        traces[model.rows[experiment]] = np.einsum("ai,nij,bj->nab", along, pushed, across, optimize=True)
     there = along @ wet @ across.T > 0.5 * along.sum(axis=1)[:, None] * across.sum(axis=1)[None]
     a, b = np.nonzero(there)
     return Spots(x[a], y[b], radius, traces[:, a, b])

@@ -51,7 +51,7 @@ def _alone(model: Model, z: Array, jobs: int) -> Array:
     places = ndtr(z)
     tasks = [(model, experiment, places) for experiment in model.case.experiments]
     for experiment, readings in zip(model.case.experiments, in_threads(_read_alone, tasks, jobs), strict=True):
-        found[:, (model.station["experiment"] == experiment).to_numpy()] = readings
+        found[:, model.rows[experiment]] = readings
     found[np.isnan(found).any(axis=1)] = np.nan
     return found
 
@@ -59,7 +59,7 @@ def _alone(model: Model, z: Array, jobs: int) -> Array:
 def _read_alone(model: Model, experiment: str, places: Array) -> Array:
     build = partial(_problem, model, experiment)
     solved = solve_members(build, places, model.case.numerics.tolerance)
-    station = model.station[(model.station["experiment"] == experiment).to_numpy()]
+    station = model.station.iloc[model.rows[experiment]]
     prediction = read_sensors(build(places), solved.state, model.site.grid, station, ()).prediction
     prediction[solved.status == FAILED] = np.nan
     return prediction
