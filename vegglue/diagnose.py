@@ -28,7 +28,8 @@ from vegglue.verdict import Misfit, judged, misfit_zones
 ACCEPTED, FLAGGED, COMPARED = 3, 6, 12
 # A second effect must be this much surer than a first one.
 FURTHER = 0.2
-# Logarithm of the odds by which a place must beat every listed effect, or a single station both.
+# Logarithm of the odds by which a place must beat every listed effect, or a single station both: 20 to 1, where strong
+# evidence begins (Kass and Raftery 1995, doi:10.2307/2291091). From 1 to 6 only one station of open-b depends on it.
 CLEARLY = 3.0
 Say = Callable[[str], None]
 

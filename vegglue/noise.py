@@ -15,7 +15,8 @@ from vegglue.effect import Array
 from vegglue.errors import InputError
 
 # How much of the difference between a grid and one of twice its size is taken as the error of the finer one [-]:
-# 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two.
+# 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to
+# open-f are the same and amplitudes move by 1.5 %; with 0 something is found where nothing is hidden.
 OF_DIFFERENCE = 0.6
 # Difference of twice the log-likelihood above which stated errors count as too small (1 % of chi2 with one degree).
 TOO_SMALL = 6.6
