@@ -33,7 +33,7 @@ from vegglue.errors import InputError
 from vegglue.extend import candidate_named
 from vegglue.ladder import improvement, rung
 from vegglue.linearise import Model, linearise, z_at
-from vegglue.loop import model_in
+from vegglue.loop import model_in, rivals_of
 from vegglue.reveal import marks
 from vegglue.schema import Case
 from vegglue.twin import Answer, Ground, candidate_of, ground_at, hiding, measured, true_place
@@ -174,11 +174,7 @@ def held_out_gain(model: Model, found: Diagnosis) -> float:
 def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosis, seed: int) -> dict[str, Any] | None:
     """The best next measurement, made and added: groups of the first step before and after; None if none is of use."""
     base = calibrated(model, found.first_parameters)
-    rivals = []
-    for name in found.steps[0].rivals:
-        suspect = next(one for one in found.suspects if one.name == name)
-        candidate = candidate_named(model.case, model.station, name)
-        rivals.append((candidate, suspect.shapes, candidate.effect.amplitude.gain(suspect.amplitude)))
+    rivals = rivals_of(model.case, found, found.steps[0].rivals)
     best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
         return None

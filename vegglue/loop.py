@@ -246,13 +246,13 @@ def next_measurements(
 def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
     """In words, and the rivals of each."""
     if len(names) > 1:
-        return [(" from ".join(names), _rivals(case, found, names))]
+        return [(" from ".join(names), rivals_of(case, found, names))]
     hidden = [one for one in found.suspects if not one.testable and not found.steps]
     # What calibration hides best, of all that would leave a trace without it.
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
     single = [one for one in found.suspects if one.name in names and not found.steps] or strongest
     return [
-        (f"{one.name} from a change of {one.mimicked_by}", _rivals(case, found, [one.name], plausible=True))
+        (f"{one.name} from a change of {one.mimicked_by}", rivals_of(case, found, [one.name], plausible=True))
         for one in single
     ]
 
@@ -264,7 +264,8 @@ def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
     return SEEN * amplitude.plausible / seen / max(suspect.visibility, 1e-6)
 
 
-def _rivals(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
+def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
+    """Effects of a diagnosis by name, at the size it found or a plausible one."""
     rivals: list[Rival] = []
     for suspect in (one for one in found.suspects if one.name in names):
         candidate = candidate_named(case, found.station, suspect.name)
