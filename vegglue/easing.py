@@ -59,6 +59,8 @@ def ease(out, state, depth, drag, west, slope, film):
     nx, _, ny, m = state.shape
     for i in range(nx):
         for j in range(ny):
+            if depth[i, j].min() > 2.0 * THIN * film:
+                continue
             for e in (1, 2):
                 if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
                     continue

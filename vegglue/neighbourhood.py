@@ -118,6 +118,8 @@ def _follow(
     ny = solved.state.shape[2]
     waiting = _spread(places, lead.known.place, pending)
     for turn in range(ROUNDS):
+        if not waiting.size:
+            break
         left = []
         for batch in np.split(waiting, range(LANES, waiting.size, LANES)):
             start = solved.state[..., batch] if turn else _starts(places, lead, solved, batch)
@@ -128,8 +130,6 @@ def _follow(
             solved.state[..., batch] = widen(end.state, ny, lead.band)
             left.append(batch[~end.converged & (end.correction < CLOSE)])
         waiting = np.concatenate(left)
-        if not waiting.size:
-            break
 
 
 def _spread(places: Array, centre: Array, pending: np.ndarray) -> np.ndarray:
