@@ -147,16 +147,17 @@ def _draw_sets(records: Sequence[Record]) -> Figure:
 
 def _draw_alarms(records: Sequence[Record]) -> Figure:
     """Shares with their intervals: alarms without anything hidden, finds by the ratio."""
-    figure = Figure(figsize=(6, 2.6), layout="constrained")
+    counted = [(label, *counts(records, groups, met)) for label, groups, met, _ in LINES]
+    shown = [(label, good, size) for label, good, size in counted if size]
+    figure = Figure(figsize=(8, 0.8 + 0.24 * len(shown)), layout="constrained")
     axes = figure.subplots()
-    for row, (_, groups, met, _) in enumerate(LINES):
-        good, size = counts(records, groups, met)
-        low, high = interval(good, size)
-        axes.plot([low, high], [-row, -row], color="#1c5d99")
-        axes.plot([good / size if size else np.nan], [-row], "o", color="#1c5d99", markersize=4)
-    axes.set_yticks([-row for row in range(len(LINES))], [label for label, *_ in LINES], fontsize=6)
+    for row, (_, good, size) in enumerate(shown):
+        axes.plot(interval(good, size), [-row, -row], color="#1c5d99")
+        axes.plot([good / size], [-row], "o", color="#1c5d99", markersize=4)
+    axes.set_yticks([-row for row in range(len(shown))], [f"{label} ({size})" for label, _, size in shown], fontsize=8)
     axes.set_xlim(0, 1)
-    axes.set_xlabel("share of data sets, 95 % interval")
+    axes.grid(axis="x", linewidth=0.4)
+    axes.set_xlabel("share of data sets (their number), 95 % interval")
     return figure
 
 
