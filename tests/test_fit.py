@@ -10,7 +10,7 @@ import scipy.stats
 
 from vegglue.effect import Array
 from vegglue.fit import MOST_STEPS, SETTLED, fit, objective
-from vegglue.linearise import Point
+from vegglue.linearise import FURTHEST, Point
 from vegglue.noise import noise_of
 
 MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
@@ -45,6 +45,19 @@ def test_a_search_ends_beside_a_bound(asked: list[Array], start: tuple[float, fl
     assert found.settled
     assert found.objective < best.fun + 2.0 * SETTLED
     assert len(asked) < MOST_STEPS
+
+
+def test_a_search_ends_at_the_end_of_all_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ever more of a parameter would help, but further out it is no longer told from the bound of its prior."""
+
+    def endless(model: Any, z: Array, near: Point | None) -> Point:
+        slope = np.array([[1.0 if np.abs(z[0]) < FURTHEST else 0.5, 0.0]] * 2 + [[0.0, 0.5]])  # by central differences
+        return Point(z, np.array([*np.clip(z[[0, 0]], -FURTHEST, FURTHEST), 0.5 * z[1]]), slope, {})
+
+    monkeypatch.setattr("vegglue.fit.linearise", endless)
+    found = fit(None, noise_of(MEASURED.assign(value=[9.0, 9.0, 0.3])), endless(None, np.zeros(2), None))  # type: ignore[arg-type]
+    assert found.settled
+    assert found.point.z == pytest.approx([FURTHEST, 0.6], abs=0.01)
 
 
 def test_a_place_without_flow_is_stepped_back_from(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.effect import Array
-from vegglue.linearise import Model, Point, linearise, theta_at
+from vegglue.linearise import FURTHEST, Model, Point, linearise, theta_at
 from vegglue.noise import Noise
 
 # A step that promises less than this improvement of the misfit ends the search.
@@ -84,4 +84,5 @@ def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:
         step = np.linalg.solve(matrix + damping * np.eye(point.z.size), right)
         if np.abs(step).max() <= longest:
             break
+    step = np.clip(point.z + step, -FURTHEST, FURTHEST) - point.z  # further out nothing changes any more
     return np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
