@@ -80,9 +80,12 @@ def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:
     slope = noise.whiten(noise.used(point.slope))
     left = noise.whiten(noise.residual(point.prediction))
     matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ left - point.z
+    # Further out nothing changes any more: what would go there is held, and does not keep the others back.
+    held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
+    matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
     for damping in DAMPINGS:
         step = np.linalg.solve(matrix + damping * np.eye(point.z.size), right)
         if np.abs(step).max() <= longest:
             break
-    step = np.clip(point.z + step, -FURTHEST, FURTHEST) - point.z  # further out nothing changes any more
+    step = np.clip(point.z + step, -FURTHEST, FURTHEST) - point.z
     return np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
