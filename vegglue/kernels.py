@@ -57,7 +57,7 @@ def _afloat(depth: float, half_per_film: float) -> float:
 @compiled
 def depths(level, bed, lift, reach, outlet_level, film):
     """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed, at corners
-    that of the point itself, times the wet share of a cell that the waterline crosses (twice its mean depth).
+    that of the point itself.
 
     reach (nx, ny): half the range of the bed within a cell [m]; lift (nx, ny, m): by how much members' beds lie higher
     [m], or empty.
@@ -87,11 +87,6 @@ def depths(level, bed, lift, reach, outlet_level, film):
         for k in range(m):
             face_y[i, ny, k] = cell[i, ny - 1, k]
             corner[i, 0, k] = 0.0
-    for i in range(1, nx):
-        for j in range(1, ny):
-            for k in range(m):
-                least = min(cell[i, j, k], cell[i - 1, j, k], cell[i, j - 1, k], cell[i - 1, j - 1, k])
-                corner[i, j, k] = min(corner[i, j, k], 2.0 * least)
     corner[0] = 0.0
     last, before = nx - 1, max(nx - 2, 0)
     for j in range(ny):
