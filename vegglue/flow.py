@@ -302,7 +302,7 @@ def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, 
 def residual(problem: Problem, state: Array) -> Array:
     """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
     depth = _depth(problem, state)
-    return _residual(problem, state, depth, *closed(problem, state, depth))
+    return _residual(problem, state, depth, _side_fluxes(problem, depth), *closed(problem, state, depth))
 
 
 def eased(problem: Problem, state: Array, slope: Array) -> Array:
@@ -312,8 +312,9 @@ def eased(problem: Problem, state: Array, slope: Array) -> Array:
     """
     depth = _depth(problem, state)
     rate, viscosity, momentum = closed(problem, state, depth)
-    out = _residual(problem, state, depth, rate, viscosity, momentum)
-    easing.ease(out, state, depth, rate, _side_fluxes(problem, depth)[0], slope, problem.film)
+    sides = _side_fluxes(problem, depth)
+    out = _residual(problem, state, depth, sides, rate, viscosity, momentum)
+    easing.ease(out, state, depth, rate, sides[0], slope, problem.film)
     return out
 
 
@@ -329,7 +330,13 @@ def _depth(problem: Problem, state: Array) -> Array:
 
 
 def _residual(
-    problem: Problem, state: Array, depth: Array, rate: Array, viscosity: Array, momentum: dict[str, Array]
+    problem: Problem,
+    state: Array,
+    depth: Array,
+    sides: tuple[Array, Array, Array],
+    rate: Array,
+    viscosity: Array,
+    momentum: dict[str, Array],
 ) -> Array:
     out = kernels.rates(
         state,
@@ -338,7 +345,7 @@ def _residual(
         problem.reach,
         rate,
         viscosity,
-        *_side_fluxes(problem, depth),
+        *sides,
         problem.outlet,
         problem.outlet_level,
         problem.film,
