@@ -9,9 +9,9 @@ from channels import GRAVITY, centres, discharge, make_problem, river, sloping, 
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from vegglue import easing, kernels
+from vegglue import kernels
 from vegglue.contract import mirrored
-from vegglue.flow import ACROSS, ALONG, LEVEL, Inflow, eased, faces, friction_slope, residual, take
+from vegglue.flow import ACROSS, ALONG, LEVEL, Inflow, faces, residual, take
 from vegglue.march import march, settle
 from vegglue.neighbourhood import solve_members
 from vegglue.sensor import read_sensors
@@ -114,35 +114,6 @@ def test_a_member_alone_is_the_member_in_a_batch():
         alone = (residual(one, own), march(one, own, 0.5, 50), chord(one, own, shared, 1e-9).state)
         for all_of_them, by_itself in zip(together, alone, strict=True):
             assert np.abs(all_of_them[..., member] - by_itself[..., 0]).max() < 1e-10
-
-
-def test_easing_moves_no_root_and_leaves_deep_water():
-    """Eased rows vanish with the residual, and only with it; they are the residual's where water is not thin."""
-    problem = river()
-    state = solved(problem)
-    slope = friction_slope(problem, state)
-    assert np.abs(eased(problem, state, slope)).max() < 1e-8
-    moved = disturbed(state, 1e-3)
-    plain, other = residual(problem, moved), eased(problem, moved, slope)
-    deep = np.minimum(faces(problem, moved).cell[:-1], faces(problem, moved).cell[1:]) > easing.THIN * problem.film
-    assert (plain[:-1, ALONG] == other[:-1, ALONG])[deep].all()
-    changed = plain != other
-    assert changed[:, ALONG].any()
-    assert (np.sign(plain) == np.sign(other))[changed].all()
-
-
-def test_easing_is_exact_where_friction_is_all():
-    """In a film the root of k |U| u = -g dz/dx in one step, from ten times its speed."""
-    problem = river()
-    state = solved(problem)
-    film = faces(problem, state).cell[:-1] < 0.2 * problem.film
-    assert film.any()
-    slope = friction_slope(problem, state)
-    faster = state.copy()
-    faster[:-1, ALONG] = np.where(film, 10.0 * state[:-1, ALONG] + 1e-3, state[:-1, ALONG])
-    step = eased(problem, faster, slope)[:-1, ALONG][film] / slope[:-1, ALONG][film]
-    error = np.abs(faster[:-1, ALONG][film] - step - state[:-1, ALONG][film])
-    assert np.median(error) < 0.1 * np.median(np.abs(state[:-1, ALONG][film]))
 
 
 def test_members_do_not_depend_on_their_company():
