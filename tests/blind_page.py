@@ -29,6 +29,11 @@ def caught(record: Record) -> bool:
     return all(mark["found"] for mark in record["marks"])
 
 
+def covered(record: Record) -> bool:
+    """Everything hidden is in the 95 % set: in what is named, or, where nothing stands out, in what is not excluded."""
+    return all(mark["found"] or mark["hidden"]["name"] in record["not_excluded"] for mark in record["marks"])
+
+
 def told_apart(record: Record) -> bool:
     """Identified, or a set of at most three groups."""
     return bool(record["steps"]) and record["verdict"] in ("identified", "one-of") and set_size(record) <= 3
@@ -74,8 +79,10 @@ LINES: tuple[tuple[str, tuple[str, ...], Callable[[Record], bool | None], str], 
     ("False alarms, nothing hidden, white errors", ("null-white",), alarmed, "at most 7 %"),
     ("False alarms, nothing hidden, errors of neighbours correlated by 0.5", ("null-ar1",), alarmed, "at most 7 %"),
     ("False alarms, nothing hidden, errors 1.5 times those stated", ("null-understated",), alarmed, "at most 7 %"),
-    ("Hidden effect in the set, ratio 3", ("snr3",), caught, "at least 90 %"),
-    ("Hidden effect in the set, ratio 6", ("snr6",), caught, "at least 90 %"),
+    ("Hidden effect in the 95 % set, ratio 3", ("snr3",), covered, "at least 90 %"),
+    ("Hidden effect in the 95 % set, ratio 6", ("snr6",), covered, "at least 90 %"),
+    ("... and something stands out at all, ratio 3", ("snr3",), caught, "-"),
+    ("... and something stands out at all, ratio 6", ("snr6",), caught, "-"),
     ("Identified, or at most three groups, ratio 3", ("snr3",), told_apart, "at least 50 %"),
     ("Identified, or at most three groups, ratio 6", ("snr6",), told_apart, "at least 90 %"),
     ("A wrong name alone, listed effects, ratio 3", ("snr3",), wrongly_named, "-"),
@@ -163,7 +170,7 @@ def _draw_alarms(records: Sequence[Record]) -> Figure:
 
 PAGE = """# How often the diagnosis is right
 
-Measured on {count} small twins (`make blind`): a channel of 64 x 20 cells with two patches, three experiments, 81
+Measured on {count} small twins (`make blind`): a channel of 64 x 40 cells with two patches, three experiments, 81
 velocities and 12 gauges (`configs/twin.yaml`). The truth of each is computed on cells two thirds as long and wide, at
 parameters 0.3 to 1 standard deviations off the centre of their priors, with new errors in each. An effect is as large
 as makes it visible at the ratio stated (length of its trace, whitened, after what calibration can mimic is taken off)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blind_page import caught, counts, interval, pair_printed, set_size, told_apart, write_page, wrongly_named
+from blind_page import caught, counts, covered, interval, pair_printed, set_size, told_apart, write_page, wrongly_named
 from scipy import stats
 
 
@@ -12,10 +12,13 @@ def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, 
     """The hidden effect is `eddies`; each rival is a group of its own."""
     steps = [{"accepted": rivals[0], "rivals": list(rivals), "groups": [[name] for name in rivals]}] if rivals else []
     inside = "eddies" in rivals
-    mark = {"found": inside, "inside": inside, "named": rivals == ("eddies",), "amplitude": None, "away": None}
+    mark = {
+        "hidden": {"name": "eddies"}, "found": inside, "inside": inside, "named": rivals == ("eddies",),
+        "amplitude": None, "away": None,
+    }  # fmt: skip
     return {
         "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
-        "verdict": verdict, "steps": steps, "set": list(rivals), "alike": {}, "seconds": 3.0,
+        "verdict": verdict, "steps": steps, "set": list(rivals), "not_excluded": [], "alike": {}, "seconds": 3.0,
         "gain": 1e-4 if rivals else None,
     } | changes  # fmt: skip
 
@@ -33,6 +36,8 @@ def test_what_counts_as_what() -> None:
     assert counts(everything, ["snr6"], told_apart) == (2, 4)
     assert counts(everything, ["snr6"], wrongly_named) == (1, 4)
     assert counts(everything, ["snr3"], caught) == (0, 0)
+    hiding = SILENT | {"not_excluded": ["sun", "eddies"]}
+    assert counts([*everything, hiding], ["snr6"], covered) == (3, 5), "not excluded where nothing stands out"
     assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
 
 
@@ -56,7 +61,7 @@ def test_the_page(tmp_path: Path) -> None:
     write_page([NAMED, WRONG, MANY, SILENT, LEFT_OUT], tmp_path)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert "Measured on 4 small twins" in page
-    assert "| Hidden effect in the set, ratio 6 | 2 | 4 | 50.0% |" in page
+    assert "| Hidden effect in the 95 % set, ratio 6 | 2 | 4 | 50.0% |" in page
     assert "`sun`" in page
     for name in ("sets", "alarms"):
         assert f"blind-{name}.svg" in page

@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.stats
 
 from vegglue.errors import InputError
-from vegglue.noise import covariance_of, estimated, noise_of, with_correlation, with_grid_error, without
+from vegglue.noise import covariance_of, drawn, estimated, noise_of, with_correlation, with_grid_error, without
 
-SECTIONS, STATIONS = 8, 20
+SECTIONS, STATIONS, TRIES = 8, 20, 60
 
 
 def stations(error: float = 0.01) -> pd.DataFrame:
@@ -83,3 +84,20 @@ def test_a_station_without_a_standard_error_is_named() -> None:
     with pytest.raises(InputError, match=r"x = 0, y = 2\.1 m"):
         noise_of(table)
     assert noise_of(table, {"velocity": 0.02}).error[7] == 0.02
+
+
+def test_doubt_about_the_correlation_keeps_alarms_rare() -> None:
+    random, physics = np.random.default_rng(9), smooth()
+    traces = np.linalg.qr(np.kron(np.ones((SECTIONS, 1)), smooth()[:STATIONS, :4]))[0]
+    alarms = {"known": 0, "doubted": 0}
+    for _ in range(TRIES):
+        left = correlated(0.6, random)
+        noise = estimated(noise_of(stations()), left, physics)
+        white = noise.whiten(traces)
+        score = np.abs(noise.whiten(left) @ white / np.linalg.norm(white, axis=0)).max()
+        certain = with_correlation(noise, noise.correlation, noise.scale)
+        for name, one in (("known", certain), ("doubted", noise)):
+            errors = drawn(one, 1000, random) @ white / np.linalg.norm(white, axis=0)
+            alarms[name] += int(score > np.quantile(np.abs(errors).max(axis=1), 0.95))
+    assert alarms["doubted"] < alarms["known"], "a correlation that is only estimated makes alarms of its own"
+    assert scipy.stats.binomtest(alarms["doubted"], TRIES, 0.05).pvalue > 1e-3

@@ -54,7 +54,8 @@ def test_family_wise_chances_are_uniform_under_the_null(problem: tuple[np.ndarra
     slopes, prints = problem
     random = np.random.default_rng(11)
     projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    maxima = (score.null_draws(projected, np.zeros(PRINTS, bool), 3) ** 2).max(axis=1)
+    errors = random.standard_normal((score.DRAWS, ROWS))
+    maxima = (score.null_draws(projected, np.zeros(PRINTS, bool), errors, 3) ** 2).max(axis=1)
     chances = []
     for _ in range(400):
         again = score.project(slopes, random.standard_normal(ROWS), random.standard_normal(SLOPES), prints)

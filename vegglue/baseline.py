@@ -9,13 +9,15 @@ from vegglue.errors import InputError
 from vegglue.fit import Fitted, fit, objective
 from vegglue.ground import cells_across
 from vegglue.linearise import Model, Point, linearise
-from vegglue.noise import Noise, noise_of, with_grid_error
+from vegglue.noise import Noise, noise_of, scattered, with_grid_error
 from vegglue.schema import Case
 from vegglue.site import build_site
 
 # Places of the prior that are looked at on the coarse grid, and how many of them are followed downhill.
 LOOKED_AT, FOLLOWED = 8, 2
 FEWEST_CELLS = 6
+# Length over width of cells above which a coarser grid has wider ones only: across the flow is where the error is.
+LONG = 2.0
 # Cells across the floor below which a grid is no place to compare effects.
 ENOUGH_ACROSS = 7.0
 
@@ -23,7 +25,7 @@ ENOUGH_ACROSS = 7.0
 @dataclass(frozen=True)
 class Baseline:
     """A model at its best place; coarse, on_coarse: the same on cells of twice the size and its point at the same
-    place, when the grid can be halved.
+    place, when the grid can be coarsened.
     """
 
     model: Model
@@ -70,6 +72,12 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     return Baseline(model, noise, fitted, coarse, on_coarse)
 
 
+def for_prediction(base: Baseline) -> Baseline:
+    """The same model calibrated so that it predicts on its own grid, whatever a finer one would say."""
+    noise = scattered(base.noise)
+    return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
+
+
 def _searched(model: Model, noise: Noise) -> Point:
     """The best place of a model, from the best of some places of its prior."""
     return min((fit(model, noise, start) for start in _starts(model, noise)), key=lambda found: found.objective).point
@@ -89,11 +97,15 @@ def grid_difference(point: Point, on_coarse: Point | None) -> Array:
 
 
 def coarser(model: Model) -> Model | None:
-    """The model on cells of twice the size; None where their number is odd or would become too small."""
+    """The model on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
+
+    None where their number is odd or would become too small.
+    """
     grid = model.site.grid
-    if grid.x.size % 2 or grid.y.size % 2 or min(grid.x.size, grid.y.size) < 2 * FEWEST_CELLS:
+    along, across = (1 if grid.dx > LONG * grid.dy else 2), 2
+    if grid.x.size % along or grid.y.size % across or min(grid.x.size / along, grid.y.size / across) < FEWEST_CELLS:
         return None
-    cell = (2.0 * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])
+    cell = (along * model.case.grid.cell[0], across * model.case.grid.cell[1])
     case: Case = model.case.model_copy(update={"grid": model.case.grid.model_copy(update={"cell": cell})})
     return Model(case, build_site(case), model.station)
 

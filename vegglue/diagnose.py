@@ -28,6 +28,9 @@ from vegglue.verdict import Misfit, judged, misfit_zones
 ACCEPTED, FLAGGED, COMPARED = 3, 6, 12
 # A second effect must be this much surer than a first one.
 FURTHER = 0.2
+# Share of an accepted trace, in standard errors, that the model may have put wrong, and that another one then picks up:
+# with the true effect in open-c and open-e 0.1 of their length was left along one other trace, at the waterline.
+BESIDE = 0.1
 # Logarithm of the odds by which a place must beat every listed effect, or a single station both: 20 to 1, where strong
 # evidence begins (Kass and Raftery 1995, doi:10.2307/2291091). From 1 to 6 only one station of open-b depends on it.
 CLEARLY = 3.0
@@ -67,7 +70,8 @@ def diagnose(model: Model, known: Array | None = None, jobs: int = -1, say: Say 
 
 def _alarm(seen: Look, steps: Sequence[Step]) -> str:
     """What the residual points at most surely: 'effect', 'place', 'station', or '' when errors alone explain it."""
-    effect, place, station = seen.effects.log_p, seen.places.log_p, seen.stations.log_p
+    slack = BESIDE * float(np.sqrt(sum(max(one.chi2_before - one.chi2_after, 0.0) for one in steps)))
+    effect, place, station = (family.log_p(slack) for family in (seen.effects, seen.places, seen.stations))
     strictness = FURTHER if steps else 1.0
     if station < np.log(0.01) and station < min(effect, place) - CLEARLY:
         return "station"

@@ -1,7 +1,7 @@
 """What a diagnosis says: the verdict, the effects that explain the misfit, where it lies, and all numbers behind it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
@@ -15,6 +15,8 @@ from vegglue.layout import Group, Variable, table_group
 Verdict = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
 # Sum over families of what the data may accuse without cause: listed effects and unlisted places.
 ALARM, ALARM_OF_PLACES = 0.04, 0.01
+# What an effect scores at least, 19 times of 20, when its trace is three standard errors long.
+HIDING = 3.0 - 1.645
 # Fields that are lists or tables of plain values.
 LISTS = ("remarks", "flagged", "first_scores", "first_parameters", "parameters")
 # Fields that have one value for each station.
@@ -116,8 +118,18 @@ class Diagnosis:
         return list(dict.fromkeys(name for step in self.steps for name in step.rivals))
 
     @property
+    def not_excluded(self) -> list[str]:
+        """Where nothing stood out: effects that may be hiding all the same, the most suspect first."""
+        return [] if self.steps else hiding(self.suspects)
+
+    @property
     def groups(self) -> list[list[str]]:
         return [list(group) for step in self.steps for group in step.groups]
+
+
+def hiding(suspects: Iterable[Suspect]) -> list[str]:
+    """Effects whose score leaves open that they are there, with a trace of three standard errors."""
+    return [one.name for one in suspects if abs(one.score) > HIDING]
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -127,6 +139,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "sentence": diagnosis.sentence,
         "set": diagnosis.set,
         "groups": diagnosis.groups,
+        "not_excluded": diagnosis.not_excluded,
         "where": None if diagnosis.where is None else asdict(diagnosis.where),
         "effects": [asdict(suspect) for suspect in diagnosis.suspects],
         "steps": [asdict(step) for step in diagnosis.steps],

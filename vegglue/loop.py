@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.aside import aside_of, without
-from vegglue.baseline import Baseline, baseline
+from vegglue.baseline import Baseline, baseline, for_prediction
 from vegglue.candidates import Candidate, change_of, start_of
 from vegglue.config import as_yaml, case_hash, load_case, resolved_yaml
 from vegglue.design import Rival, Worth, worth_of_measurements
@@ -104,8 +104,8 @@ def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
 
 
 def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
-    """The case at its best place, which is kept for the next command; aside: measurements that are left out."""
-    base = baseline(without(model_in(case), aside), known_place(case, folder))
+    """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
+    base = for_prediction(baseline(without(model_in(case), aside), known_place(case, folder)))
     remember_place(case, folder, _theta(base))
     return base
 

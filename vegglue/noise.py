@@ -1,8 +1,10 @@
 """What a residual may be without anything missing: errors of the data, correlated along a section, and of the grid.
 
-cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation
+cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation,
+E_ij = (c + (1 - c) 1_ij) g_i g_j, c the share that all stations have in common
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +20,15 @@ from vegglue.errors import InputError
 # 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to
 # open-f are the same and amplitudes move by 1.5 %; with 0 something is found where nothing is hidden.
 OF_DIFFERENCE = 0.6
+# Share of that error which all stations have in common: where one grid is too fast, the misfit looks as its difference
+# to another grid does, and is no evidence of anything missing.
+COMMON = 0.5
 # Difference of twice the log-likelihood above which stated errors count as too small (1 % of chi2 with one degree).
 TOO_SMALL = 6.6
 # Correlations, and sizes of what else there is, from the best of which the search for the likeliest begins.
 RHO, SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
+# Correlations among which the doubt about it is spread, and how likely none is before the data have spoken: as some.
+DOUBTED, NONE = np.linspace(0.05, 0.95, 19), 0.5
 
 
 @dataclass(frozen=True)
@@ -32,10 +39,12 @@ class Noise:
     value: Array
     error: Array
     apart: Array  # |y_i - y_j| over the usual spacing, infinite between sections (n, n)
-    grid: Array  # half a difference of two grids (n,), zero when unknown
+    grid: Array  # error of the grid (n,), zero when unknown
+    common: float  # share of the grid's error that all stations have in common
     correlation: float
     scale: float
     lower: Array  # Cholesky factor of the covariance
+    doubt: Array  # correlations that the residual leaves open, and the chance of each (2, k)
 
     def used(self, values: Array) -> Array:
         """Rows of the used stations, of (station, ...)."""
@@ -81,7 +90,8 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     zero = np.zeros(len(used))
     rows = np.flatnonzero(station["used"].to_numpy(bool))
     value = used["value"].to_numpy(float)
-    return _factored(Noise(rows, value, error, _apart(used), zero, 0.0, 1.0, np.diag(error)))
+    known = np.array([[0.0], [1.0]])
+    return _factored(Noise(rows, value, error, _apart(used), zero, COMMON, 0.0, 1.0, np.diag(error), known))
 
 
 def with_grid_error(noise: Noise, difference: Array) -> Noise:
@@ -89,8 +99,17 @@ def with_grid_error(noise: Noise, difference: Array) -> Noise:
     return _factored(replace(noise, grid=OF_DIFFERENCE * difference[noise.rows]))
 
 
+def scattered(noise: Noise) -> Noise:
+    """The same with an error of the grid that is each station's own: for predictions on that very grid.
+
+    A common one leaves the fit free to shift all stations as a finer grid would, and with them all it predicts.
+    """
+    return _factored(replace(noise, common=0.0))
+
+
 def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
-    return _factored(replace(noise, correlation=correlation, scale=scale))
+    known = np.array([[correlation], [1.0]])
+    return _factored(replace(noise, correlation=correlation, scale=scale, doubt=known))
 
 
 def without(noise: Noise, outliers: np.ndarray) -> Noise:
@@ -108,17 +127,11 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
     with F (n, k) all that calibration and missing effects could do to the predictions: what is smooth in that way is
     not taken for noise. rho >= 0; s only when the stated errors are too small beyond doubt.
     """
-
-    def cost(rho: float, scale: float, log_t: float) -> float:
-        covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
-        factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
-        return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
-
-    gram = explained @ explained.T
+    cost = _cost_of(noise, left, explained)
     begin = [(cost(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho in RHO for t in SIZES]
     _, *start = min(begin)
 
-    def best(scale_free: bool) -> tuple[float, float, float]:
+    def best(scale_free: bool) -> tuple[float, float, float, float]:
         def unfold(x: Array) -> tuple[float, float, float]:
             rho, scale = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[2], -3.0, 3.0)) if scale_free else 1.0
             return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
@@ -129,11 +142,45 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
             method="Nelder-Mead",
             options={"xatol": 0.02, "fatol": 0.02},
         )
-        return float(end.fun), *unfold(end.x)[:2]
+        return float(end.fun), *unfold(end.x)
 
     fixed, free = best(False), best(True)
-    _, rho, scale = free if fixed[0] - free[0] > TOO_SMALL and free[2] > 1.0 else fixed
-    return with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
+    _, rho, scale, log_t = free if fixed[0] - free[0] > TOO_SMALL and free[2] > 1.0 else fixed
+    found = with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
+    return replace(found, doubt=_doubt(lambda level: cost(level, scale, log_t)))
+
+
+def _cost_of(noise: Noise, left: Array, explained: Array) -> Callable[[float, float, float], float]:
+    """-2 log-likelihood of rho, s and ln t, but for a constant."""
+    gram = explained @ explained.T
+
+    def cost(rho: float, scale: float, log_t: float) -> float:
+        covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
+        factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
+        return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
+
+    return cost
+
+
+def _doubt(cost: Callable[[float], float]) -> Array:
+    """Correlations, none among them, and how likely each is (2, k); cost: -2 log-likelihood of one."""
+    levels = np.concatenate([[0.0], DOUBTED])
+    costs = np.array([cost(float(level)) for level in levels])
+    before = np.where(levels == 0.0, NONE, (1.0 - NONE) / DOUBTED.size)
+    chance = before * np.exp(-0.5 * (costs - costs.min()))
+    return np.stack([levels, chance / chance.sum()])
+
+
+def drawn(noise: Noise, draws: int, random: np.random.Generator) -> Array:
+    """Whitened errors (draws, n) whose correlation is one of those left open, as likely as it is.
+
+    Independent and of size one only when the correlation is beyond doubt.
+    """
+    parts = []
+    for level, many in zip(noise.doubt[0], random.multinomial(draws, noise.doubt[1]), strict=True):
+        lower = _factored(replace(noise, correlation=float(level))).lower
+        parts.append(random.standard_normal((many, noise.rows.size)) @ noise.whiten(lower).T)
+    return np.concatenate(parts)
 
 
 def _factored(noise: Noise) -> Noise:
@@ -144,7 +191,8 @@ def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E of the used stations (n, n)."""
     related = np.eye(noise.rows.size) if noise.correlation == 0.0 else np.exp(noise.apart * np.log(noise.correlation))
     covariance = noise.scale**2 * related * np.outer(noise.error, noise.error)
-    return np.asarray(covariance + 0.5 * np.outer(noise.grid, noise.grid) + np.diag(0.5 * noise.grid**2))
+    common = noise.common * np.outer(noise.grid, noise.grid)
+    return np.asarray(covariance + common + np.diag((1.0 - noise.common) * noise.grid**2))
 
 
 def _apart(used: pd.DataFrame) -> Array:

@@ -66,7 +66,8 @@ def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], 
     if further is None:
         return None
     before, names = chi2(seen.noise, seen.base.fitted.point), tuple(one.candidate.name for one in rivals)
-    return Step(best.candidate.name, names, groups, before, further.fitted.chi2, seen.effects.p), further
+    p_family = float(np.exp(seen.effects.log_p()))
+    return Step(best.candidate.name, names, groups, before, further.fitted.chi2, p_family), further
 
 
 def _groups(seen: Look, rivals: list[Refit]) -> tuple[tuple[str, ...], ...]:

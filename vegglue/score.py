@@ -54,10 +54,10 @@ def scores(projected: Projected, one_sided: np.ndarray) -> Array:
     return _signed(projected.units.T @ projected.residual, one_sided)
 
 
-def null_draws(projected: Projected, one_sided: np.ndarray, seed: int) -> Array:
-    """T (draws, c) of residuals that are errors only."""
-    random = np.random.default_rng(seed)
-    noise = random.standard_normal((DRAWS, projected.residual.size), dtype=np.float32)
+def null_draws(projected: Projected, one_sided: np.ndarray, errors: Array, seed: int) -> Array:
+    """T (draws, c) of residuals that are errors (draws, n) only; the rows of the prior are drawn here."""
+    of_prior = np.random.default_rng(seed).standard_normal((len(errors), projected.residual.size - errors.shape[1]))
+    noise = np.hstack([errors, of_prior]).astype(np.float32)
     return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
 
 

@@ -10,7 +10,7 @@ from vegglue.baseline import Baseline
 from vegglue.candidates import start_of
 from vegglue.effect import Array
 from vegglue.linearise import z_of
-from vegglue.noise import Noise, estimated
+from vegglue.noise import Noise, drawn, estimated
 from vegglue.schema import Case
 from vegglue.traces import Traces, traces_of
 
@@ -25,21 +25,25 @@ FREE = 1e4
 
 @dataclass(frozen=True)
 class Family:
-    """Scores T of fingerprints that are one hypothesis, and the chance of the best of them under errors alone.
-
-    log_p: natural logarithm of the family-wise p-value, carried on beyond what the bootstrap can count.
+    """Scores T of fingerprints that are one hypothesis; many: how many independent ones they amount to under errors
+    alone, so that the chance of the best is 1 - (1 - sf(T^2))^many.
     """
 
     scores: Array
-    log_p: float
+    many: float
 
     @property
     def best(self) -> int:
         return int(np.argmax(self.scores**2))
 
-    @property
-    def p(self) -> float:
-        return float(np.exp(self.log_p))
+    def log_p(self, slack: float = 0.0) -> float:
+        """ln of the family-wise p of a best score that is too large by `slack`, beyond what a bootstrap counts."""
+        score = max(float(np.abs(self.scores).max()) - slack, 0.0)
+        log_tail = float(scipy.stats.chi2.logsf(score**2, 1))
+        log_p = np.log(self.many) + log_tail
+        if log_p > -4.0:
+            log_p = np.log(-np.expm1(self.many * np.log1p(-min(np.exp(log_tail), 1.0 - 1e-12))))
+        return float(min(log_p, 0.0))
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,8 @@ def look(base: Baseline, flagged: tuple[int, ...] = (), before: Look | None = No
 
     one_sided = np.array([amplitude.low >= amplitude.off for amplitude in traces.amplitudes], bool)
     projected, of_spots, of_stations = against(prints), against(spots), against(np.eye(left.size))
-    maxima, scores = _maxima(projected, one_sided, seed), score.scores(projected, one_sided)
+    errors = drawn(noise, score.DRAWS, np.random.default_rng((seed, 1)))
+    maxima, scores = _maxima(projected, one_sided, errors, seed), score.scores(projected, one_sided)
     return Look(
         base=replace(base, noise=noise),
         flagged=flagged,
@@ -112,8 +117,8 @@ def look(base: Baseline, flagged: tuple[int, ...] = (), before: Look | None = No
         scores=scores,
         maxima=maxima,
         effects=_family(scores, maxima),
-        places=_both_ways(of_spots, (), seed),
-        stations=_both_ways(of_stations, flagged, seed),
+        places=_both_ways(of_spots, (), errors, seed),
+        stations=_both_ways(of_stations, flagged, errors, seed),
         spot_length=of_spots.length,
     )
 
@@ -133,16 +138,16 @@ def _noise(noise: Noise, traces: Traces, used: tuple[Array, Array, Array], left:
     return estimated(first, left, np.hstack([explained, free]))
 
 
-def _maxima(projected: score.Projected, one_sided: np.ndarray, seed: int) -> Array:
-    return np.asarray((score.null_draws(projected, one_sided, seed) ** 2).max(axis=1))
+def _maxima(projected: score.Projected, one_sided: np.ndarray, errors: Array, seed: int) -> Array:
+    return np.asarray((score.null_draws(projected, one_sided, errors, seed) ** 2).max(axis=1))
 
 
-def _both_ways(projected: score.Projected, flagged: tuple[int, ...], seed: int) -> Family:
+def _both_ways(projected: score.Projected, flagged: tuple[int, ...], errors: Array, seed: int) -> Family:
     """Traces of either sign; those flagged score nothing."""
     two = np.zeros(projected.length.size, bool)
     scores = score.scores(projected, two)
     scores[list(flagged)] = 0.0
-    return _family(scores, _maxima(projected, two, seed))
+    return _family(scores, _maxima(projected, two, errors, seed))
 
 
 def refit_start(seen: Look, candidate: int, changed: Case) -> Array:
@@ -158,12 +163,7 @@ def refit_start(seen: Look, candidate: int, changed: Case) -> Array:
 
 
 def _family(scores: Array, maxima: Array) -> Family:
-    """The tail of the maximum of c alike squares: 1 - (1 - sf(T^2))^c, c so that it fits the bootstrap at 95 %."""
+    """Such that the tail fits the bootstrap at 95 %."""
     if scores.size == 0:
-        return Family(np.zeros(1), 0.0)
-    many = -np.log(0.95) / scipy.stats.chi2.sf(np.quantile(maxima, 0.95), 1)
-    log_tail = scipy.stats.chi2.logsf(float((scores**2).max()), 1)
-    log_p = np.log(many) + log_tail
-    if log_p > -4.0:
-        log_p = float(np.log(-np.expm1(many * np.log1p(-np.exp(log_tail)))))
-    return Family(scores, float(min(log_p, 0.0)))
+        return Family(np.zeros(1), 1.0)
+    return Family(scores, float(-np.log(0.95) / scipy.stats.chi2.sf(np.quantile(maxima, 0.95), 1)))

@@ -94,8 +94,8 @@ def told_by_data(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
 
 
 def alike(value: Array, error: Array) -> tuple[float, int, float]:
-    """chi2, degrees of freedom and p of values that should be one, NaN where unknown; all NaN with fewer than two."""
-    known = np.isfinite(value) & np.isfinite(error)
+    """chi2, degrees of freedom and p of values that should be one (error NaN or 0: unknown); NaN for fewer than two."""
+    known = np.isfinite(value) & (error > 0)  # zero at an end of its support, where no step leads
     if known.sum() < 2:
         return float("nan"), 0, float("nan")
     weight = 1.0 / error[known] ** 2

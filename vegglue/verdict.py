@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import scipy.stats
 
-from vegglue.diagnosis import Step, Suspect, Verdict, Where
+from vegglue.diagnosis import Step, Suspect, Verdict, Where, hiding
 from vegglue.effect import Array, Ground
 from vegglue.ground import ground_of
 from vegglue.linearise import Model, Point
@@ -17,6 +17,8 @@ from vegglue.noise import Noise
 MOST_GROUPS = 3
 # Chance of the last misfit under errors alone, below which something is still missing.
 POOR = 1e-3
+# Names that a remark holds at most.
+SHOWN = 8
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
 AT_EDGE = 0.2
 
@@ -68,7 +70,10 @@ def judged(
 
 
 def _without_steps(suspects: Sequence[Suspect], fit: Misfit, remarks: list[str]) -> tuple[Verdict, str, list[str]]:
-    testable = [suspect for suspect in suspects if suspect.testable]
+    testable, open_still = [suspect for suspect in suspects if suspect.testable], hiding(suspects)
+    if open_still:
+        names = ", ".join(open_still[:SHOWN]) + (f" and {len(open_still) - SHOWN} more" * (len(open_still) > SHOWN))
+        remarks.append(f"Not excluded, should something of three standard errors be there all the same: {names}.")
     if fit.p < POOR:
         return (
             "cannot-tell",
