@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from reach import said_to, vegglue
 
+from vegglue.baseline import coarser
 from vegglue.candidates import at_work, candidates_of, with_effect
 from vegglue.config import load_case
 from vegglue.extend import candidate_named
@@ -132,6 +133,21 @@ def test_slopes_are_those_of_solved_members() -> None:
     assert point.slope == pytest.approx(measured.T, abs=2e-4)
 
 
+def test_a_point_leads_to_one_on_narrower_cells() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    coarse = coarser(model)
+    assert coarse is not None
+    assert coarse.site.bed.shape == (model.site.bed.shape[0], model.site.bed.shape[1] // 2), "long cells become wider"
+    z = np.array([0.3, -0.2, 0.5, 0.1])
+    cold, near = linearise(model, z), linearise(coarse, z)
+    assert cold is not None
+    assert near is not None
+    warm = linearise(model, z, near)
+    assert warm is not None
+    assert warm.prediction == pytest.approx(cold.prediction, abs=1e-6)
+
+
 def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     model = model_of(case, read_observations(case))
@@ -162,3 +178,22 @@ def test_a_hidden_effect_is_named_added_and_the_error_falls(tmp_path: Path) -> N
     rungs = json.loads(vegglue(tmp_path, "compare", "hidden/hidden.yaml", child, "--json").stdout)["rungs"]
     assert rungs[1]["held_out_sections"] < rungs[0]["held_out_sections"]
     assert rungs[1]["chi2"] < 0.8 * rungs[0]["chi2"]
+
+
+@pytest.mark.slow
+def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> None:
+    config = ROOT / "configs" / "twin.yaml"
+    vegglue(tmp_path, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
+    small = tmp_path / "hidden" / "small.yaml"
+    small.write_text("extends: hidden.yaml\nname: small\nsimulate: {members: 16}\n", encoding="utf-8")
+    said = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
+    assert "discharge_error[high] of -0.0" in said, "names in brackets are no markup"
+    child = "small-discharge_error_high"
+    for folder in ("small", child):
+        made = {path.name for path in (tmp_path / "runs" / folder).iterdir()}
+        assert made >= {"ensemble.h5", "posterior.h5", "report.html"}
+    assert (tmp_path / "runs" / child / "ladder.png").exists()
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}
+    again = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
+    assert "up to date" in again
+    assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}

@@ -59,8 +59,8 @@ def test_true_parameters_lie_off_the_centre_and_follow_the_seed() -> None:
 
 
 def test_the_truth_is_computed_on_other_cells(ground: Ground) -> None:
-    assert ground.fine.site.bed.shape == (96, 30)
-    assert ground.model.site.bed.shape == (64, 20)
+    assert ground.fine.site.bed.shape == (96, 60)
+    assert ground.model.site.bed.shape == (64, 40)
     difference = ground.there.prediction - ground.here.prediction
     assert 1e-4 < np.sqrt(np.mean(difference**2)) < 0.01
 

@@ -15,7 +15,7 @@ from vegglue import __version__
 from vegglue.channel_figure import save_channel_figure
 from vegglue.check import check_case
 from vegglue.cli_effects import effects_command
-from vegglue.cli_loop import COMMANDS, Config, Runs, Trust
+from vegglue.cli_loop import COMMANDS, Config, Runs, Trust, loop
 from vegglue.cli_twin import COMMANDS as OF_TWINS
 from vegglue.config import case_hash, load_case, resolved_yaml, simulation_hash
 from vegglue.cores import alone
@@ -35,7 +35,7 @@ from vegglue.store import diagnosis_that_fits, read_ensemble, read_posterior, st
 from vegglue.survey import read_survey, rigid_cylinder
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-console = Console(highlight=False, soft_wrap=True)
+console = Console(highlight=False, soft_wrap=True, markup=False)
 
 Jobs = Annotated[
     int, typer.Option(min=-1, help="Processes at once; -1 for one on every core. Results do not depend on it.")
@@ -50,7 +50,8 @@ Members = Annotated[
 def about() -> None:
     """Calibrate a model of flow through plants against measured velocities, and see where it fails.
 
-    check, then simulate -> infer -> report; every command takes the same CONFIG and works in runs/<name>.
+    check, then run, or its steps: simulate, infer, diagnose, extend, compare, next, report. Every command takes the
+    same CONFIG and works in runs/<name>.
     """
 
 
@@ -130,7 +131,7 @@ def _inferred(case: Case, observations: Observations, ensemble: Ensemble, method
         )
     if (method or case.infer.method) == "glue" or not refinable(case):
         return glue(ensemble, case, observations)
-    return refine(ensemble, case, observations, jobs, lambda text: console.print(f"[dim]... {text}[/dim]"))
+    return refine(ensemble, case, observations, jobs, lambda text: console.print(f"... {text}", style="dim"))
 
 
 @app.command()
@@ -145,6 +146,28 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs"), t
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(load_case(config, trust)))
     page = write_report(folder, case, observations, ensemble, posterior, flow, survey, diagnosis)
     console.print(f"Report: {page.resolve()}")
+
+
+@app.command(name="run")
+def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
+    """The whole loop: calibrate, diagnose, add what is missing, watch the error fall, report before and after."""
+    _calibrate(config, jobs, runs, trust)
+    last = loop(load_case(config, trust), runs, jobs)
+    if last.resolve() != config.resolve():
+        _calibrate(last, jobs, runs, trust)
+    for each in dict.fromkeys((config.resolve(), last.resolve())):
+        report(each, runs=runs, trust=trust)
+
+
+def _calibrate(config: Path, jobs: int, runs: Path, trust: bool) -> None:
+    """Ensemble and posterior, unless they are there."""
+    simulate_command(config, jobs=jobs, runs=runs, trust=trust)
+    case = load_case(config, trust)
+    posterior = runs / case.name / "posterior.h5"
+    if stored_hash(posterior) == case_hash(case):
+        console.print(f"{posterior} is up to date.")
+        return
+    infer(config, jobs=jobs, runs=runs, trust=trust)
 
 
 for _name, _command in (*COMMANDS, *OF_TWINS, ("effects", effects_command)):

@@ -32,10 +32,12 @@ from vegglue.loop import (
     next_measurements,
     write_child,
 )
+from vegglue.schema import Case
 from vegglue.text_files import write_text
 
 # Into a file or a pipe, lines as long as they need to be.
-console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+# Names such as `discharge_error[high]` are no markup.
+console = Console(highlight=False, soft_wrap=True, markup=False, width=None if sys.stdout.isatty() else 200)
 Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
 Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
 Jobs = Annotated[int, typer.Option(min=-1, help="Cores at once; -1 for all. Results do not depend on it.")]
@@ -145,17 +147,17 @@ def next_command(
     _show_next(found)
 
 
-def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
-    """The whole loop: diagnose, add what is missing, watch the error fall, say what to measure next."""
-    case = load_case(config, trust)
+def loop(case: Case, runs: Path, jobs: int) -> Path:
+    """Diagnose, add what is missing, watch the error fall, say what to measure next; the last config."""
     folder = folder_of(runs, case)
     _tell(diagnosed(case, folder, jobs, _say()))
     grown = grow(case, runs, jobs, _say())
     _show_ladder(grown.rungs, aside_in_words(grown.aside))
     _show_next(next_measurements(case, folder, jobs, _say(), []))
-    picture = folder_of(runs, load_case(grown.paths[-1], trust)) / "ladder.png"
+    picture = folder_of(runs, load_case(grown.paths[-1], trust=True)) / "ladder.png"  # the case was trusted
     save_ladder_figure(grown.rungs, picture)
     console.print(f"Ladder drawn in {picture}; last config: {grown.paths[-1]}")
+    return grown.paths[-1]
 
 
 COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
@@ -164,7 +166,6 @@ COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("extend", extend_command),
     ("compare", compare_command),
     ("next", next_command),
-    ("run", run_command),
 )
 
 
@@ -181,7 +182,7 @@ def _default_target(folder: Path) -> Path:
 def _say(quiet: bool = False) -> Callable[[str], None]:
     def say(text: str) -> None:
         if not quiet:
-            console.print(f"[dim]... {text}[/dim]")
+            console.print(f"... {text}", style="dim")
 
     return say
 
@@ -195,7 +196,8 @@ def _number(text: str) -> tuple[str, float]:
 
 
 def _tell(found: Diagnosis) -> None:
-    console.print(f"[bold]{found.verdict}[/bold]: {found.sentence}")
+    console.print(found.verdict, style="bold", end=": ")
+    console.print(found.sentence)
     for remark in found.remarks:
         console.print(f"- {remark}")
     table = Table(box=None, pad_edge=False, header_style="bold")

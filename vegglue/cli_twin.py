@@ -16,7 +16,7 @@ from vegglue.store import diagnosis_that_fits
 from vegglue.twin import ground_at, measured, opened, sealed, true_place
 from vegglue.twin_files import SEAL, config_in, write_twin
 
-console = Console(highlight=False, soft_wrap=True)
+console = Console(highlight=False, soft_wrap=True, markup=False)
 
 
 def twin_command(

@@ -53,12 +53,13 @@ class Model:
 
 @dataclass(frozen=True)
 class Flowing:
-    """One experiment at a place: its state (nx, 3, rows, 1) in a band of rows, factors, and slopes d state / dz_j
-    (nx, 3, rows, p).
+    """One experiment at a place: its state (nx, 3, wet rows, 1) in a band of all `rows`, factors, and slopes
+    d state / dz_j (nx, 3, wet rows, p).
     """
 
     state: Array
     band: tuple[int, int]
+    rows: int
     factors: Factors
     slopes: Array
 
@@ -206,22 +207,29 @@ def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> Flowin
         return None
     part = crop(problem, *band)
     slopes = tangents(part, solution.state, factors, _causes(model, experiment, z, solution.state, band), EXACT)
-    return Flowing(solution.state, band, factors, slopes)
+    return Flowing(solution.state, band, ny, factors, slopes)
 
 
 def _warm(near: Point, before: Flowing, z: Array, shape: tuple[int, int]) -> Array:
     """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be."""
-    nx, ny = before.state.shape[0], shape[1] if shape[0] == before.state.shape[0] else shape[1] // 2
-    warm = widen(before.state, ny, before.band)
+    warm = widen(before.state, before.rows, before.band)
     if before.slopes.shape[3] == z.size:
-        warm = warm + widen(before.slopes @ (z - near.z)[:, None], ny, before.band)
-    return warm if nx == shape[0] else _prolonged(warm)
+        warm = warm + widen(before.slopes @ (z - near.z)[:, None], before.rows, before.band)
+    if shape[0] == 2 * warm.shape[0]:
+        warm = _shorter(warm)
+    return _narrower(warm) if shape[1] == 2 * warm.shape[2] else warm
 
 
-def _prolonged(coarse: Array) -> Array:
-    """A state (nx, 3, ny, 1) on cells of half the size: velocities between faces are the mean of both."""
-    fine = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=2)
+def _shorter(coarse: Array) -> Array:
+    """A state (nx, 3, ny, 1) on cells of half the length: velocities between faces are the mean of both."""
+    fine = np.repeat(coarse, 2, axis=0)
     fine[2::2, ALONG] = 0.5 * (fine[1:-1:2, ALONG] + fine[3::2, ALONG])
+    return fine
+
+
+def _narrower(coarse: Array) -> Array:
+    """A state (nx, 3, ny, 1) on cells of half the width, likewise."""
+    fine = np.repeat(coarse, 2, axis=2)
     fine[:, ACROSS, 1:-1:2] = 0.5 * (fine[:, ACROSS, :-2:2] + fine[:, ACROSS, 2::2])
     return fine
 
