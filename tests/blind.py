@@ -25,7 +25,7 @@ from vegglue.baseline import Baseline, baseline
 from vegglue.candidates import candidates_of, with_effect
 from vegglue.config import load_case
 from vegglue.cores import as_finished
-from vegglue.design import SEPARATES, planned, worth_of_measurements
+from vegglue.design import SEPARATES, worth_of_measurements
 from vegglue.diagnose import diagnose
 from vegglue.diagnosis import Diagnosis
 from vegglue.effect import Array
@@ -49,14 +49,14 @@ TWO = (
 )  # fmt: skip
 # Data sets of each kind at share 1; of those with an effect, up to a third cannot be made visible and are left out.
 SIZES = {
-    "null-white": 200, "null-ar1": 200, "null-understated": 100, "snr3": 300, "snr6": 300, "unlisted": 80, "two": 40,
-    "probe": 40,
+    "null-white": 200, "null-ar1": 200, "null-understated": 60, "snr3": 300, "snr6": 300, "unlisted": 60, "two": 30,
+    "probe": 30,
 }  # fmt: skip
 NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.
 OF_THE_GRID = ("smagorinsky",)
 # Every so many data sets, held-out errors are taken before and after, and the measurement that `next` proposes is made.
-LOOKED_INTO = 2
+LOOKED_INTO = 4
 
 
 @dataclass(frozen=True)
@@ -179,11 +179,10 @@ def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosi
     best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
         return None
-    wide, _ = planned(base.model, base.noise)
-    more = wide.station.iloc[best.plan.rows]
+    more = best.plan.stations
     usual = model.station.groupby("kind")["standard_error"].median()
     error = more["kind"].map(usual).to_numpy(float)
-    experiments = {**model.case.experiments, best.plan.experiment: wide.case.experiments[best.plan.experiment]}
+    experiments = {**model.case.experiments, best.plan.experiment: best.plan.setting}
     values = _true_values(ground, answer, experiments, more)
     if values is None:
         return None

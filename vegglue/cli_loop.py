@@ -253,8 +253,9 @@ def _show_next(found: Sequence[tuple[str, Sequence[Worth]]]) -> None:
     for what, worths in found:
         useful = [one for one in worths if one.then >= SEPARATES and one.then > 1.1 * one.now]
         if not useful:
-            best = max((one.then for one in worths), default=0.0)
-            console.print(f"To tell {what}: none of {len(worths)} measurements would (D2 at most {best:.2g}).")
+            best = max(worths, key=lambda one: one.then, default=None)
+            most = f" (D2 at most {best.then:.2g}: {best.plan.name})" if best else ""
+            console.print(f"To tell {what}: none of {len(worths)} measurements would by itself{most}.")
             continue
         console.print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
         for one in useful[:4]:

@@ -26,8 +26,9 @@ from vegglue.site import build_site
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
 # Verticals are planned this far apart, in half widths of the floor; sections this share of the reach.
 SPACING, SECTIONS = 0.25, 12
-# Other discharges, relative to the nearest one at hand, with the outlet level that goes with it (h ~ Q^0.6).
-FACTORS = (0.5, 1.4)
+# Other discharges, relative to the lowest and to the highest one at hand, with the outlet level that goes with them
+# (h ~ Q^0.6). A quarter brings plants to the surface, where what depends on speed or depth leaves other traces.
+LOWER, HIGHER = (0.25, 0.5), (1.4,)
 LEVEL_POWER = 0.6
 # Below this D^2 a measurement does not separate anything.
 SEPARATES = 4.0
@@ -35,13 +36,18 @@ SEPARATES = 4.0
 
 @dataclass(frozen=True)
 class Plan:
-    """One measurement that could be made: its stations (rows of the extended table), where, and its cost [h]."""
+    """One measurement that could be made: its stations and their rows of the extended table, where, and its cost [h].
+
+    setting: the experiment it is made in.
+    """
 
     name: str
     rows: np.ndarray
+    stations: pd.DataFrame
     hours: float
     x: float
     experiment: str
+    setting: Experiment
 
 
 @dataclass(frozen=True)
@@ -66,9 +72,12 @@ def worth_of_measurements(
     """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
     be told from calibration: (effect, shapes, gain (amplitude - off)^power).
     """
-    wide, plans = planned(model, noise)
-    point = linearise(wide, z)
-    if point is None:
+    for case in (_with_other_discharges(model.case, LOWER), _with_other_discharges(model.case, ()), model.case):
+        wide, plans = planned(model, case)
+        point = linearise(wide, z)
+        if point is not None:
+            break
+    else:
         return [[] for _ in questions]
     every = [rival for question in questions for rival in question]
     changed = [change_of(wide.case, one, shapes) for one, shapes, _ in every]
@@ -92,14 +101,16 @@ def _ranked(plans: Sequence[Plan], known: np.ndarray, slope: Array, traces: Arra
     return sorted(found, key=lambda one: -one.per_hour)
 
 
-def planned(model: Model, noise: Noise) -> tuple[Model, list[Plan]]:
-    """The model with every station that could be measured behind those that were, and the plans they make."""
+def planned(model: Model, case: Case) -> tuple[Model, list[Plan]]:
+    """The model with every station that could be measured behind those that were, and the plans they make; case: the
+    model's with further experiments.
+    """
     tables, plans, count = [model.station], [], len(model.station)
-    case = _with_other_discharges(model.case)
     velocity = model.station[(model.station["kind"] == "velocity") & model.station["used"]]
     for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
         table = _stations(experiment, plan_name, x, y, kind)
-        plans.append(Plan(plan_name, np.arange(count, count + len(table)), hours, x, experiment))
+        rows, setting = np.arange(count, count + len(table)), case.experiments[experiment]
+        plans.append(Plan(plan_name, rows, table, hours, x, experiment, setting))
         tables.append(table)
         count += len(table)
     return Model(case, model.site, pd.concat(tables, ignore_index=True)), plans
@@ -144,8 +155,10 @@ def _stations(experiment: str, section: str, x: float, y: Array, kind: str) -> p
     )  # fmt: skip
 
 
-def _with_other_discharges(case: Case) -> Case:
-    """The case with experiments at discharges it has not seen, where those at hand are numbers."""
+def _with_other_discharges(case: Case, lower: Sequence[float]) -> Case:
+    """The case with experiments at discharges it has not seen, `lower` ones and HIGHER, where those at hand are
+    numbers.
+    """
     known = list(case.experiments.items())
     numbers = [(name, one) for name, one in known if _plain(one)]
     if not numbers:
@@ -154,7 +167,7 @@ def _with_other_discharges(case: Case) -> Case:
     lowest, highest = min(totals, key=lambda name: totals[name]), max(totals, key=lambda name: totals[name])
     floor = float(build_site(case).bed[-1].min())
     more = {}
-    for name, factor in ((lowest, FACTORS[0]), (highest, FACTORS[1])):
+    for name, factor in [(lowest, factor) for factor in lower] + [(highest, factor) for factor in HIGHER]:
         one = case.experiments[name]
         depth = float(one.level) - floor
         level = floor + depth * factor**LEVEL_POWER

@@ -250,7 +250,7 @@ def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple
     hidden = [one for one in found.suspects if not one.testable and not found.steps]
     # What calibration hides best, of all that would leave a trace without it.
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
-    single = [one for one in found.suspects if one.name in names and not found.steps] or strongest
+    single = [one for one in found.suspects if list(names) == [one.name]] or strongest
     return [
         (f"{one.name} from a change of {one.mimicked_by}", rivals_of(case, found, [one.name], plausible=True))
         for one in single
