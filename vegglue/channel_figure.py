@@ -12,7 +12,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.patches import Polygon
 
 from vegglue.check import expected_depth
-from vegglue.figure_style import COLOUR, SMALL, canvas, label, styled
+from vegglue.figure_style import COLOUR, SMALL, canvas, label, save, styled
 from vegglue.observations import Observations
 from vegglue.outline import corners
 from vegglue.schema import Case
@@ -25,8 +25,7 @@ ROOM = 12.0
 
 def save_channel_figure(case: Case, site: Site, observations: Observations, path: Path) -> None:
     """Write the channel to a PNG: all of it, and the reach with plants and stations enlarged."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draw_channel(case, site, observations).savefig(path, dpi=150)
+    save(draw_channel(case, site, observations), path, dots_per_inch=150)
 
 
 @styled

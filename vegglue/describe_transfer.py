@@ -31,7 +31,12 @@ def told(posterior: Posterior, transfer: Transfer, others: Mapping[str, object])
     if not order:
         return ["Calibrated alone, no two experiments tell the same parameter: nothing to compare between them."]
     moves = moving(transfer)
-    said = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order]
+    alike = [j for j in order[1:] if transfer.p[j] >= DOUBTED and PREFIX + posterior.parameters[j] not in others]
+    said = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order if j not in alike]
+    if alike:
+        rest = ", ".join(posterior.parameters[j] for j in alike)
+        least = min(transfer.p[j] for j in alike)
+        said.append(f"One value for all will do as well for {rest} (p = {least:.2g} or more).")
     names = [posterior.parameters[j] for j in order if moves[j]]
     return [*said, _misfits(transfer), _meaning(names, rejected(transfer))]
 

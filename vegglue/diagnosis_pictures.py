@@ -14,7 +14,7 @@ from vegglue.diagnosis import Diagnosis
 from vegglue.diagnosis_words import added, error_of, first_score, last_score, ranked, standing
 from vegglue.figure_misfit import draw_gauges, draw_places, draw_profiles, draw_zones, paint_places, paint_zones
 from vegglue.figure_plan import Outline
-from vegglue.figure_style import Picture, styled
+from vegglue.figure_style import Picture, save, styled
 from vegglue.figure_suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.outline import corners
 from vegglue.reported import Run, picture
@@ -34,14 +34,12 @@ def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture
 
 def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
     """Write the whole diagnosis as one screen, PNG or SVG by the ending of `path`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draw_diagnosis(diagnosis, _outlines(case)).savefig(path, dpi=130)
+    save(draw_diagnosis(diagnosis, _outlines(case)), path, dots_per_inch=130)
 
 
 def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str, path: Path) -> None:
     """Write what one unit of an effect changes at the stations, trace (station,); PNG or SVG by its ending."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draw_fingerprint(trace, station, unit).savefig(path)
+    save(draw_fingerprint(trace, station, unit), path)
 
 
 @styled

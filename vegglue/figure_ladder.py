@@ -1,5 +1,6 @@
 """The error ladder as one picture: how the errors fall from model to model, and what the parameters do meanwhile."""
 
+import textwrap
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -9,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vegglue.effect import Array
-from vegglue.figure_style import COLOUR, SMALL, WIDTH, label, styled
+from vegglue.figure_style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.ladder import Rung, held_out, improvement
 from vegglue.typography import fixed, short
 
@@ -17,12 +18,13 @@ from vegglue.typography import fixed, short
 MOVES = 0.05
 # Panels of parameters side by side, and ratio of largest to smallest above which their axis is logarithmic.
 ACROSS, DECADES = 5, 30.0
+# Letters of a parameter's name in a line.
+TITLE = 26
 
 
 def save_ladder_figure(rungs: Sequence[Rung], path: Path) -> None:
     """Write the ladder to a file, PNG or SVG by its ending."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draw_ladder(rungs).savefig(path)
+    save(draw_ladder(rungs), path)
 
 
 @styled
@@ -110,7 +112,8 @@ def _paint_parameter(axes: Axes, rungs: Sequence[Rung], name: str) -> None:
         axes.set_yscale("log")
     moving = [rung.homogeneity[name] for _, rung in known if name in rung.homogeneity]
     told = f"\nsame everywhere: p = {fixed(moving[-1], 2)}" if moving else ""
-    axes.set_title(f"{name}{told}", fontsize=SMALL + 0.5, fontweight="normal")
+    broken = "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), TITLE))
+    axes.set_title(f"{broken}{told}", fontsize=SMALL + 0.5, fontweight="normal")
     axes.set(xlim=(0.5, len(rungs) + 0.5))
     axes.set_xticks(range(1, len(rungs) + 1))
     axes.tick_params(labelsize=7.5)

@@ -126,6 +126,13 @@ def label(axes: Axes, x: float, y: float, text: str, colour: str = "ink", **keyw
     text_.set_path_effects([withStroke(linewidth=2.2, foreground=COLOUR["paper"])])
 
 
+def save(figure: Figure, path: Path, dots_per_inch: float = 200) -> None:
+    """Write a figure by itself, PNG or SVG by the ending of `path`, in a folder that is made if need be."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with _styled_context():
+        figure.savefig(path, dpi=dots_per_inch)
+
+
 @dataclass(frozen=True)
 class Picture:
     """A figure for the page: file name without ending, caption (HTML), spoken text, inline SVG, width [px]."""

@@ -25,6 +25,7 @@ from vegglue.wording import (
     plant_parameter,
     pressed_side,
     symbol,
+    unexplained,
     with_unit,
 )
 
@@ -140,7 +141,7 @@ def _residual(posterior: Posterior, kind: str) -> Finding:
     text += with_unit(posterior.rmse[kind], kind)
     if not np.isfinite(error):
         return Finding("residual", f"{text}; without standard errors nothing can be said of what they ought to be.")
-    if miss <= 1.5 * error:
+    if not unexplained(posterior, kind, miss):
         return Finding("residual", f"{text}, no more than the measurement error of {with_unit(error, kind)} explains.")
     return Finding(
         "residual",

@@ -8,7 +8,7 @@ from vegglue.describe import CLAIMED_FROM
 from vegglue.posterior import Posterior
 from vegglue.schema import Case
 from vegglue.typography import count, percent, short
-from vegglue.wording import estimate, measurement_error, pressed_side, symbol, with_unit
+from vegglue.wording import estimate, measurement_error, pressed_side, symbol, unexplained, with_unit
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,8 @@ def _how_well(posterior: Posterior) -> str:
     told = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
     if not np.isfinite(error):
         return f"{told}; their own error is not known."
-    ratio = miss / error
-    if ratio > 1.5:
-        return f"{told}, {short(ratio, 2)} times their own error."
+    if unexplained(posterior, kind, miss):
+        return f"{told}, {short(miss / error, 2)} times their own error."
     return f"{told}, as much as their own error of {with_unit(error, kind)} explains."
 
 

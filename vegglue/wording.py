@@ -1,12 +1,16 @@
 """Words the report says in several places: a parameter, its estimate, what the data are worth (HTML)."""
 
 import numpy as np
+import scipy.stats
 
 from vegglue.ensemble import FAILED, Ensemble
 from vegglue.likelihood import root_mean_square
 from vegglue.posterior import Posterior
 from vegglue.schema import Case
 from vegglue.typography import NARROW, plus_minus, short, symbol_html, unit_html
+
+# Chance below which a misfit is no chance any more.
+SELDOM = 1e-3
 
 
 def symbol(case: Case, name: str) -> str:
@@ -41,6 +45,18 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
     station = posterior.station
     error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
     return root_mean_square(error)
+
+
+def unexplained(posterior: Posterior, kind: str, miss: float) -> bool:
+    """Whether a root mean square misfit is larger than the errors of its stations allow, by chance once in 1,000.
+
+    Where the posterior knows how its errors hang together, its own chance of the misfit counts as well.
+    """
+    used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
+    count = max(int(used.sum()), 1)
+    error, refinement = measurement_error(posterior, kind), posterior.refinement
+    doubted = refinement is not None and refinement.errors == "stated" and refinement.p_misfit < SELDOM
+    return miss > error * float(np.sqrt(scipy.stats.chi2.isf(SELDOM, count) / count)) or (doubted and miss > error)
 
 
 def pressed_side(posterior: Posterior, name: str) -> str:
