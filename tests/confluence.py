@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vegglue.aside import aside_of
 from vegglue.config import as_yaml, load_case
 from vegglue.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.diagnosis import Diagnosis
@@ -51,7 +52,7 @@ def by_section(model: Model, prediction: np.ndarray) -> dict[str, float]:
 
 
 def row_of(title: str, case: Case, runs: Path) -> Row:
-    base = calibrated(case, folder_of(case, runs))
+    base = calibrated(case, folder_of(case, runs), aside_of())
     unseen = validation_of(case)
     assert unseen is not None
     there = linearise(unseen, base.fitted.point.z)

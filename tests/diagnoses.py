@@ -15,7 +15,7 @@ def a_suspect(name: str, **changes: Any) -> Suspect:
     suspect = Suspect(
         name=name, title="Störung – größer als 0", unit="m2/s", amplitude=0.1 + 0.2, interval95=(-np.inf, 1 / 3),
         score=7.3, p_family=0.0002, visibility=0.9, smallest_detectable=0.05, testable=True, refitted=False,
-        objective=210.0, mimicked_by="k_s", likeness=-0.4, shapes={},
+        objective=210.0, mimicked_by="k_s", likeness=-0.4, shapes={}, off=0.0, scale=0.5,
     )  # fmt: skip
     return replace(suspect, **changes)
 

@@ -29,7 +29,8 @@ class Suspect:
 
     amplitude, interval95: from its own refit when there was one, else to first order; unit of the amplitude. p_family:
     chance that errors alone make any effect look as strong. visibility: share of its trace that calibration cannot
-    mimic [-]. smallest_detectable: amplitude that would be seen 19 times of 20; mimicked_by: the parameter most alike.
+    mimic [-]. smallest_detectable: amplitude that would be seen 19 times of 20; mimicked_by: the parameter most alike;
+    off, scale: where the amplitude does nothing, and how far from there is plausible.
     """
 
     name: str
@@ -47,6 +48,13 @@ class Suspect:
     mimicked_by: str
     likeness: float
     shapes: dict[str, float]
+    off: float
+    scale: float
+
+    @property
+    def stretch(self) -> float:
+        """Amplitude over a plausible one [-]."""
+        return abs(self.amplitude - self.off) / self.scale
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ def _suspect(seen: Look, candidate: int) -> Suspect:
         mimicked_by=mimic,
         likeness=likeness,
         shapes=seen.traces.settings[column],
+        off=amplitude.off,
+        scale=amplitude.scale,
     )
 
 

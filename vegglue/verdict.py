@@ -17,6 +17,8 @@ from vegglue.noise import Noise
 MOST_GROUPS = 3
 # Chance of the last misfit under errors alone, below which something is still missing.
 POOR = 1e-3
+# Amplitude over a plausible one, above which it is said to be too large to be believed.
+STRETCHED = 3.0
 # Names that a remark holds at most.
 SHOWN = 8
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
@@ -48,7 +50,7 @@ def judged(
     flagged: Sequence[int],
 ) -> tuple[Verdict, str, list[str]]:
     """The verdict, its sentence, and what else should be known."""
-    remarks = _remarks(noise, suspects, flagged)
+    remarks = [*_stretched(steps, suspects), *_remarks(noise, suspects, flagged)]
     if place is not None:
         before = f", after {_names(steps)}" if steps else ""
         return (
@@ -132,6 +134,16 @@ def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int]) 
         names = ", ".join(_untestable(suspect) for suspect in hidden)
         remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
     return remarks
+
+
+def _stretched(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str]:
+    by_name = {suspect.name: suspect for suspect in suspects}
+    far = [one for step in steps if (one := by_name[step.accepted]).stretch > STRETCHED]
+    return [
+        f"{one.name} is {one.stretch:.1f} times what is plausible for it: it may stand in for something that is not in "
+        "the library."
+        for one in far
+    ]
 
 
 def _untestable(suspect: Suspect) -> str:

@@ -1,0 +1,68 @@
+"""From what was found to a verdict in words: when it names, when it only remarks, and when it cannot tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnoses import a_diagnosis, a_suspect
+
+from vegglue.diagnosis import Step, Suspect, Where
+from vegglue.noise import noise_of
+from vegglue.verdict import Misfit, judged
+
+STATION = a_diagnosis().station
+FITS, MISSES = Misfit(5.0, 5), Misfit(80.0, 5)
+NONE = a_suspect("wind", score=0.4)
+
+
+def step(*rivals: str) -> Step:
+    return Step(rivals[0], rivals, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4)
+
+
+def said(steps: list[Step], suspects: list[Suspect], place: Where | None, fit: Misfit) -> tuple[str, str, str]:
+    verdict, sentence, remarks = judged(noise_of(STATION), steps, suspects, place, fit, ())
+    return verdict, sentence, " ".join(remarks)
+
+
+def test_nothing_is_missing_only_where_it_would_be_seen() -> None:
+    assert said([], [NONE], None, FITS)[0] == "nothing-missing"
+    blind = [replace(NONE, testable=False)] * 9
+    assert said([], [NONE, *blind], None, FITS)[0] == "cannot-tell"
+    assert said([], [NONE], None, MISSES)[0] == "cannot-tell"
+
+
+def test_what_scores_below_the_alarm_is_not_excluded() -> None:
+    many = [a_suspect(f"effect{k}", score=2.5 - 0.1 * k) for k in range(11)]
+    verdict, _, remarks = said([], [*many, NONE], None, FITS)
+    assert verdict == "nothing-missing"
+    assert "effect0" in remarks
+    assert "and 3 more" in remarks
+    assert "wind" not in remarks
+    assert a_diagnosis(steps=(), suspects=(*many, NONE)).not_excluded == [one.name for one in many]
+    assert a_diagnosis(suspects=(*many, NONE)).not_excluded == [], "something stood out"
+
+
+@pytest.mark.parametrize(
+    ("rivals", "verdict"),
+    [(["a"], "identified"), (["a", "b", "c"], "one-of"), (["a", "b", "c", "d"], "cannot-tell")],
+)
+def test_a_set_of_more_than_three_groups_tells_nothing(rivals: list[str], verdict: str) -> None:
+    assert said([step(*rivals)], [a_suspect(name) for name in rivals], None, FITS)[0] == verdict
+
+
+def test_an_implausible_size_is_remarked() -> None:
+    usual, huge = a_suspect("a", amplitude=0.9, scale=0.5), a_suspect("a", amplitude=-0.34, scale=0.1)
+    assert "plausible" not in said([step("a")], [usual], None, FITS)[2]
+    assert "3.4 times what is plausible" in said([step("a")], [huge], None, FITS)[2]
+
+
+def test_a_place_wins_over_steps() -> None:
+    place = Where(33.0, -0.6, ("low",), 0.4, 12.0)
+    verdict, sentence, _ = said([step("a")], [a_suspect("a")], place, MISSES)
+    assert verdict == "none-of-these"
+    assert "after a: the misfit points at x = 33.0, y = -0.6 m" in sentence
+
+
+def test_the_chance_of_a_misfit() -> None:
+    assert Misfit(5.0, 5).p == pytest.approx(0.4159, abs=1e-3)
+    assert np.isfinite(Misfit(0.0, 0).p)
