@@ -31,12 +31,15 @@ def caught(record: Record) -> bool:
 
 def covered(record: Record) -> bool:
     """Everything hidden is in the 95 % set: in what is named, or, where nothing stands out, in what is not excluded."""
-    return all(mark["found"] or mark["hidden"]["name"] in record["not_excluded"] for mark in record["marks"])
+    left = {name for group in record["not_excluded"] for name in group}
+    return all(mark["found"] or mark["hidden"]["name"] in left for mark in record["marks"])
 
 
 def told_apart(record: Record) -> bool:
-    """Identified, or a set of at most three groups."""
-    return bool(record["steps"]) and record["verdict"] in ("identified", "one-of") and set_size(record) <= 3
+    """Identified, or a 95 % set of at most three groups."""
+    if not record["steps"]:
+        return 0 < len(record["not_excluded"]) <= 3
+    return record["verdict"] in ("identified", "one-of") and set_size(record) <= 3
 
 
 def set_size(record: Record) -> int:

@@ -36,8 +36,9 @@ def test_what_counts_as_what() -> None:
     assert counts(everything, ["snr6"], told_apart) == (2, 4)
     assert counts(everything, ["snr6"], wrongly_named) == (1, 4)
     assert counts(everything, ["snr3"], caught) == (0, 0)
-    hiding = SILENT | {"not_excluded": ["sun", "eddies"]}
+    hiding = SILENT | {"not_excluded": [["sun"], ["eddies"]]}
     assert counts([*everything, hiding], ["snr6"], covered) == (3, 5), "not excluded where nothing stands out"
+    assert counts([hiding], ["snr6"], told_apart) == (1, 1)
     assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
 
 

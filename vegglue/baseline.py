@@ -74,6 +74,8 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
 
 def for_prediction(base: Baseline) -> Baseline:
     """The same model calibrated so that it predicts on its own grid, whatever a finer one would say."""
+    if base.coarse is None:
+        return base
     noise = scattered(base.noise)
     return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
 

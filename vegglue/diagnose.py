@@ -20,7 +20,7 @@ from vegglue.linearise import Model
 from vegglue.noise import without
 from vegglue.prune import pruned
 from vegglue.refits import accepted, refits_of
-from vegglue.suspects import suspects_of
+from vegglue.suspects import hiding, suspects_of
 from vegglue.suspicion import Look, look
 from vegglue.verdict import Misfit, judged, misfit_zones
 
@@ -115,7 +115,8 @@ def _written(first: Look, last: Look, steps: Sequence[Step], suspects: Mapping[s
     place = _where(last) if _alarm(last, steps) == "place" else None
     misfit = Misfit(chi2(noise, point), noise.rows.size - point.z.size - len(last.flagged))
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.refitted, -(one.score**2))))
-    verdict, sentence, remarks = judged(noise, steps, ranked, place, misfit, last.flagged)
+    open_still = () if steps or place else hiding(last)
+    verdict, sentence, remarks = judged(noise, steps, ranked, place, misfit, last.flagged, open_still)
     mapped = first if place is None else last  # a place is found in what the steps leave
     return Diagnosis(
         name=first.base.model.case.name,
@@ -125,6 +126,7 @@ def _written(first: Look, last: Look, steps: Sequence[Step], suspects: Mapping[s
         suspects=ranked,
         steps=tuple(steps),
         where=place,
+        not_excluded=open_still,
         chi2=misfit.chi2,
         freedom=misfit.freedom,
         p_misfit=misfit.p,

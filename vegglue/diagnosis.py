@@ -1,7 +1,7 @@
 """What a diagnosis says: the verdict, the effects that explain the misfit, where it lies, and all numbers behind it."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
@@ -15,10 +15,8 @@ from vegglue.layout import Group, Variable, table_group
 Verdict = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
 # Sum over families of what the data may accuse without cause: listed effects and unlisted places.
 ALARM, ALARM_OF_PLACES = 0.04, 0.01
-# What an effect scores at least, 19 times of 20, when its trace is three standard errors long.
-HIDING = 3.0 - 1.645
 # Fields that are lists or tables of plain values.
-LISTS = ("remarks", "flagged", "first_scores", "first_parameters", "parameters")
+LISTS = ("remarks", "not_excluded", "flagged", "first_scores", "first_parameters", "parameters")
 # Fields that have one value for each station.
 AT_STATIONS = ("prediction_first", "prediction", "error")
 
@@ -86,6 +84,7 @@ class Diagnosis:
     effect explains and that stand alone; zones: misfit by experiment, section and zone; residual: (station,) of the
     baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere, of the model in
     which `where` was found, else of the first.
+    not_excluded: where nothing stood out, groups of effects that may be there all the same.
     threshold, first_scores: score that errors alone reach once in 1 / ALARM, and those of the effects at the baseline.
     """
 
@@ -96,6 +95,7 @@ class Diagnosis:
     suspects: tuple[Suspect, ...]
     steps: tuple[Step, ...]
     where: Where | None
+    not_excluded: tuple[tuple[str, ...], ...]
     chi2_first: float
     chi2: float
     freedom: int
@@ -126,18 +126,8 @@ class Diagnosis:
         return list(dict.fromkeys(name for step in self.steps for name in step.rivals))
 
     @property
-    def not_excluded(self) -> list[str]:
-        """Where nothing stood out: effects that may be hiding all the same, the most suspect first."""
-        return [] if self.steps else hiding(self.suspects)
-
-    @property
     def groups(self) -> list[list[str]]:
         return [list(group) for step in self.steps for group in step.groups]
-
-
-def hiding(suspects: Iterable[Suspect]) -> list[str]:
-    """Effects whose score leaves open that they are there, with a trace of three standard errors."""
-    return [one.name for one in suspects if abs(one.score) > HIDING]
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -218,6 +208,7 @@ def diagnosis_from(read: Mapping[str, Mapping[str, Any]], stated: Mapping[str, A
     return Diagnosis(
         **{name: kind(stated[name]) for name, kind in _plain_names().items()},
         remarks=tuple(told["remarks"]),
+        not_excluded=tuple(tuple(group) for group in told["not_excluded"]),
         suspects=_suspects_from(read["suspects"]),
         steps=tuple(_step_from(step) for step in told["steps"]),
         where=None if where is None else Where(**where | {"experiments": tuple(where["experiments"])}),

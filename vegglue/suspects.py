@@ -2,9 +2,12 @@
 
 import numpy as np
 
+from vegglue import score
 from vegglue.diagnosis import Suspect
 from vegglue.suspicion import Look
 
+# What an effect scores at least, 19 times of 20, when its trace is three standard errors long.
+HIDING = 3.0 - 1.645
 # Amplitude seen in 19 of 20 tries at the 5 % level, over its standard error.
 SEEN = 3.5
 
@@ -39,6 +42,21 @@ def _suspect(seen: Look, candidate: int) -> Suspect:
         off=amplitude.off,
         scale=amplitude.scale,
     )
+
+
+def hiding(seen: Look) -> tuple[tuple[str, ...], ...]:
+    """Groups of effects that may be there, three standard errors long, although none stands out, the best first.
+
+    Their scores leave that open, and are not so far below the best one's that it must be another.
+    """
+    gains = seen.scores / np.maximum(seen.projected.length, 1e-300)
+    slack = score.rivals(seen.projected, seen.traces.columns, gains, seed=3)
+    best = {j: seen.best_score(j) for j in seen.order}
+    most = max((value**2 for value in best.values()), default=0.0)
+    kept = [j for j in seen.order if abs(best[j]) > HIDING and most - best[j] ** 2 <= slack[j]]
+    columns = [seen.best_column(j) for j in kept]
+    cosine = score.cosines(seen.projected)[np.ix_(columns, columns)]
+    return tuple(tuple(group) for group in score.groups([seen.traces.candidates[j].name for j in kept], cosine))
 
 
 def _mimic(seen: Look, column: int) -> tuple[str, float]:

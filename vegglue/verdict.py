@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import scipy.stats
 
-from vegglue.diagnosis import Step, Suspect, Verdict, Where, hiding
+from vegglue.diagnosis import Step, Suspect, Verdict, Where
 from vegglue.effect import Array, Ground
 from vegglue.ground import ground_of
 from vegglue.linearise import Model, Point
@@ -48,9 +48,10 @@ def judged(
     place: Where | None,
     fit: Misfit,
     flagged: Sequence[int],
+    not_excluded: Sequence[Sequence[str]],
 ) -> tuple[Verdict, str, list[str]]:
     """The verdict, its sentence, and what else should be known."""
-    remarks = [*_stretched(steps, suspects), *_remarks(noise, suspects, flagged)]
+    remarks = [*_stretched(steps, suspects), *_open(not_excluded), *_remarks(noise, suspects, flagged)]
     if place is not None:
         before = f", after {_names(steps)}" if steps else ""
         return (
@@ -72,10 +73,7 @@ def judged(
 
 
 def _without_steps(suspects: Sequence[Suspect], fit: Misfit, remarks: list[str]) -> tuple[Verdict, str, list[str]]:
-    testable, open_still = [suspect for suspect in suspects if suspect.testable], hiding(suspects)
-    if open_still:
-        names = ", ".join(open_still[:SHOWN]) + (f" and {len(open_still) - SHOWN} more" * (len(open_still) > SHOWN))
-        remarks.append(f"Not excluded, should something of three standard errors be there all the same: {names}.")
+    testable = [suspect for suspect in suspects if suspect.testable]
     if fit.p < POOR:
         return (
             "cannot-tell",
@@ -134,6 +132,13 @@ def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int]) 
         names = ", ".join(_untestable(suspect) for suspect in hidden)
         remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
     return remarks
+
+
+def _open(groups: Sequence[Sequence[str]]) -> list[str]:
+    names = [name for group in groups for name in group]
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    said = f"Not excluded, should something of three standard errors be there: {', '.join(names[:SHOWN])}{more}."
+    return [said] if names else []
 
 
 def _stretched(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str]:
