@@ -150,24 +150,27 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs"), t
 
 @app.command(name="run")
 def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
-    """The whole loop: calibrate, diagnose, add what is missing, watch the error fall, report before and after."""
-    _calibrate(config, jobs, runs, trust)
+    """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report before and after."""
     last = loop(load_case(config, trust), runs, jobs)
-    if last.resolve() != config.resolve():
-        _calibrate(last, jobs, runs, trust)
     for each in dict.fromkeys((config.resolve(), last.resolve())):
-        report(each, runs=runs, trust=trust)
+        if _calibrated(each, jobs, runs, trust):
+            report(each, runs=runs, trust=trust)
 
 
-def _calibrate(config: Path, jobs: int, runs: Path, trust: bool) -> None:
-    """Ensemble and posterior, unless they are there."""
+def _calibrated(config: Path, jobs: int, runs: Path, trust: bool) -> bool:
+    """Ensemble and posterior, unless they are there; False, and why, where no posterior could be found."""
     simulate_command(config, jobs=jobs, runs=runs, trust=trust)
     case = load_case(config, trust)
     posterior = runs / case.name / "posterior.h5"
     if stored_hash(posterior) == case_hash(case):
         console.print(f"{posterior} is up to date.")
-        return
-    infer(config, jobs=jobs, runs=runs, trust=trust)
+        return True
+    try:
+        infer(config, jobs=jobs, runs=runs, trust=trust)
+    except InputError as error:
+        console.print(f"{error} There is no report of {case.name} without a posterior.")
+        return False
+    return True
 
 
 for _name, _command in (*COMMANDS, *OF_TWINS, ("effects", effects_command)):
