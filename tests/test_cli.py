@@ -15,6 +15,7 @@ from vegglue.config import case_hash, load_case, simulation_hash
 from vegglue.neighbourhood import SIZE
 from vegglue.store import read_ensemble, read_posterior, stored_hash
 
+pytestmark = pytest.mark.slow  # whole runs through the shell
 MEMBERS = 128
 STEPS = ("check", "simulate", "infer", "report")
 TRUE_N_B = 0.05  # of the README's measurements

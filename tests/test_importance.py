@@ -99,6 +99,7 @@ def test_same_seed_same_draws_and_all_count() -> None:
     assert not np.array_equal(first.z, sample(bent, squares, start(2), 300, seed=5).z)
 
 
+@pytest.mark.slow
 def test_too_few_rounds_are_no_error() -> None:
     def needle(z: np.ndarray, values: np.ndarray) -> np.ndarray:
         return -0.5 * np.sum((z - 5) ** 2 / 1e-8, axis=1)

@@ -85,6 +85,7 @@ def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: p
         np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.slow
 def test_company_does_not_change_a_member(tmp_path: Path) -> None:
     """Two leaves together against each member alone: below 1e-6 m/s and m, and as small as the tolerance asks for."""
     case, site, observations = reach_at(tmp_path)

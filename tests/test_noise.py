@@ -86,6 +86,7 @@ def test_a_station_without_a_standard_error_is_named() -> None:
     assert noise_of(table, {"velocity": 0.02}).error[7] == 0.02
 
 
+@pytest.mark.slow
 def test_doubt_about_the_correlation_keeps_alarms_rare() -> None:
     random, physics = np.random.default_rng(9), smooth()
     traces = np.linalg.qr(np.kron(np.ones((SECTIONS, 1)), smooth()[:STATIONS, :4]))[0]

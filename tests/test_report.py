@@ -26,6 +26,7 @@ from vegglue.site import Site, build_site
 from vegglue.summary import verdict
 from vegglue.survey import read_survey, rigid_cylinder
 
+pytestmark = pytest.mark.slow  # whole pages
 CONFIGS = Path(__file__).parents[1] / "configs"
 MEMBERS = 2048
 VOID = {"meta", "link", "br", "hr", "img", "input"}

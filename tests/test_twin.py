@@ -200,6 +200,7 @@ def test_the_folder_of_a_twin(ground: Ground, tmp_path: Path) -> None:
         config_in(tmp_path)
 
 
+@pytest.mark.slow
 def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     assert said_to(monkeypatch, capsys, "twin", CONFIG, "--hide", "gauge_datum=0.1", "--seed", 2, "--to", "play") == (
