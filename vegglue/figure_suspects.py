@@ -27,6 +27,8 @@ MARKS: dict[str, tuple[str, str, str]] = {
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
 }
+# Place across the panel of scores, right of which a mark would stand in the key.
+CROWDED = 0.45
 # Panels side by side.
 ACROSS = 5
 LINES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
@@ -67,6 +69,9 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
     handles = [*scores.get_legend_handles_labels()[0], *again]
     if handles:
         scores.legend(handles=handles, loc="lower right", frameon=False, fontsize=SMALL)
+        lowest = np.nan_to_num(first)[-len(handles) - 1 :]
+        if lowest.max() > CROWDED**2 * reach:  # rows of their own below the marks
+            scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), -0.9)
     visible.barh(rows, suspects["visibility"], height=0.5, color=COLOUR["narrow"])
     visible.set(xlim=(0, 1), xlabel="visibility [–]", xticks=[0, 0.5, 1])
     for axes in (scores, visible):
