@@ -185,7 +185,8 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> N
     config = ROOT / "configs" / "twin.yaml"
     vegglue(tmp_path, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
     small = tmp_path / "hidden" / "small.yaml"
-    small.write_text("extends: hidden.yaml\nname: small\nsimulate: {members: 16}\n", encoding="utf-8")
+    told = "extends: hidden.yaml\nname: small\nsimulate: {members: 16}\ninfer: {method: glue}\n"
+    small.write_text(told, encoding="utf-8")
     said = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
     assert "discharge_error[high] of -0.0" in said, "names in brackets are no markup"
     child = "small-discharge_error_high"
