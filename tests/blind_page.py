@@ -186,8 +186,8 @@ code are diagnosed in `tests/test_open_cases.py`.
 A line is met when its interval reaches what is wanted. The 95 % set is what the verdict names. Where nothing stands out
 it is nothing, or one of the effects that are listed as not excluded, and its groups are counted alike. With a chance of
 5 % of a false alarm over all effects together the threshold is a score of about 3.2, which an effect of ratio 3 passes
-in less than half of all data sets. Mean number of groups in a set, {sizes}. Left out, since these data would not show
-them at any plausible size: {left_out}.
+in less than half of all data sets, which bounds the share of small sets there. Mean number of groups in a set,
+{sizes}. Left out at some true parameters, since the data would not show them at any plausible size: {left_out}.
 
 ![Shares and their intervals](blind-alarms.svg)
 
