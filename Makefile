@@ -51,7 +51,7 @@ test: $(READY)  # everything that must pass
 	$(BIN)/mypy
 	$(BIN)/pytest tests
 
-check: $(READY)  # the fast part, under a minute
+check: $(READY)  # the fast part
 	$(BIN)/ruff check vegglue tests
 	$(BIN)/mypy
 	$(BIN)/pytest tests -m 'not slow'

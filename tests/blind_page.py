@@ -76,6 +76,7 @@ def shrank(record: Record) -> bool | None:
     return 0 < done["after"] < done["before"] if done else None
 
 
+SILENT = "nothing-missing"
 LISTED = ("snr3", "snr6")
 NAMED = (*LISTED, "two", "probe")
 LINES: tuple[tuple[str, tuple[str, ...], Callable[[Record], bool | None], str], ...] = (
@@ -122,9 +123,11 @@ def write_page(records: Sequence[Record], folder: Path) -> None:
         for group in ("snr3", "snr6")
         if (found := [set_size(record) for record in done if record["group"] == group and record["steps"]])
     )
+    open_still = [len(one["not_excluded"]) for one in done if one["group"] == "snr3" and one["verdict"] == SILENT]
     seconds = np.median([record["seconds"] for record in done]) if done else float("nan")
     text = PAGE.format(
-        table="\n".join(rows), sizes=sizes or "-", count=len(done), seconds=seconds,
+        table="\n".join(rows), sizes=sizes or "-",
+        still=f"{np.mean(open_still):.1f}" if open_still else "-", count=len(done), seconds=seconds,
         left_out=", ".join(f"`{name}`" for name in left_out) or "none",
     )  # fmt: skip
     folder.mkdir(exist_ok=True)
@@ -179,7 +182,9 @@ parameters 0.3 to 1 standard deviations off the centre of their priors, with new
 as makes it visible at the ratio stated (length of its trace, whitened, after what calibration can mimic is taken off)
 on the true flow; shapes lie between the values that the search tries. A diagnosis took {seconds:.0f} s of one core
 (median). The truth differs from the model in its grid, parameters and errors, not in its equations: data of another
-code are diagnosed in `tests/test_open_cases.py`.
+code are diagnosed in `tests/test_open_cases.py`. The cells are those that `vegglue import` makes, 16 across the floor.
+On cells twice as wide the difference between the grids alone made 14 alarms in 134 sets with correlated errors and
+nothing hidden (5 in 121 with the truth on the same grid), which is why the study was moved to these.
 
 {table}
 
@@ -187,7 +192,9 @@ A line is met when its interval reaches what is wanted. The 95 % set is what the
 it is nothing, or one of the effects that are listed as not excluded, and its groups are counted alike. With a chance of
 5 % of a false alarm over all effects together the threshold is a score of about 3.2, which an effect of ratio 3 passes
 in less than half of all data sets, which bounds the share of small sets there. Mean number of groups in a set,
-{sizes}. Left out at some true parameters, since the data would not show them at any plausible size: {left_out}.
+{sizes}; in those of ratio 3 where nothing stands out {still}: these hold what scores above
+3 - 1.645, so that most truths are among them by construction, and say little. Left out at some true parameters, since
+the data would not show them at any plausible size: {left_out}.
 
 ![Shares and their intervals](blind-alarms.svg)
 

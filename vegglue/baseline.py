@@ -104,10 +104,10 @@ def coarser(model: Model) -> Model | None:
     None where their number is odd or would become too small.
     """
     grid = model.site.grid
-    along, across = (1 if grid.dx > LONG * grid.dy else 2), 2
-    if grid.x.size % along or grid.y.size % across or min(grid.x.size / along, grid.y.size / across) < FEWEST_CELLS:
+    along = 1 if grid.dx > LONG * grid.dy else 2
+    if grid.x.size % along or grid.y.size % 2 or min(grid.x.size / along, grid.y.size / 2) < FEWEST_CELLS:
         return None
-    cell = (along * model.case.grid.cell[0], across * model.case.grid.cell[1])
+    cell = (along * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])
     case: Case = model.case.model_copy(update={"grid": model.case.grid.model_copy(update={"cell": cell})})
     return Model(case, build_site(case), model.station)
 
