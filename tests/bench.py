@@ -5,30 +5,35 @@ import os
 import platform
 import pstats
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from vegglue.config import load_case
-from vegglue.march import advance
-from vegglue.neighbourhood import leaves
+from vegglue.flow import faces
+from vegglue.march import advance, march
+from vegglue.neighbourhood import leaves, solve_members
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
-from vegglue.simulate import begin_at, chunk_size, solve_chunk, unit_places
+from vegglue.simulate import _problem_at, begin_at, chunk_size, solve_chunk, unit_places
 from vegglue.site import build_site
 from vegglue.start import backwater
 
 CONFIG = Path(__file__).parents[1] / "configs" / "d3a.yaml"
 PHASES = {
-    "residual": "residual",
+    "eased": "residual of chord steps",
     "jacobian": "Jacobian, its residuals included",
     "factor": "factorisation",
     "solve": "back-substitution",
     "next_state": "Anderson mixing",
+    "_starts": "starts from solved neighbours",
 }
 PAPER_STEPS = 6000
+SAMPLE = 128
+MARCHED_STEP, MARCHED = 0.5, 240
 
 
 def main() -> None:
@@ -37,6 +42,8 @@ def main() -> None:
     step = marching(case)
     member = steady(case)
     print(f"steady state by Newton / {PAPER_STEPS:,} marched steps: {PAPER_STEPS * step / member:.0f} times faster")
+    same(case)
+    sizes(case)
     cores(case)
 
 
@@ -75,6 +82,63 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
         count, spent = calls[name]
         print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
     return seconds / len(chunk)
+
+
+def sizes(case) -> None:  # type: ignore[no-untyped-def]
+    """Seconds a member in one process, SAMPLE neighbours of the prior, on other cells and on shorter reaches."""
+    along = [on_grid(case, (x, 471.0), (0.5, 0.375)) for x in (300.0, 471.0 - 2 * 171.0, 0.0)]
+    both = [on_grid(case, (300.0, 471.0), cell) for cell in ((1.0, 0.75), (0.5, 0.375), (0.25, 0.1875))]
+    for words, cases in (("longer", along), ("refined both ways", both)):
+        cells, seconds = np.array([timed(one) for one in cases]).T
+        for number, spent in zip(cells, seconds, strict=True):
+            print(f"{words}: {number:,.0f} cells, {1 / spent:.1f} members/s on one core")
+        power = np.polyfit(np.log(cells), np.log(seconds), 1)[0]
+        print(f"  cost grows with cells^{power:.2f} over a factor of {cells[-1] / cells[0]:.0f}")
+    for cell in ((1.0, 0.75), (0.25, 0.1875)):
+        number, spent = timed(on_grid(case, (0.0, 571.0), cell))
+        print(f"the paper's channel on cells of {cell[0]} x {cell[1]} m ({number:,} cells): {1 / spent:.1f} members/s")
+
+
+def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: ignore[no-untyped-def]
+    """A case on part of its channel, with the depth it has at its end, and on other cells."""
+    rise = -case.bed[0].trapezoid.bed_slope * (x[1] - case.grid.x[1])
+    experiments = {name: one.model_copy(update={"level": one.level + rise}) for name, one in case.experiments.items()}
+    grid = case.grid.model_copy(update={"x": x, "cell": cell})
+    return case.model_copy(update={"grid": grid, "experiments": experiments})
+
+
+def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
+    """Cells, and seconds a member on one core."""
+    site, observations = build_site(case), read_observations(case)
+    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
+    chunk = places[leaves(places, SAMPLE)[SAMPLE // 4]]
+    begin = begin_at(case, site)
+    solve_chunk(case, site, observations, chunk[:2], begin)
+    began = time.perf_counter()
+    rows = solve_chunk(case, site, observations, chunk, begin)
+    seconds = time.perf_counter() - began
+    if (rows["status"] != 0).any():
+        print(f"  {int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed")
+    return site.bed.size, seconds / len(chunk)
+
+
+def same(case) -> None:  # type: ignore[no-untyped-def]
+    """64 members spread over the priors: from their neighbours by chord steps, and each settled by marching on."""
+    short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
+    site = build_site(short)
+    theta = sample_prior(short.parameters, 64, 1)
+    places = unit_places(short, theta)
+    build = partial(_problem_at, short, site, "D3a")
+    solved = solve_members(build, places, 1e-8)
+    began = time.perf_counter()
+    moved = march(build(places), solved.state, MARCHED_STEP, MARCHED)
+    depth = faces(build(places), solved.state).cell[:, None]
+    gap = np.abs(moved - solved.state) * (depth > 0.05)
+    print(
+        f"64 members over the priors, 342 x 40 cells: {int((solved.status == 0).sum())} by Newton; marched on for "
+        f"{MARCHED * MARCHED_STEP:.0f} s they move by at most {gap.max():.0e} m/s or m where water is deeper than "
+        f"5 cm ({time.perf_counter() - began:.0f} s)"
+    )
 
 
 def cores(case) -> None:  # type: ignore[no-untyped-def]

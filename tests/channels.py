@@ -1,9 +1,11 @@
-"""Channels that the verification tests share: small, with smooth walls, of one member."""
+"""Channels that the verification tests share: small, with smooth walls."""
+
+from dataclasses import replace
 
 import numpy as np
 
-from vegglue import kernels
-from vegglue.flow import LEVEL, Array, Inflow, Plants, Problem, faces
+from vegglue import roughness
+from vegglue.flow import LEVEL, Array, Inflow, Plants, Problem, faces, take
 from vegglue.start import backwater
 from vegglue.steady import newton
 
@@ -20,7 +22,7 @@ def make_problem(
     cell: tuple[float, float],
     discharge: float,
     level: float,
-    friction: tuple[int, float] = (kernels.CHEZY, 50.0),
+    friction: tuple[int, float] = (roughness.CHEZY, 50.0),
     **changes: object,
 ) -> Problem:
     """One friction class, inflow from the west by conveyance, outlet all along the east, a film of 0.1 mm."""
@@ -68,7 +70,7 @@ def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: obj
     column, row = np.nonzero(((x > 12.0) & (x < 16.0))[:, None] & ((y > 0.0) & (y < 1.5))[None])
     one = np.ones((column.size, 1))
     settings = {
-        "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+        "law": np.array([roughness.MANNING, roughness.KEULEGAN]),
         "coefficient": np.array([[0.06], [1.0]]),
         "friction_class": banks,
         "plants": Plants(column, row, 4.0 * one, 0.7 * one, 60.0 * one),
@@ -106,3 +108,12 @@ def filled(problem: Problem, level: float) -> Array:
     state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
     state[:, LEVEL] = level
     return state
+
+
+def family(places: Array) -> Problem:
+    """The reach for members at places (m, 2) of a unit square: roughness of the floor, density of the plants."""
+    places = np.atleast_2d(places)
+    many = take(river(), np.zeros(len(places), dtype=np.int64))
+    coefficient = np.stack([0.03 + 0.06 * places[:, 0], np.full(len(places), 1.0)])
+    phi = many.plants.phi * 10.0 ** (places[:, 1] - 0.5)
+    return replace(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))

@@ -11,7 +11,7 @@ import pytest
 from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import quad
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.effect import Acting, Ground
 from vegglue.effects import library
 from vegglue.flow import faces
@@ -67,7 +67,7 @@ def developed(chezy, strength, ratio, flow, rows):
         flow,
         DEPTH - SLOPE * COLUMNS * SPACING,
         friction_class=np.broadcast_to((y > 0.5 * WIDTH).astype(np.int64), shape).copy(),
-        law=np.array([kernels.CHEZY, kernels.CHEZY]),
+        law=np.array([roughness.CHEZY, roughness.CHEZY]),
         coefficient=np.array(chezy)[:, None],
         acting=acting,
         ground=panels(bed, rows),

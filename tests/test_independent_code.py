@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from channels import centres, make_problem, solved, trapezoid
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import LEVEL, Plants, faces
 from vegglue.sensor import read_sensors
 from vegglue.site import Grid
@@ -50,7 +50,7 @@ def test_true_parameters_reproduce_the_holdout():
     stems = np.array([patch["stems_per_m2"] for patch in place["patches"]])[number][:, None]
     plants = Plants(column, row, truth["phi"] * stems / 22.0, 0.0 * stems + truth["hd"], 0.0 * stems + 60.0)
     changes = {
-        "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+        "law": np.array([roughness.MANNING, roughness.KEULEGAN]),
         "coefficient": np.array([[truth["nb"]], [truth["ks"]]]),
         "friction_class": banks,
         "plants": plants,
@@ -80,7 +80,7 @@ def papers_channel(case):
     else:
         one = np.ones((column.size, 1))
         changes = {
-            "law": np.array([kernels.MANNING, kernels.KEULEGAN]),
+            "law": np.array([roughness.MANNING, roughness.KEULEGAN]),
             "coefficient": np.array([[0.10], [2.7]]),
             "plants": Plants(column, row, 40.0 * one, 0.8 * one, 60.0 * one),
         }

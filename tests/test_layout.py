@@ -20,7 +20,7 @@ HOMES = {
         "channel_figure", "diagnosis_pictures", "figure_ladder", "figure_misfit", "figure_plan", "figure_posterior",
         "figure_style", "figure_suspects", "figures", "reported",
     },
-    "numba": {"blocks", "kernels", "sweeps"},
+    "numba": {"blocks", "elementary", "sweeps"},
     "pandas": {
         "adv", "aside", "candidates", "contract", "design", "diagnosis", "diagnosis_pictures", "ensemble", "extend",
         "figure_misfit", "figure_suspects", "figures", "flow_pictures", "groundwork", "infer", "layout",

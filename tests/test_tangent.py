@@ -8,10 +8,11 @@ import pytest
 from channels import centres, river
 
 from vegglue.flow import ALONG, residual
+from vegglue.jacobian import factors
 from vegglue.sensor import read_sensors, reading_weights
 from vegglue.site import Grid
 from vegglue.start import backwater
-from vegglue.steady import factors, newton
+from vegglue.steady import newton
 from vegglue.tangent import adjoints, along, tangents
 
 STEP = 1e-5

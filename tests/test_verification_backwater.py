@@ -7,7 +7,7 @@ import pytest
 from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import solve_ivp
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import LEVEL
 
 FLOW, MANNING, SLOPE, REACH = 2.0, 0.03, 0.001, 2000.0
@@ -24,7 +24,7 @@ def froude_squared(depth: float) -> float:
 
 def depths(bed: np.ndarray, length: float, manning: float, level: float) -> np.ndarray:
     """Depth along a channel of 2 m2/s, two cells across; the film adds nothing at a hundredth of a millimetre."""
-    problem = make_problem(bed, (length / len(bed), 1.0), 2.0 * FLOW, level, (kernels.MANNING, manning), film=1e-5)
+    problem = make_problem(bed, (length / len(bed), 1.0), 2.0 * FLOW, level, (roughness.MANNING, manning), film=1e-5)
     state = solved(problem)
     assert discharge(problem, state) == pytest.approx(2.0 * FLOW, rel=1e-9)
     assert state[:, LEVEL, 0] == pytest.approx(state[:, LEVEL, 1], abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import quad, solve_bvp
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import Array, faces
 
 WIDTH, DEPTH, SLOPE = 6.0, 0.5, 0.001
@@ -25,7 +25,7 @@ def developed(viscosity: Array, flow: float, rows: int) -> Array:
         flow,
         DEPTH - SLOPE * COLUMNS * SPACING,
         friction_class=np.broadcast_to((y > 0.5 * WIDTH).astype(np.int64), shape).copy(),
-        law=np.array([kernels.CHEZY, kernels.CHEZY]),
+        law=np.array([roughness.CHEZY, roughness.CHEZY]),
         coefficient=np.array([[SMOOTH], [ROUGH]]),
         viscosity=np.broadcast_to(viscosity[None, :, None], (*shape, 1)).copy(),
         film=1e-5,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from channels import GRAVITY, filled, make_problem, order, shown
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import ACROSS, ALONG, LEVEL, faces, residual, storage
 
 VISCOSITY, CHEZY, REACH = 0.3, 20.0, (12.0, 9.0)
@@ -83,7 +83,7 @@ def operator_errors(cells):
     where = places(cells)
     cell = (REACH[0] / cells[0], REACH[1] / cells[1])
     problem = make_problem(
-        bed(*where[LEVEL]), cell, 1.0, 1.2, (kernels.CHEZY, CHEZY), viscosity=np.array([VISCOSITY]), film=1e-6
+        bed(*where[LEVEL]), cell, 1.0, 1.2, (roughness.CHEZY, CHEZY), viscosity=np.array([VISCOSITY]), film=1e-6
     )
     state = np.stack([function(*at) for function, at in zip((level, across, along), where, strict=True)], axis=1)
     rates = residual(problem, np.ascontiguousarray(state[..., None]))[..., 0]
@@ -106,7 +106,7 @@ def test_advection_is_upwind_to_third_order():
     errors = []
     for cells in (40, 80, 160):
         dx = 10.0 / cells
-        problem = make_problem(np.zeros((cells, 4)), (dx, 1.0), 1.0, 1.0, (kernels.CHEZY, 1e9), film=1e-9)
+        problem = make_problem(np.zeros((cells, 4)), (dx, 1.0), 1.0, 1.0, (roughness.CHEZY, 1e9), film=1e-9)
         state = filled(problem, 1.0)
         x = (np.arange(cells) + 1.0) * dx
         u, rise = 5.0 + 1e-3 * np.sin(2.0 * x), 2e-3 * np.cos(2.0 * x)
@@ -120,7 +120,7 @@ def test_water_flowing_back_is_carried_from_downstream():
     """Against the channel the upwind value is the first-order one, on the right side: order one, not instability."""
     errors = []
     for cells in (40, 80, 160):
-        problem = make_problem(np.zeros((cells, 4)), (10.0 / cells, 1.0), 1.0, 1.0, (kernels.CHEZY, 1e9), film=1e-9)
+        problem = make_problem(np.zeros((cells, 4)), (10.0 / cells, 1.0), 1.0, 1.0, (roughness.CHEZY, 1e9), film=1e-9)
         state = filled(problem, 1.0)
         x = (np.arange(cells) + 1.0) * 10.0 / cells
         u, rise = -1.0 + 0.1 * np.sin(2.0 * x), 0.2 * np.cos(2.0 * x)
@@ -136,7 +136,7 @@ WIGGLES = [("along", 0), ("along", 1), ("across", 0), ("across", 1)]
 @pytest.mark.parametrize(("velocity", "axis"), WIGGLES)
 def test_advection_damps_wiggles(velocity, axis, drift):
     """From the right side: a wiggle from cell to cell loses energy, whichever way it is carried."""
-    problem = make_problem(np.zeros((20, 18)), (1.0, 1.0), 1.0, 1.0, (kernels.CHEZY, 1e9), film=1e-9)
+    problem = make_problem(np.zeros((20, 18)), (1.0, 1.0), 1.0, 1.0, (roughness.CHEZY, 1e9), film=1e-9)
     calm = filled(problem, 1.0)
     calm[:, ALONG], calm[:, ACROSS, 1:] = 1.0, drift
     wiggle = np.zeros_like(calm)
@@ -203,7 +203,7 @@ def test_storage_is_the_derivative_of_depth():
 def test_film_is_not_carried(above, share):
     """Of u du/dx the film keeps nothing and water everything: h^4 / (h^4 + (2 f)^4), 1e-4 off at 20 f."""
     film = 0.001
-    problem = make_problem(np.zeros((12, 4)), (1.0, 1.0), 0.0, above, (kernels.CHEZY, 1e9), film=film)
+    problem = make_problem(np.zeros((12, 4)), (1.0, 1.0), 0.0, above, (roughness.CHEZY, 1e9), film=film)
     problem = replace(problem, inflows=())
     state = filled(problem, above)
     state[:, ALONG] = (1.0 + 0.1 * np.arange(12))[:, None, None]

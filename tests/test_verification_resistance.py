@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from channels import GRAVITY, discharge, make_problem, planted, sloping, solved
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import ALONG, LEVEL, drag, faces, residual
 from vegglue.start import backwater
 
@@ -39,16 +39,16 @@ def plants(phi, height, bare=60.0, proportional=False):
 
 # name: (depth [m], Chezy coefficient [m^1/2/s], what makes the problem)
 LAWS = {
-    "manning": (0.8, manning(0.8, 0.03), classes(kernels.MANNING, 0.03)),
-    "manning-shallow": (0.1, manning(0.1, 0.06), classes(kernels.MANNING, 0.06)),
-    "keulegan": (0.8, keulegan(0.8, 0.5), classes(kernels.KEULEGAN, 0.5)),
-    "keulegan-clipped": (0.3, 18.0 * np.log10(1.3), classes(kernels.KEULEGAN, 2.9)),
+    "manning": (0.8, manning(0.8, 0.03), classes(roughness.MANNING, 0.03)),
+    "manning-shallow": (0.1, manning(0.1, 0.06), classes(roughness.MANNING, 0.06)),
+    "keulegan": (0.8, keulegan(0.8, 0.5), classes(roughness.KEULEGAN, 0.5)),
+    "keulegan-clipped": (0.3, 18.0 * np.log10(1.3), classes(roughness.KEULEGAN, 2.9)),
     "keulegan-other-clip": (
         0.3,
         18.0 * np.log10(1.0129),
-        classes(kernels.KEULEGAN, 4.0) | {"log_argument_minimum": 1.0129},
+        classes(roughness.KEULEGAN, 4.0) | {"log_argument_minimum": 1.0129},
     ),
-    "chezy": (0.8, 35.0, classes(kernels.CHEZY, 35.0)),
+    "chezy": (0.8, 35.0, classes(roughness.CHEZY, 35.0)),
     "baptist-emergent": (0.5, baptist(0.5, 2.0, 0.8, 60.0), plants(2.0, 0.8)),
     "baptist-emergent-proportional": (0.5, baptist(0.5, 2.0, 0.8, 60.0, True), plants(2.0, 0.8, proportional=True)),
     "baptist-submerged": (1.3, baptist(1.3, 2.0, 0.8, 60.0), plants(2.0, 0.8)),
@@ -93,8 +93,8 @@ def test_drag_follows_depth(law):
     """Over depths from the film to deep water, through k_s/12 and the canopy."""
     depth = np.geomspace(1e-3, 5.0, COLUMNS * ROWS).reshape(COLUMNS, ROWS, 1)
     changes, chezy = {
-        "manning": (classes(kernels.MANNING, 0.05), [manning(h, 0.05) for h in depth.ravel()]),
-        "keulegan": (classes(kernels.KEULEGAN, 2.7), [keulegan(h, 2.7) for h in depth.ravel()]),
+        "manning": (classes(roughness.MANNING, 0.05), [manning(h, 0.05) for h in depth.ravel()]),
+        "keulegan": (classes(roughness.KEULEGAN, 2.7), [keulegan(h, 2.7) for h in depth.ravel()]),
         "baptist": (plants(40.0, 0.8), [baptist(h, 40.0, 0.8, 60.0) for h in depth.ravel()]),
     }[law]
     problem, _ = uniform(1.0, 50.0, changes)
@@ -104,9 +104,9 @@ def test_drag_follows_depth(law):
 @pytest.mark.parametrize(
     ("law", "value", "chezy"),
     [
-        (kernels.MANNING, 0.05, manning),
-        (kernels.KEULEGAN, 1.0, keulegan),
-        (kernels.CHEZY, 30.0, lambda h, c: c),
+        (roughness.MANNING, 0.05, manning),
+        (roughness.KEULEGAN, 1.0, keulegan),
+        (roughness.CHEZY, 30.0, lambda h, c: c),
     ],
     ids=["manning", "keulegan", "chezy"],
 )
@@ -128,7 +128,7 @@ def test_a_cell_on_a_slope_conveys_what_its_slope_conveys(law, value, chezy):
             wet = strips[strips > 0.0]
             conveyed = sum(chezy(h, value) * h**1.5 for h in wet) / strips.size
             expected = 9.81 * (strips.mean() / conveyed) ** 2
-            clipped = law == kernels.KEULEGAN and strips.min() < 0.2
+            clipped = law == roughness.KEULEGAN and strips.min() < 0.2
             tolerance = 1e-5 if strips.min() > 0.5 else 2e-2 if clipped else 2e-3
             assert rates[row] == pytest.approx(expected, rel=tolerance)
 
@@ -146,7 +146,7 @@ def test_emergent_conventions_differ_below_the_canopy_only():
 
 def test_laws_stay_finite_as_water_vanishes():
     depth = np.full((COLUMNS, ROWS, 1), 1e-4)
-    for changes in (classes(kernels.MANNING, 0.1), classes(kernels.KEULEGAN, 5.0), plants(100.0, 0.8)):
+    for changes in (classes(roughness.MANNING, 0.1), classes(roughness.KEULEGAN, 5.0), plants(100.0, 0.8)):
         problem, _ = uniform(1.0, 50.0, changes)
         rates = drag(problem, depth)
         assert np.isfinite(rates).all()
@@ -155,7 +155,7 @@ def test_laws_stay_finite_as_water_vanishes():
 
 def test_plants_replace_the_class_of_their_cells():
     """A patch in a corner: its cells have Baptist's drag, all others their class's."""
-    problem, _ = uniform(1.0, 50.0, classes(kernels.CHEZY, 30.0))
+    problem, _ = uniform(1.0, 50.0, classes(roughness.CHEZY, 30.0))
     inside = planted((4, 2), 2.0, 0.8, 60.0)
     cells = np.full((COLUMNS, ROWS, 1), 0.5)
     rates = drag(replace(problem, plants=inside), cells)[..., 0]
@@ -166,7 +166,7 @@ def test_plants_replace_the_class_of_their_cells():
 
 def test_friction_is_linear_below_a_millimetre_per_second():
     """Creeping flow: the force is k sqrt(u^2 + (1 mm/s)^2) u, here at u = 0.5 mm/s."""
-    problem, _ = uniform(1.0, 20.0, classes(kernels.CHEZY, 20.0))
+    problem, _ = uniform(1.0, 20.0, classes(roughness.CHEZY, 20.0))
     state = np.zeros((COLUMNS, 3, ROWS, 1))
     state[:, LEVEL], state[:, ALONG] = 1.0 + problem.bed[:, :, None], 5e-4
     drag_force = residual(problem, state)[3:-3, ALONG] + GRAVITY * SLOPE

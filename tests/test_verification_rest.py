@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from channels import filled, make_problem, river
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import ALONG, LEVEL, faces, residual
 from vegglue.march import march
 
@@ -20,7 +20,7 @@ def rough_bed(shape: tuple[int, int]) -> np.ndarray:
 
 def lake(level: float, film: float = 0.01):
     bed = rough_bed((40, 30))
-    return make_problem(bed, (0.5, 0.375), 0.0, level, (kernels.KEULEGAN, 1.0), viscosity=np.array([0.01]), film=film)
+    return make_problem(bed, (0.5, 0.375), 0.0, level, (roughness.KEULEGAN, 1.0), viscosity=np.array([0.01]), film=film)
 
 
 @pytest.mark.parametrize("level", [1.5, 0.1, -0.3], ids=["wet", "islands", "ponds"])

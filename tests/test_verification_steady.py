@@ -5,19 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import GRAVITY, centres, discharge, make_problem, river, sloping, solved
+from channels import GRAVITY, centres, discharge, family, make_problem, river, sloping, solved
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from vegglue import kernels
+from vegglue import roughness
+from vegglue.chord import chord
 from vegglue.contract import mirrored
 from vegglue.flow import ACROSS, ALONG, LEVEL, Inflow, faces, residual, take
+from vegglue.jacobian import factors, jacobian
 from vegglue.march import march, settle
 from vegglue.neighbourhood import solve_members
 from vegglue.sensor import read_sensors
 from vegglue.site import Grid
 from vegglue.start import backwater
-from vegglue.steady import chord, factors, jacobian
 
 CHANCE = np.random.default_rng(3)
 
@@ -38,15 +39,6 @@ def flipped(problem):
         friction_class=np.ascontiguousarray(problem.friction_class[:, ::-1]),
         plants=replace(problem.plants, row=rows - 1 - problem.plants.row),
     )
-
-
-def family(places):
-    """The reach for members at places (m, 2) of a unit square: roughness of the floor, density of the plants."""
-    places = np.atleast_2d(places)
-    many = take(river(), np.zeros(len(places), dtype=np.int64))
-    coefficient = np.stack([0.03 + 0.06 * places[:, 0], np.full(len(places), 1.0)])
-    phi = many.plants.phi * 10.0 ** (places[:, 1] - 0.5)
-    return replace(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))
 
 
 def test_every_section_carries_the_inflow():
@@ -210,7 +202,7 @@ def compare_jacobian(problem, state):
 def test_jacobian_is_the_derivative_of_the_residual():
     """In deep water with currents both ways across: every row."""
     bed = 0.05 * np.sin(np.arange(20))[:, None] * np.cos(np.arange(8))[None]
-    problem = make_problem(bed, (0.5, 0.4), 2.0, 1.0, (kernels.MANNING, 0.05), viscosity=np.array([0.02]))
+    problem = make_problem(bed, (0.5, 0.4), 2.0, 1.0, (roughness.MANNING, 0.05), viscosity=np.array([0.02]))
     problem = replace(problem, inflows=(replace(problem.inflows[0], by_conveyance=False),))
     worst = compare_jacobian(problem, disturbed(solved(problem), 0.01))
     print(f"J against differences, deep water: {worst.max():.1e} of the row's size")
@@ -279,7 +271,7 @@ def joined():
         Inflow("north", 30, 34, np.array([0.25]), by_conveyance=False),
     )
     changes = {"inflows": sides, "viscosity": np.array([0.02])}
-    return make_problem(sloping(30.0, 60, 8, 0.0005), (0.5, 0.5), 1.0, 0.6, (kernels.MANNING, 0.03), **changes)
+    return make_problem(sloping(30.0, 60, 8, 0.0005), (0.5, 0.5), 1.0, 0.6, (roughness.MANNING, 0.03), **changes)
 
 
 def test_side_inflows_conserve_mass():
@@ -322,7 +314,7 @@ def test_side_inflow_brings_only_its_own_momentum_along(side, along):
         Inflow(side, 30, 40, np.array([0.5]), by_conveyance=False, along=along),
     )
     changes = {"inflows": sides, "viscosity": np.array([0.2]), "film": 0.001}
-    problem = make_problem(np.zeros((80, 4)), (0.5, 0.5), 1.0, 1.0, (kernels.CHEZY, 5e3), **changes)
+    problem = make_problem(np.zeros((80, 4)), (0.5, 0.5), 1.0, 1.0, (roughness.CHEZY, 5e3), **changes)
     now = faces(problem, solved(problem))
     pushed = (now.flux_x * now.u + 0.5 * 9.81 * now.face_x**2).sum(axis=1)[:, 0] * 0.5
     taken = (now.flux_x * now.u).sum(axis=1)[:, 0] * 0.5
@@ -333,7 +325,7 @@ def test_side_inflow_brings_only_its_own_momentum_along(side, along):
 def over(profile):
     """3 m3/s through a rectangular channel 6 m wide and 30 m long, 0.5 m deep at its outlet."""
     bed, changes = np.repeat(profile[:, None], 4, axis=1), {"viscosity": np.array([0.01]), "film": 0.002}
-    return make_problem(bed, (0.5, 1.5), 3.0, 0.44, (kernels.MANNING, 0.03), **changes)
+    return make_problem(bed, (0.5, 1.5), 3.0, 0.44, (roughness.MANNING, 0.03), **changes)
 
 
 def weir(height):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from channels import GRAVITY, centres, filled, make_problem
 
-from vegglue import kernels
+from vegglue import roughness
 from vegglue.flow import LEVEL
 from vegglue.march import march
 
@@ -14,7 +14,7 @@ DEPTH, LENGTH, CELLS, HEIGHT = 1.0, 20.0, 40, 1e-6
 def basin(shape: tuple[int, int], cell: tuple[float, float]):
     """Walls all around, next to no friction."""
     nothing = {"inflows": (), "outlet": np.zeros(shape[1], bool), "film": 1e-6}
-    return make_problem(np.zeros(shape), cell, 0.0, DEPTH, (kernels.CHEZY, 1e6), **nothing)
+    return make_problem(np.zeros(shape), cell, 0.0, DEPTH, (roughness.CHEZY, 1e6), **nothing)
 
 
 def amplitudes(problem, shape, step, steps, theta):

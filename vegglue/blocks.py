@@ -81,8 +81,12 @@ def solve(blocks, far, right):
 
 @compiled
 def remember(turns, sums, slot, state, step, last_state, last_step):
-    """Slot of the memory: t = f - f_last, s = (x - x_last) + t, member by member."""
-    nx, _, ny, m = state.shape
+    """Slot of the memory: t = f - f_last, s = (x - x_last) + t, member by member.
+
+    Returned: inner products per member of that turn with every turn, and of every turn with f, two arrays (depth, m).
+    """
+    depth, nx, _, ny, m = turns.shape
+    gram, right = np.zeros((depth, m)), np.zeros((depth, m))
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
@@ -90,16 +94,6 @@ def remember(turns, sums, slot, state, step, last_state, last_step):
                     turn = step[i, e, j, k] - last_step[i, e, j, k]
                     turns[slot, i, e, j, k] = turn
                     sums[slot, i, e, j, k] = turn + state[i, e, j, k] - last_state[i, e, j, k]
-
-
-@compiled
-def products(turns, slot, step):
-    """Inner products per member of turn `slot` with every turn, and of every turn with f: two arrays (depth, m)."""
-    depth, nx, _, ny, m = turns.shape
-    gram, right = np.zeros((depth, m)), np.zeros((depth, m))
-    for i in range(nx):
-        for e in range(3):
-            for j in range(ny):
                 for d in range(depth):
                     for k in range(m):
                         gram[d, k] += turns[slot, i, e, j, k] * turns[d, i, e, j, k]

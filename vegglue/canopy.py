@@ -22,7 +22,8 @@ fixed at plausible values.
 
 import math
 
-from vegglue.kernels import GRAVITY, KARMAN, compiled
+from vegglue.elementary import compiled
+from vegglue.kernels import GRAVITY, KARMAN
 
 LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
 BAPTIST, HUTHOFF, KLOPSTRA, LUHAR_NEPF, STONE_SHEN, YANG_CHOI = range(6)

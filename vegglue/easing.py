@@ -1,9 +1,15 @@
-"""Momentum of thin water eased for chord steps: rows in which friction is so far from linear that frozen slopes fail.
+"""Thin water eased for chord steps, where both its laws are far from linear: friction in the velocity, and what a
+face carries in the level.
 
-Steps with another member's Jacobian overshoot along the waterline long after the rest of the flow has settled. Written
-with its own root, a row is linear in its velocity: 8 steps instead of 15 for a member of one chunk of the paper's
-ensemble, 15 instead of 30 in another (means of 100), and 2 factorisations instead of 11, 7 instead of 17.
-This is a left nonlinear preconditioner, as in Cai and Keyes 2002, doi:10.1137/S106482750037620X; not
+Steps with another member's Jacobian overshoot along the waterline long after the rest of the flow has settled. Hence,
+on thin faces,
+
+    rows of momentum are written as slope (u - u*), u* their root in u, all else as it is;
+    the unknown is w = rho u, rho = h / h_c, with h_c the depth at the centre: what it carries is linear in w.
+
+Both are one where water is deep, leave roots where they are and vanish at the centre. Means of iterations over two
+chunks of the paper's ensemble: 15 and 30 without, 12 and 11 with the first alone, see DECISIONS for both. A nonlinear
+preconditioner from the left and one from the right, as in Cai and Keyes 2002, doi:10.1137/S106482750037620X; not
 checked against it.
 """
 
@@ -11,54 +17,59 @@ import math
 
 import numpy as np
 
-from vegglue.kernels import REST_SPEED, compiled
+from vegglue.elementary import compiled
+from vegglue.kernels import REST_SPEED, _depth
 
-# Films of depth above which a row stays as it is; 2 needs two more steps in ten, 10 none fewer.
+# Films of depth above which a face stays as it is; 2 needs two more steps in ten, 10 none fewer.
 THIN = 5.0
 
 
 @compiled
-def _friction(state, depth, drag, west, i, j, k, along):
-    """Own velocity [m/s], the rest of |U|^2 [m2/s2] and k [1/m] of the east face of cell i, j, or of its south face."""
+def _gap(own: float, other: float, rough: float, rate: float) -> float:
+    """u - u* [m/s] of a row whose rate is `rate`, k |U| u in it; other: |U|^2 less u^2."""
+    drive = math.sqrt(own * own + other) * own - rate / rough
+    root = math.sqrt(0.5 * (math.sqrt(other * other + 4.0 * drive * drive) - other))
+    return own - math.copysign(root, drive)
+
+
+@compiled
+def _beside(state, before, i, j, along):
+    """The cell beyond the face of cell i, j (its east one, or its south one) and the four velocities across it."""
     nx, _, ny, _ = state.shape
     if along:
         b, n = min(i + 1, nx - 1), min(j + 1, ny - 1)
-        other = 0.25 * (state[i, 1, j, k] + state[i, 1, n, k] + state[b, 1, j, k] + state[b, 1, n, k])
-        here, beside, k_here, k_beside = depth[i, j, k], depth[b, j, k], drag[i, j, k], drag[b, j, k]
-    else:
-        s = max(j - 1, 0)
-        if i > 0:
-            behind = state[i - 1, 2, j, k] + state[i - 1, 2, s, k]
-        else:
-            behind = west[j, k] / depth[0, j, k] + west[s, k] / depth[0, s, k]
-        other = 0.25 * (state[i, 2, j, k] + state[i, 2, s, k] + behind)
-        here, beside, k_here, k_beside = depth[i, j, k], depth[i, s, k], drag[i, j, k], drag[i, s, k]
-    rough = (k_here * here + k_beside * beside) / (here + beside)
-    return state[i, 2 if along else 1, j, k], other * other + REST_SPEED * REST_SPEED, rough
+        return b, j, state[i, 1, j], state[i, 1, n], state[b, 1, j], state[b, 1, n]
+    s = max(j - 1, 0)
+    behind = state[i - 1, 2] if i > 0 else before
+    return i, s, state[i, 2, j], state[i, 2, s], behind[j], behind[s]
 
 
 @compiled
 def friction_slope(state, depth, drag, west):
     """d(k |U| u)/du [1/s] of the unknowns (nx, 3, ny, m); none for levels."""
     nx, _, ny, m = state.shape
-    slope = np.zeros((nx, 3, ny, m))
+    slope, before = np.zeros((nx, 3, ny, m)), west / depth[0]
     for i in range(nx):
         for j in range(ny):
             for e in (1, 2):
+                a, b, one, two, three, four = _beside(state, before, i, j, e == 2)
                 for k in range(m):
-                    own, rest, rough = _friction(state, depth, drag, west, i, j, k, e == 2)
-                    speed = math.sqrt(own * own + rest)
+                    own, other = state[i, e, j, k], 0.25 * (one[k] + two[k] + three[k] + four[k])
+                    here, beyond = depth[i, j, k], depth[a, b, k]
+                    rough = (drag[i, j, k] * here + drag[a, b, k] * beyond) / (here + beyond)
+                    speed = math.sqrt(own * own + other * other + REST_SPEED * REST_SPEED)
                     slope[i, e, j, k] = rough * (speed + own * own / speed)
     return slope
 
 
 @compiled
 def ease(out, state, depth, drag, west, slope, film):
-    """Momentum rows of thin water, in place, as slope (u - u*): u* is their root in u, all else as it is.
+    """Momentum rows of thin water, in place, as slope (u - u*); blended in below THIN films.
 
-    slope (nx, 3, ny, 1): of the state whose factors are in use. Roots stay roots; blended in below THIN films.
+    slope (nx, 3, ny, 1): of the state whose factors are in use.
     """
     nx, _, ny, m = state.shape
+    before, per_thin = west / depth[0], 0.5 / (THIN * film)
     for i in range(nx):
         for j in range(ny):
             if depth[i, j].min() > 2.0 * THIN * film:
@@ -66,13 +77,113 @@ def ease(out, state, depth, drag, west, slope, film):
             for e in (1, 2):
                 if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
                     continue
+                a, b, one, two, three, four = _beside(state, before, i, j, e == 2)
+                at_centre = slope[i, e, j, 0]
                 for k in range(m):
-                    beside = depth[i + 1, j, k] if e == 2 else depth[i, j - 1, k]
-                    share = 0.5 * (depth[i, j, k] + beside) / (THIN * film)
-                    if share > 1.0:
-                        continue
-                    own, rest, rough = _friction(state, depth, drag, west, i, j, k, e == 2)
-                    drive = math.sqrt(own * own + rest) * own - out[i, e, j, k] / rough
-                    root = math.sqrt(0.5 * (math.sqrt(rest * rest + 4.0 * drive * drive) - rest))
-                    eased = slope[i, e, j, 0] * (own - math.copysign(root, drive))
-                    out[i, e, j, k] += (1.0 - share * share) * (eased - out[i, e, j, k])
+                    other = 0.25 * (one[k] + two[k] + three[k] + four[k])
+                    pair = depth[i, j, k] + depth[a, b, k]
+                    rough = (drag[i, j, k] * depth[i, j, k] + drag[a, b, k] * depth[a, b, k]) / pair
+                    rate = out[i, e, j, k]
+                    gap = _gap(state[i, e, j, k], other * other + REST_SPEED * REST_SPEED, rough, rate)
+                    share = min(pair * per_thin, 1.0)
+                    out[i, e, j, k] = rate + (1.0 - share * share) * (at_centre * gap - rate)
+
+
+@compiled
+def thickness(state, bed, lift, reach, film):
+    """Of one member, (nx, 3, ny): depths h_c [m] of faces, none of levels; and u d(rho)/dz [1/s], z the level of either
+    cell beside.
+    """
+    nx, _, ny, _ = state.shape
+    thick, answer = np.full((nx, 3, ny), np.inf), np.zeros((nx, 3, ny))
+    for i in range(nx):
+        for j in range(ny):
+            for e in (1, 2):
+                if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
+                    continue
+                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                wide = 0.5 * (reach[i, j] + reach[a, b])
+                above = 0.5 * (state[i, 0, j, 0] - bed[i, j] + state[a, 0, b, 0] - bed[a, b])
+                if lift.size:
+                    above -= 0.5 * (lift[i, j, 0] + lift[a, b, 0])
+                h = _depth(above, wide, film)
+                share = min(h / (THIN * film), 1.0)
+                wet = min(max(0.5 * (above - 0.1 * film + wide) / wide, 0.0), 1.0)
+                thick[i, e, j] = h
+                answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / h * state[i, e, j, 0]
+    return thick, answer
+
+
+@compiled
+def thin_faces(state, bed, lift, reach, film, thick):
+    """Faces (column, unknown, row) that are thin at the centre or in any member of a state, (face, 3)."""
+    nx, _, ny, m = state.shape
+    found, count = np.empty((2 * nx * ny, 3), np.int64), 0
+    for i in range(nx):
+        for j in range(ny):
+            for e in (1, 2):
+                if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
+                    continue
+                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                wide, thinnest = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
+                for k in range(m):
+                    above = 0.5 * (state[i, 0, j, k] - bed[i, j] + state[a, 0, b, k] - bed[a, b])
+                    if lift.size:
+                        above -= 0.5 * (lift[i, j, k] + lift[a, b, k])
+                    thinnest = min(thinnest, _depth(above, wide, film))
+                if thinnest < THIN * film:
+                    found[count, 0], found[count, 1], found[count, 2] = i, e, j
+                    count += 1
+    return found[:count].copy()
+
+
+@compiled
+def stretch(values, state, faces, bed, lift, reach, film, thick, back):
+    """Entries of some faces times rho at the levels of a state, or divided by it, in place; values (nx, 3, ny, m)."""
+    m = state.shape[3]
+    for f in range(len(faces)):
+        i, e, j = faces[f]
+        a, b = (i + 1, j) if e == 2 else (i, j - 1)
+        wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
+        for k in range(m):
+            above = 0.5 * (state[i, 0, j, k] - bed[i, j] + state[a, 0, b, k] - bed[a, b])
+            if lift.size:
+                above -= 0.5 * (lift[i, j, k] + lift[a, b, k])
+            h = _depth(above, wide, film)
+            share = min(min(h, centre) / (THIN * film), 1.0)
+            rho = 1.0 + (1.0 - share * share) * (h / centre - 1.0)
+            values[i, e, j, k] *= 1.0 / rho if back else rho
+
+
+@compiled
+def tilt(step, answer):
+    """Steps of u, in place, to steps of w: dw = du + u d(rho)/dz (dz + dz beyond the face)."""
+    nx, _, ny, m = step.shape
+    for i in range(nx):
+        for j in range(ny):
+            for e in (1, 2):
+                if answer[i, e, j] == 0.0:
+                    continue
+                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                for k in range(m):
+                    step[i, e, j, k] += answer[i, e, j] * (step[i, 0, j, k] + step[a, 0, b, k])
+
+
+@compiled
+def correction(after, before, depth, film):
+    """Largest change of each member (m,) [m, m/s], in thin water in proportion to its depth; NaN if any entry is."""
+    nx, _, ny, m = after.shape
+    thin = THIN * film
+    largest, total = np.zeros(m), np.zeros(m)
+    for i in range(nx):
+        east = min(i + 1, nx - 1)
+        for j in range(ny):
+            south = max(j - 1, 0)
+            for k in range(m):
+                here = min(depth[i, j, k], thin)
+                level = abs(after[i, 0, j, k] - before[i, 0, j, k]) * here
+                across = abs(after[i, 1, j, k] - before[i, 1, j, k]) * max(here, min(depth[i, south, k], thin))
+                along = abs(after[i, 2, j, k] - before[i, 2, j, k]) * max(here, min(depth[east, j, k], thin))
+                largest[k] = max(largest[k], max(level, max(across, along)))
+                total[k] += level + across + along
+    return largest / thin + 0.0 * total

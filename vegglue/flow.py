@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vegglue import canopy, easing, kernels
+from vegglue import canopy, easing, kernels, roughness
 from vegglue.acting import closures, push, stages_of, stand_values
 from vegglue.effect import Acting, Ground
 from vegglue.ground import rows
@@ -247,7 +247,7 @@ def faces(problem: Problem, state: Array) -> Faces:
 
 def bed_drag(problem: Problem, depth: Array) -> Array:
     """k = g / (C^2 h) [1/m] of the class laws at cell centres; depth (nx, ny, m) [m]."""
-    return kernels.class_drag(
+    return roughness.class_drag(
         depth,
         problem.reach,
         problem.friction_class,
@@ -316,6 +316,28 @@ def eased(problem: Problem, state: Array, slope: Array) -> Array:
     out = _residual(problem, state, depth, sides, rate, viscosity, momentum)
     easing.ease(out, state, depth, rate, sides[0], slope, problem.film)
     return out
+
+
+def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
+    """Of the faces of one member's state, what `carried` and its inverse need of a centre: see `easing.thickness`."""
+    return easing.thickness(state, problem.bed, problem.lift, problem.reach, problem.film)
+
+
+def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.int64]:
+    """Where `carry` does something: faces (column, unknown, row) thin at the centre or in any member of a state."""
+    return easing.thin_faces(state, problem.bed, problem.lift, problem.reach, problem.film, thick)
+
+
+def carry(
+    problem: Problem, values: Array, state: Array, thin: NDArray[np.int64], thick: Array, back: bool = False
+) -> None:
+    """Velocities or their rates (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
+    easing.stretch(values, state, thin, problem.bed, problem.lift, problem.reach, problem.film, thick, back)
+
+
+def correction(problem: Problem, after: Array, before: Array) -> Array:
+    """Largest change from one state to another [m, m/s] (m,), in thin water in proportion to its depth."""
+    return easing.correction(after, before, _depth(problem, before), problem.film)
 
 
 def friction_slope(problem: Problem, state: Array) -> Array:

@@ -8,21 +8,15 @@ members: cells (nx, ny, m), west-east faces (nx + 1, ny, m), south-north faces (
 import math
 
 import numpy as np
-from numba import njit
+
+from vegglue.elementary import compiled
 
 GRAVITY = 9.81
 KARMAN = 0.4
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest.
 REST_SPEED = 1e-3
-MANNING, KEULEGAN, CHEZY = 0, 1, 2
-LOG_SLOPE = 18.0 / math.log(10.0)
-GAUSS_PLACE = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
-GAUSS_WEIGHT = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 # Columns computed together, and those beside them they look at.
 STRIP, HALO = 40, 3
-
-# No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
-compiled = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
 
 
 @compiled
@@ -35,14 +29,14 @@ def _depth(above: float, reach: float, film: float) -> float:
     """
     dry = 0.1 * film
     lifted = above - dry
-    share = min(max(0.5 * (lifted + reach) / reach, 0.0), 1.0)
+    share = min(max(0.5 * lifted * (1.0 / reach) + 0.5, 0.0), 1.0)
     return dry + reach * share * share + max(lifted - reach, 0.0)
 
 
 @compiled
 def _sheared(above: float, film: float) -> float:
     """max(a, 0) [m], rounded off within a film: the depth of the point itself, for land drags at no water beside it."""
-    share = min(max(0.5 * (above + film) / film, 0.0), 1.0)
+    share = min(max(0.5 * above * (1.0 / film) + 0.5, 0.0), 1.0)
     return film * share * share + max(above - film, 0.0)
 
 
@@ -98,58 +92,6 @@ def depths(level, bed, lift, reach, outlet_level, film):
 
 
 @compiled
-def _chezy(law: int, coefficient: float, depth: float, log_argument_minimum: float) -> float:
-    """C [m^1/2/s]: h^(1/6)/n (Manning), 18 log10(max(12 h/k_s, floor)) (Keulegan 1938), or as given."""
-    if law == MANNING:
-        return depth ** (1.0 / 6.0) / coefficient
-    if law == KEULEGAN:
-        return LOG_SLOPE * math.log(max(12.0 * depth / coefficient, log_argument_minimum))
-    return coefficient
-
-
-@compiled
-def _conveyance(law: int, coefficient: float, mean: float, reach: float, floor: float) -> float:
-    """Mean of C h^(3/2) over a cell of mean depth `mean` whose bed rises evenly by 2 w: three Gauss points where wet.
-
-    As in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324: one slope of the surface drives each depth.
-    """
-    above = mean if mean > reach else 2.0 * math.sqrt(reach * mean) - reach
-    lowest, highest = max(above - reach, 0.0), above + reach
-    total = 0.0
-    for q in range(3):
-        h = lowest + (highest - lowest) * GAUSS_PLACE[q]
-        if h > 0.0:
-            weight = GAUSS_WEIGHT[q] * 0.5 * (highest - lowest) / reach
-            total += weight * _chezy(law, coefficient, h, floor) * h * math.sqrt(h)
-    return total
-
-
-@compiled
-def class_drag(depth, reach, friction_class, law, coefficient, log_argument_minimum, film):
-    """k = g / (C^2 h) [1/m] of the class laws; on a slope g h^2 / <C h^(3/2)>^2, the same for one depth throughout."""
-    nx, ny, m = depth.shape
-    drag = np.empty((nx, ny, m))
-    dry = 0.1 * film
-    of_film = np.empty(coefficient.shape)
-    for c in range(law.size):
-        for k in range(m):
-            of_film[c, k] = _chezy(law[c], coefficient[c, k], dry, log_argument_minimum) * dry * math.sqrt(dry)
-    for i in range(nx):
-        for j in range(ny):
-            c = friction_class[i, j]
-            steep = reach[i, j] > 4.0001 * film
-            for k in range(m):
-                h = depth[i, j, k]
-                if steep:
-                    carried = _conveyance(law[c], coefficient[c, k], h - dry, reach[i, j], log_argument_minimum)
-                    drag[i, j, k] = GRAVITY * (h / (carried + of_film[c, k])) ** 2
-                else:
-                    chezy = _chezy(law[c], coefficient[c, k], h, log_argument_minimum)
-                    drag[i, j, k] = GRAVITY / (chezy * chezy * h)
-    return drag
-
-
-@compiled
 def _upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
     """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
     from_left = left + (right - left) / 3.0 + (left - far_left) / 6.0
@@ -164,14 +106,55 @@ def _upwind_downstream(flux: float, far_left: float, left: float, right: float) 
 
 
 @compiled
+def _carrier(out, flux, depth, other_flux, other_depth):
+    """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
+    rows, m = out.shape
+    for j in range(rows):
+        for k in range(m):
+            out[j, k] = (flux[j, k] + other_flux[j, k]) / (depth[j, k] + other_depth[j, k])
+
+
+@compiled
+def _shear(out, f, u, v, viscosity, corner, per_x, per_y):
+    """h nu (du/dy + dv/dx) [m3/s2] at the corners (ny + 1, m) of west-east faces f; none at walls and ends."""
+    nx, ny, m = viscosity.shape
+    a, b = max(f - 1, 0), min(f, nx - 1)
+    out[0], out[ny] = 0.0, 0.0
+    for j in range(1, ny):
+        for k in range(m):
+            nu = 0.25 * (viscosity[a, j, k] + viscosity[b, j, k] + viscosity[a, j - 1, k] + viscosity[b, j - 1, k])
+            turn = (u[f, j, k] - u[f, j - 1, k]) * per_y + (v[b, j, k] - v[a, j, k]) * per_x
+            out[j, k] = nu * corner[f, j, k] * turn
+
+
+@compiled
+def _stretch_along(out, f, u, viscosity, cell, per_x):
+    """2 h nu du/dx [m3/s2] of the cells (ny, m) of column f; none beyond the outlet."""
+    nx, ny, m = cell.shape
+    for j in range(ny):
+        for k in range(m):
+            stress = viscosity[f, j, k] * cell[f, j, k] * (u[f + 1, j, k] - u[f, j, k]) if f < nx else 0.0
+            out[j, k] = 2.0 * stress * per_x
+
+
+@compiled
 def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy):
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
+    west, east, before, behind = np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m))
+    side, shear = np.empty((ny + 1, m)), np.empty((ny + 1, m))
+    _carrier(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
+    _stretch_along(behind, first, u, viscosity, cell, per_x)
     for f in range(first + 1, stop + 1):
         a, b = f - 1, min(f, nx - 1)
         f1, f2 = max(f - 2, 0), min(f + 1, nx)
+        west, east, before, behind = east, west, behind, before
+        _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
+        _stretch_along(behind, f, u, viscosity, cell, per_x)
+        _carrier(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
+        _shear(shear, f, u, v, viscosity, corner, per_x, per_y)
         for j in range(ny):
             if f == nx and not outlet[j]:
                 out[offset + a - first, 2, j] = u[f, j]
@@ -179,10 +162,7 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
             j1, j2, j3, j4 = max(j - 2, 0), max(j - 1, 0), min(j + 1, ny - 1), min(j + 2, ny - 1)
             for k in range(m):
                 here = u[f, j, k]
-                c_w = (flux_x[f - 1, j, k] + flux_x[f, j, k]) / (face_x[f - 1, j, k] + face_x[f, j, k])
-                c_e = (flux_x[f, j, k] + flux_x[f2, j, k]) / (face_x[f, j, k] + face_x[f2, j, k])
-                c_s = (flux_y[a, j, k] + flux_y[b, j, k]) / (face_y[a, j, k] + face_y[b, j, k])
-                c_n = (flux_y[a, j + 1, k] + flux_y[b, j + 1, k]) / (face_y[a, j + 1, k] + face_y[b, j + 1, k])
+                c_w, c_e, c_s, c_n = west[j, k], east[j, k], side[j, k], side[j + 1, k]
                 u_w = _upwind_downstream(c_w, u[f1, j, k], u[f - 1, j, k], here)
                 u_e = _upwind_downstream(c_e, u[f - 1, j, k], here, u[f2, j, k])
                 u_s = _upwind(c_s, u[f, j1, k], u[f, j2, k], here, u[f, j3, k])
@@ -190,23 +170,15 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_x + (
                     c_n * (u_n - here) - c_s * (u_s - here)
                 ) * per_y
-                nu_a, nu_b = viscosity[a, j, k], viscosity[b, j, k]
-                t_e = 2.0 * nu_b * cell[b, j, k] * (u[f2, j, k] - here) * per_x
-                t_w = 2.0 * nu_a * cell[a, j, k] * (here - u[f - 1, j, k]) * per_x
-                nu_s = 0.25 * (nu_a + nu_b + viscosity[a, j2, k] + viscosity[b, j2, k])
-                nu_n = 0.25 * (nu_a + nu_b + viscosity[a, j3, k] + viscosity[b, j3, k])
-                t_s = nu_s * corner[f, j, k] * ((here - u[f, j2, k]) * per_y + (v[b, j, k] - v[a, j, k]) * per_x)
-                turn_n = (u[f, j3, k] - here) * per_y + (v[b, j + 1, k] - v[a, j + 1, k]) * per_x
-                t_n = nu_n * corner[f, j + 1, k] * turn_n
-                mixed = (t_e - t_w) * per_x + (t_n - t_s) * per_y
+                mixed = (behind[j, k] - before[j, k]) * per_x + (shear[j + 1, k] - shear[j, k]) * per_y
                 across = 0.25 * (v[a, j, k] + v[a, j + 1, k] + v[b, j, k] + v[b, j + 1, k])
                 speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
+                per_pair = 1.0 / (cell[a, j, k] + cell[b, j, k])
                 stress = drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]
-                rough = stress / (cell[a, j, k] + cell[b, j, k]) * speed * here
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
-                mixed *= 2.0 / (cell[a, j, k] + cell[b, j, k])
-                moved = carried * _afloat(face_x[f, j, k], half_per_film) - mixed
-                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_x + rough
+                moved = carried * _afloat(face_x[f, j, k], half_per_film)
+                pulled = (stress * speed * here - 2.0 * mixed) * per_pair
+                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_x + pulled
 
 
 @compiled
@@ -215,16 +187,21 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
+    west, east, side = np.empty((ny - 1, m)), np.empty((ny - 1, m)), np.empty((ny, m))
+    before, behind = np.empty((ny + 1, m)), np.empty((ny + 1, m))
+    _carrier(east, flux_x[first, :-1], face_x[first, :-1], flux_x[first, 1:], face_x[first, 1:])
+    _shear(behind, first, u, v, viscosity, corner, per_x, per_y)
     for i in range(first, stop):
-        i1, i2, i3 = max(i - 2, 0), max(i - 1, 0), min(i + 1, nx - 1)
+        i1, i2, i3, f = max(i - 2, 0), max(i - 1, 0), min(i + 1, nx - 1), i + 1
+        west, east, before, behind = east, west, behind, before
+        _carrier(east, flux_x[f, :-1], face_x[f, :-1], flux_x[f, 1:], face_x[f, 1:])
+        _shear(behind, f, u, v, viscosity, corner, per_x, per_y)
+        _carrier(side, flux_y[i, :-1], face_y[i, :-1], flux_y[i, 1:], face_y[i, 1:])
         for j in range(1, ny):
             j1, j4 = max(j - 2, 0), min(j + 2, ny)
             for k in range(m):
                 here = v[i, j, k]
-                c_s = (flux_y[i, j - 1, k] + flux_y[i, j, k]) / (face_y[i, j - 1, k] + face_y[i, j, k])
-                c_n = (flux_y[i, j, k] + flux_y[i, j + 1, k]) / (face_y[i, j, k] + face_y[i, j + 1, k])
-                c_w = (flux_x[i, j - 1, k] + flux_x[i, j, k]) / (face_x[i, j - 1, k] + face_x[i, j, k])
-                c_e = (flux_x[i + 1, j - 1, k] + flux_x[i + 1, j, k]) / (face_x[i + 1, j - 1, k] + face_x[i + 1, j, k])
+                c_s, c_n, c_w, c_e = side[j - 1, k], side[j, k], west[j - 1, k], east[j - 1, k]
                 v_s = _upwind(c_s, v[i, j1, k], v[i, j - 1, k], here, v[i, j + 1, k])
                 v_n = _upwind(c_n, v[i, j - 1, k], here, v[i, j + 1, k], v[i, j4, k])
                 # Water enters through the west side with no velocity across.
@@ -233,23 +210,17 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                 carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_x + (
                     c_n * (v_n - here) - c_s * (v_s - here)
                 ) * per_y
-                nu_s, nu_n = viscosity[i, j - 1, k], viscosity[i, j, k]
-                t_n = 2.0 * nu_n * cell[i, j, k] * (v[i, j + 1, k] - here) * per_y
-                t_s = 2.0 * nu_s * cell[i, j - 1, k] * (here - v[i, j - 1, k]) * per_y
-                nu_w = 0.25 * (nu_s + nu_n + viscosity[i2, j - 1, k] + viscosity[i2, j, k])
-                nu_e = 0.25 * (nu_s + nu_n + viscosity[i3, j - 1, k] + viscosity[i3, j, k])
-                t_w = nu_w * corner[i, j, k] * ((u[i, j, k] - u[i, j - 1, k]) * per_y + (here - v[i2, j, k]) * per_x)
-                turn_e = (u[i + 1, j, k] - u[i + 1, j - 1, k]) * per_y + (v[i3, j, k] - here) * per_x
-                t_e = nu_e * corner[i + 1, j, k] * turn_e
-                mixed = (t_e - t_w) * per_x + (t_n - t_s) * per_y
+                t_n = viscosity[i, j, k] * cell[i, j, k] * (v[i, j + 1, k] - here)
+                t_s = viscosity[i, j - 1, k] * cell[i, j - 1, k] * (here - v[i, j - 1, k])
+                mixed = (behind[j, k] - before[j, k]) * per_x + 2.0 * (t_n - t_s) * per_y * per_y
                 along = 0.25 * (u[i, j, k] + u[i + 1, j, k] + u[i, j - 1, k] + u[i + 1, j - 1, k])
                 speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
+                per_pair = 1.0 / (cell[i, j, k] + cell[i, j - 1, k])
                 stress = drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k]
-                rough = stress / (cell[i, j, k] + cell[i, j - 1, k]) * speed * here
                 slope = (level[i, j, k] - level[i, j - 1, k]) * per_y
-                mixed *= 2.0 / (cell[i, j, k] + cell[i, j - 1, k])
-                moved = carried * _afloat(face_y[i, j, k], half_per_film) - mixed
-                out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + rough
+                moved = carried * _afloat(face_y[i, j, k], half_per_film)
+                pulled = (stress * speed * here - 2.0 * mixed) * per_pair
+                out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + pulled
 
 
 @compiled

@@ -14,6 +14,7 @@ from scipy.special import ndtr, ndtri
 from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
 from vegglue.flow import ACROSS, ALONG, Problem, crop, residual
+from vegglue.jacobian import Factors
 from vegglue.neighbourhood import chord_in_band, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
@@ -21,7 +22,6 @@ from vegglue.problem import build_problem
 from vegglue.schema import Case, Parameter
 from vegglue.sensor import read_sensors, reading_weights
 from vegglue.site import Site, build_site
-from vegglue.steady import Factors
 from vegglue.tangent import adjoints, tangents
 
 # Step of differences in z, small against the prior and large against rounding.

@@ -9,16 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
+from vegglue.chord import Solution, chord, stream
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
-from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual, take
+from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual
+from vegglue.jacobian import Factors
 from vegglue.march import settle
 from vegglue.start import backwater
-from vegglue.steady import CLOSE, Factors, Solution, chord, finish, newton
+from vegglue.steady import CLOSE, finish, newton
 
 # Neighbours that one factorisation serves, and how many are solved at once.
 SIZE, LANES = 64, 16
-# Who is not there after so many steps waits for the others, so many times.
-STEPS, ROUNDS = 8, 4
+# Who is not there after so many steps waits for a centre of its own.
+MOST = 30
 # Solved members that a start is drawn from.
 NEAREST = 48
 TANGENT_STEP = 1e-4
@@ -109,27 +111,24 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
 def _follow(
     whole: Problem, places: Array, pending: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
 ) -> None:
-    """Solve the neighbours of a centre with its factors, LANES at a time, and note them in `solved`.
-
-    Those that are not there after a round wait for the others, so that no lanes are kept for the slow.
+    """Solve the neighbours of a centre with its factors and note them in `solved`, those that fail or outgrow its band
+    apart.
     """
     assert lead.known is not None
     assert lead.factors is not None
-    ny = solved.state.shape[2]
-    waiting = _spread(places, lead.known.place, pending)
-    for turn in range(ROUNDS):
-        if not waiting.size:
-            break
-        left = []
-        for batch in np.split(waiting, range(LANES, waiting.size, LANES)):
-            start = solved.state[..., batch] if turn else _starts(places, lead, solved, batch)
-            within = inside(start, lead.band)
-            end = chord_in_band(take(whole, batch), within, lead.factors, lead.band, tolerance, STEPS)
-            solved.iterations[batch] += end.iterations
-            solved.status[batch[end.converged]] = SOLVED_BY_NEWTON
-            solved.state[..., batch] = widen(end.state, ny, lead.band)
-            left.append(batch[~end.converged & (end.correction < CLOSE)])
-        waiting = np.concatenate(left)
+    part, band, ny = crop(whole, *lead.band), lead.band, solved.state.shape[2]
+
+    def note(members: np.ndarray, ended: Solution) -> None:
+        solved.iterations[members] += ended.iterations
+        good = ended.converged & ~overflows(part, ended.state, band, ny)
+        solved.status[members[good]] = SOLVED_BY_NEWTON
+        solved.state[..., members[good]] = widen(ended.state[..., good], ny, band)
+
+    def starts_of(members: np.ndarray) -> Array:
+        return inside(_starts(places, lead, solved, members), band)
+
+    queue = _spread(places, lead.known.place, pending)
+    stream(part, queue, starts_of, lead.factors, tolerance, MOST, LANES, note)
 
 
 def _spread(places: Array, centre: Array, pending: np.ndarray) -> np.ndarray:

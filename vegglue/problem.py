@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vegglue import canopy, kernels
+from vegglue import canopy, roughness
 from vegglue.effect import Array, Boundary, Ground
 from vegglue.flow import Inflow, Plants, Problem
 from vegglue.ground import ground_of, present
@@ -11,7 +11,7 @@ from vegglue.schema import Inflow as InflowPart
 from vegglue.site import Site
 from vegglue.workings import Theta, acting_in, bounded, lifted, value_of
 
-LAWS = {"manning": (kernels.MANNING, "n"), "keulegan": (kernels.KEULEGAN, "k_s"), "chezy": (kernels.CHEZY, "c")}
+LAWS = {"manning": (roughness.MANNING, "n"), "keulegan": (roughness.KEULEGAN, "k_s"), "chezy": (roughness.CHEZY, "c")}
 
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:

@@ -264,7 +264,9 @@ class Numerics(Part):
     emergent: Literal["constant", "proportional"] = Field(
         default="constant", description="phi or phi h/h_d where h < h_d"
     )
-    tolerance: Positive = Field(default=1e-6, description="largest correction a solved member still asks for [m, m/s]")
+    tolerance: Positive = Field(
+        default=1e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
+    )
 
 
 class KeptFields(Part):

@@ -13,7 +13,7 @@ import numpy as np
 
 from vegglue import blocks
 from vegglue.flow import Array, Problem, residual, take
-from vegglue.steady import Factors
+from vegglue.jacobian import Factors
 
 # Step [m, m/s] of the central difference along a direction scaled to one.
 STEP = 1e-5

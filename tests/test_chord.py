@@ -1,0 +1,48 @@
+"""Members that pass through a few lanes: who ends how, and that company does not matter."""
+
+import numpy as np
+from channels import family, solved
+
+from vegglue.chord import Solution, chord, stream
+from vegglue.flow import take
+from vegglue.jacobian import factors
+
+
+def test_members_pass_through_few_lanes_as_they_would_all_at_once():
+    places = np.random.default_rng(8).random((11, 2))
+    batch = family(places)
+    centre = solved(take(batch, np.array([0])))
+    shared = factors(take(batch, np.array([0])), centre)
+    together = chord(batch, np.repeat(centre, 11, axis=3), shared, 1e-9)
+    found: dict[int, tuple[bool, np.ndarray]] = {}
+    entered: list[int] = []
+
+    def starts_of(members: np.ndarray) -> np.ndarray:
+        entered.append(members.size)
+        return np.repeat(centre, members.size, axis=3)
+
+    def note(members: np.ndarray, ended: Solution) -> None:
+        for lane, member in enumerate(members):
+            assert member not in found
+            found[int(member)] = bool(ended.converged[lane]), ended.state[..., lane]
+
+    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, 25, 4, note)
+    assert sorted(found) == list(range(11))
+    assert sum(entered) == 11
+    assert max(entered) <= 4
+    assert together.converged.all()
+    for member, (converged, state) in found.items():
+        assert converged
+        assert np.abs(state - together.state[..., member]).max() < 1e-7
+
+
+def test_a_member_that_strays_ends_and_spoils_no_other():
+    places = np.random.default_rng(9).random((4, 2))
+    batch = family(places)
+    centre = solved(take(batch, np.array([0])))
+    shared = factors(take(batch, np.array([0])), centre)
+    start = np.repeat(centre, 4, axis=3)
+    start[..., 2] = np.nan
+    end = chord(batch, start, shared, 1e-8)
+    assert end.converged.tolist() == [True, True, False, True]
+    assert np.isfinite(end.state[..., [0, 1, 3]]).all()
