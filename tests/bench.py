@@ -12,9 +12,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from vegglue.config import load_case
-from vegglue.flow import faces
+from vegglue.flow import crop, faces
 from vegglue.march import advance, march
-from vegglue.neighbourhood import leaves, solve_members
+from vegglue.neighbourhood import inside, leaves, settled, solve_members
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
@@ -33,7 +33,7 @@ PHASES = {
 }
 PAPER_STEPS = 6000
 SAMPLE = 128
-MARCHED_STEP, MARCHED = 0.5, 240
+SHALLOW, MARCHED_STEP, MARCHED = 0.3, 0.5, 100
 
 
 def main() -> None:
@@ -123,21 +123,24 @@ def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
 
 
 def same(case) -> None:  # type: ignore[no-untyped-def]
-    """64 members spread over the priors: from their neighbours by chord steps, and each settled by marching on."""
+    """64 members spread over the priors: by chord steps in an ensemble, by Newton alone, and marched on from there."""
     short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
     site = build_site(short)
-    theta = sample_prior(short.parameters, 64, 1)
-    places = unit_places(short, theta)
+    places = unit_places(short, sample_prior(short.parameters, 64, 1))
     build = partial(_problem_at, short, site, "D3a")
     solved = solve_members(build, places, 1e-8)
-    began = time.perf_counter()
-    moved = march(build(places), solved.state, MARCHED_STEP, MARCHED)
-    depth = faces(build(places), solved.state).cell[:, None]
-    gap = np.abs(moved - solved.state) * (depth > 0.05)
+    apart, moved = [], []
+    for member, place in enumerate(places):
+        problem, start = build(place[None]), solved.state[..., member : member + 1]
+        alone, _, band = settled(problem, start, 1e-9)
+        part = crop(problem, *band)
+        wet = faces(part, alone.state).cell[:, None] > SHALLOW
+        apart.append(np.abs(inside(start, band) - alone.state)[np.broadcast_to(wet, alone.state.shape)].max())
+        moved.append(np.abs(march(part, alone.state, MARCHED_STEP, MARCHED) - alone.state).max())
     print(
-        f"64 members over the priors, 342 x 40 cells: {int((solved.status == 0).sum())} by Newton; marched on for "
-        f"{MARCHED * MARCHED_STEP:.0f} s they move by at most {gap.max():.0e} m/s or m where water is deeper than "
-        f"5 cm ({time.perf_counter() - began:.0f} s)"
+        f"64 members over the priors, 342 x 40 cells: marched on for {MARCHED * MARCHED_STEP:.0f} s in the rows "
+        f"that are solved they move by at most {max(moved):.0e} m/s or m; ensemble and single member differ by at most "
+        f"{max(apart):.0e} where water is deeper than {SHALLOW:g} m (rows beyond the water differ)"
     )
 
 
