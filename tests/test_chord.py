@@ -1,11 +1,12 @@
 """Members that pass through a few lanes: who ends how, and that company does not matter."""
 
 import numpy as np
-from channels import family, solved
+from channels import family, river, solved
 
 from vegglue.chord import Solution, chord, stream
 from vegglue.flow import take
 from vegglue.jacobian import factors
+from vegglue.steady import finish
 
 
 def test_members_pass_through_few_lanes_as_they_would_all_at_once():
@@ -46,3 +47,16 @@ def test_a_member_that_strays_ends_and_spoils_no_other():
     end = chord(batch, start, shared, 1e-8)
     assert end.converged.tolist() == [True, True, False, True]
     assert np.isfinite(end.state[..., [0, 1, 3]]).all()
+
+
+def test_one_that_strayed_is_not_taken_up_again():
+    """Its state may be anything: no factors are made there, and its correction says so."""
+    problem = river()
+    near = solved(problem)
+    far = near + 0.3 * np.random.default_rng(0).standard_normal(near.shape)
+    shared = factors(problem, near)
+    end = chord(problem, far, shared, 1e-8)
+    assert not end.converged[0]
+    assert np.isinf(end.correction[0])
+    _, kept = finish(problem, far, 1e-8)
+    assert kept is None

@@ -24,7 +24,9 @@ LONGEST = 0.25
 
 @dataclass(frozen=True)
 class Solution:
-    """States (nx, 3, ny, m), the last correction of each member [m/s, m], iterations spent, and who converged."""
+    """States (nx, 3, ny, m), the least correction of each member [m/s, m], infinite if it strayed, iterations, and
+    who converged.
+    """
 
     state: Array
     correction: Array
@@ -107,7 +109,9 @@ def stream(
         size = correction(part, after, state)
         age[running] += 1
         best[running] = np.minimum(best, size)[running]
-        ended = running & ~((size >= tolerance) & (size < 4.0 * LONGEST) & (age < most))
+        strayed = running & ~(size < 4.0 * LONGEST)
+        best[strayed] = np.inf
+        ended = strayed | running & ((size < tolerance) | (age >= most))
         if ended.any():
             deliver(here[ended], Solution(after[..., ended], best[ended], age[ended], size[ended] < tolerance))
             running = running & ~ended
@@ -125,6 +129,7 @@ def stream(
             part, state = take(problem, here), _lanes(state, keep, entering.size)
             if entering.size:
                 state[..., keep.size :] = starts_of(entering)
+            # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
             carried, thin = _carried(part, state, shared)
             memory.keep(keep, entering.size)
             age = np.concatenate([age[keep], np.zeros(entering.size, dtype=np.int64)])

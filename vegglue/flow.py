@@ -318,14 +318,27 @@ def eased(problem: Problem, state: Array, slope: Array) -> Array:
     return out
 
 
+def face_depths(problem: Problem, state: Array) -> Array:
+    """Depths [m] of the faces that velocities of a state stand on, (nx, 3, ny, m); infinite where `carry` has none."""
+    level = np.ascontiguousarray(state[:, LEVEL])
+    _, along, across, _ = kernels.depths(
+        level, problem.bed, problem.lift, problem.reach, problem.outlet_level, problem.film
+    )
+    found = np.full_like(state, np.inf)
+    found[:-1, ALONG], found[:, ACROSS, 1:] = along[1:-1], across[:, 1:-1]
+    return found
+
+
 def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
-    """Of the faces of one member's state, what `carried` and its inverse need of a centre: see `easing.thickness`."""
-    return easing.thickness(state, problem.bed, problem.lift, problem.reach, problem.film)
+    """Of one member, (nx, 3, ny): depths of its faces [m], and how its velocities answer to levels there [1/s]."""
+    thick = np.ascontiguousarray(face_depths(problem, state)[..., 0])
+    return thick, easing.answers(state, problem.bed, problem.lift, problem.reach, problem.film, thick)
 
 
 def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.int64]:
     """Where `carry` does something: faces (column, unknown, row) thin at the centre or in any member of a state."""
-    return easing.thin_faces(state, problem.bed, problem.lift, problem.reach, problem.film, thick)
+    thinnest = np.minimum(face_depths(problem, state).min(axis=3), thick)
+    return np.argwhere(thinnest < easing.THIN * problem.film)
 
 
 def carry(

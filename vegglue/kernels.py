@@ -20,7 +20,7 @@ STRIP, HALO = 40, 3
 
 
 @compiled
-def _depth(above: float, reach: float, film: float) -> float:
+def wet_depth(above: float, reach: float, film: float) -> float:
     """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = `reach`.
 
     h - f/10 is the mean of max(a - s, 0) over s in (-w, w), a = above - f/10: a cell wets from its lowest corner (the
@@ -74,9 +74,9 @@ def depths(level, bed, lift, reach, outlet_level, film):
                 west = level[w, j, k] - bed[w, j]
                 south = level[i, s, k] - bed[i, s]
                 diagonal = level[w, s, k] - bed[w, s]
-                cell[i, j, k] = _depth(here, reach[i, j], film)
-                face_x[i, j, k] = _depth(0.5 * (here + west), reach_x, film)
-                face_y[i, j, k] = _depth(0.5 * (here + south), reach_y, film)
+                cell[i, j, k] = wet_depth(here, reach[i, j], film)
+                face_x[i, j, k] = wet_depth(0.5 * (here + west), reach_x, film)
+                face_y[i, j, k] = wet_depth(0.5 * (here + south), reach_y, film)
                 corner[i, j, k] = _sheared(0.25 * (here + west + south + diagonal), film)
         for k in range(m):
             face_y[i, ny, k] = cell[i, ny - 1, k]
@@ -87,7 +87,7 @@ def depths(level, bed, lift, reach, outlet_level, film):
         for k in range(m):
             edge = bed[last, j] + 0.5 * (bed[last, j] - bed[before, j])
             above = outlet_level[k] - edge - (lift[last, j, k] if lift.size else 0.0)
-            face_x[nx, j, k] = _depth(above, reach[last, j], film)
+            face_x[nx, j, k] = wet_depth(above, reach[last, j], film)
     return cell, face_x, face_y, corner
 
 
@@ -128,7 +128,7 @@ def _shear(out, f, u, v, viscosity, corner, per_x, per_y):
 
 
 @compiled
-def _stretch_along(out, f, u, viscosity, cell, per_x):
+def _strain_along(out, f, u, viscosity, cell, per_x):
     """2 h nu du/dx [m3/s2] of the cells (ny, m) of column f; none beyond the outlet."""
     nx, ny, m = cell.shape
     for j in range(ny):
@@ -146,13 +146,13 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
     west, east, before, behind = np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m))
     side, shear = np.empty((ny + 1, m)), np.empty((ny + 1, m))
     _carrier(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
-    _stretch_along(behind, first, u, viscosity, cell, per_x)
+    _strain_along(behind, first, u, viscosity, cell, per_x)
     for f in range(first + 1, stop + 1):
         a, b = f - 1, min(f, nx - 1)
         f1, f2 = max(f - 2, 0), min(f + 1, nx)
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
-        _stretch_along(behind, f, u, viscosity, cell, per_x)
+        _strain_along(behind, f, u, viscosity, cell, per_x)
         _carrier(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
         _shear(shear, f, u, v, viscosity, corner, per_x, per_y)
         for j in range(ny):
@@ -288,10 +288,10 @@ def cell_depth(state, bed, lift, reach, film):
         for j in range(ny):
             if lift.size:
                 for k in range(m):
-                    depth[i, j, k] = _depth(state[i, 0, j, k] - bed[i, j] - lift[i, j, k], reach[i, j], film)
+                    depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j] - lift[i, j, k], reach[i, j], film)
                 continue
             for k in range(m):
-                depth[i, j, k] = _depth(state[i, 0, j, k] - bed[i, j], reach[i, j], film)
+                depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j], reach[i, j], film)
     return depth
 
 
