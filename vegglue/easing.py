@@ -21,8 +21,8 @@ import numpy as np
 from vegglue.elementary import compiled
 from vegglue.kernels import REST_SPEED, wet_depth
 
-# Films of depth above which a face stays as it is. Of the rows, 2 needs two more steps in ten, 10 none fewer; of rho, 20
-# and 100 none fewer.
+# Films of depth above which a face stays as it is. Of the rows, 2 needs two more steps in ten, 10 none fewer;
+# of rho, 20 and 100 none fewer.
 THIN = 5.0
 
 
