@@ -11,11 +11,12 @@ from reach import COARSE, write_reach
 from vegglue.config import load_case
 from vegglue.ensemble import FAILED, SOLVED_BY_NEWTON
 from vegglue.infer import glue
-from vegglue.neighbourhood import SIZE, leaves
+from vegglue.nearness import axes, leaves
+from vegglue.neighbourhood import SIZE
 from vegglue.observations import Observations, read_observations
 from vegglue.prior import sample_prior
 from vegglue.schema import Case
-from vegglue.simulate import LARGEST_CHUNK, parameters_at, simulate, solve_chunk, unit_places
+from vegglue.simulate import LARGEST_CHUNK, begin_and_chunks, parameters_at, simulate, solve_chunk, unit_places
 from vegglue.site import Site, build_site
 from vegglue.store import read_ensemble
 
@@ -65,21 +66,34 @@ def test_leaves_are_neighbours_and_follow_each_other() -> None:
     assert np.median(steps) < 0.35, "at random it would be 0.66"
 
 
+def test_members_lie_apart_as_their_flows_differ() -> None:
+    """Along the direction that changes flows most the axis is longest; what changes nothing still has one."""
+    change = np.random.default_rng(6).standard_normal((50, 3))
+    both = 1.6 * change[:, 0] + 0.1 * change[:, 1]
+    found = axes([(both, 0.5 * both, np.zeros(50))], 3)
+    lengths = np.sort(np.linalg.norm(found, axis=0))
+    assert lengths[-1] == pytest.approx(1.0, abs=0.01)
+    assert lengths[:2] == pytest.approx(0.1, abs=0.01)
+    longest = found[:, np.linalg.norm(found, axis=0).argmax()]
+    assert longest == pytest.approx(np.array([1.0, 0.5, 0.0]) / np.hypot(1.0, 0.5), abs=0.01)
+    assert (axes([], 3) == np.eye(3)).all()
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: int) -> None:
     """What is handed to the processes, and in which order, for any number of them."""
-    case, _, observations = reach_at(tmp_path, ("members: 1024", f"members: {5 * CHUNK}"))
+    case, site, observations = reach_at(tmp_path, ("members: 1024", f"members: {5 * CHUNK}"))
     handed: list[np.ndarray] = []
 
     def record(*given: Any) -> Iterator[Any]:
-        _, _, _, places, chunks, todo, _ = given
+        _, _, _, places, chunks, todo, _, _ = given
         handed.extend(places[chunks[index]] for index in todo)
         return iter(())
 
     monkeypatch.setattr("vegglue.simulate._solve_all", record)
     simulate(case, observations, tmp_path / "ensemble.h5", jobs, lambda progress: None)
     places = places_of(case, 5 * CHUNK)
-    expected = [places[leaf] for leaf in leaves(places, CHUNK)]
+    expected = [places[leaf] for leaf in begin_and_chunks(case, site, places)[1]]
     assert len(handed) == 5
     for ours, theirs in zip(handed, expected, strict=True):
         np.testing.assert_array_equal(ours, theirs)

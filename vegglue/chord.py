@@ -2,7 +2,7 @@
 
 Walker and Ni 2011, doi:10.1137/10078356X.
 
-Members pass through a few lanes that are computed side by side; as soon as half of the lanes are done, others enter.
+Members pass through a few lanes that are computed side by side; as soon as some are done, others enter their lanes.
 Thin water is eased, see `easing`. A member is there when its correction, in m and m/s, is below the tolerance.
 """
 
@@ -18,6 +18,8 @@ from vegglue.flow import Array, Problem, carry, correction, eased, take, thin_fa
 from vegglue.jacobian import Factors, Single
 
 DEPTH = 6
+# So many lanes are free before other members enter them.
+ENTER = 2
 # A step this long [m, m/s] leaves the range where the linearisation means anything.
 LONGEST = 0.25
 
@@ -46,40 +48,39 @@ class _Memory:
         self.sums: Single = np.zeros((DEPTH, *shape), np.float32)
         self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
         self.last: tuple[Array, Single] | None = None
-        self.new = np.zeros(shape[-1], dtype=bool)
-        self.count = 0
+        # When each slot was filled and since when each lane has had its member, counted in steps.
+        self.filled, self.since, self.count = np.zeros(DEPTH, dtype=np.int64), np.zeros(shape[-1], dtype=np.int64), 0
 
-    def keep(self, lanes: np.ndarray, entering: int) -> None:
-        """Some lanes, and behind them new ones with nothing to remember."""
-        self.turns, self.sums = _lanes(self.turns, lanes, entering), _lanes(self.sums, lanes, entering)
-        self.gram = _lanes(self.gram, lanes, entering)
-        self.new = np.arange(lanes.size + entering) >= lanes.size
+    def keep(self, lanes: np.ndarray) -> None:
+        """Some lanes only."""
+        self.turns, self.sums, self.gram = (_lanes(values, lanes) for values in (self.turns, self.sums, self.gram))
+        self.since = self.since[lanes]
         if self.last is not None:
-            self.last = _lanes(self.last[0], lanes, entering), _lanes(self.last[1], lanes, entering)
+            self.last = _lanes(self.last[0], lanes), _lanes(self.last[1], lanes)
+
+    def forget(self, lanes: np.ndarray) -> None:
+        """Lanes in which other members begin."""
+        self.gram[..., lanes], self.since[lanes] = 0.0, self.count
 
     def next_state(self, state: Array, step: Single) -> Array:
         """x + f, less what the memory knows to overshoot."""
-        if self.last is not None:
-            last_state, last_step = self.last
-            last_state[..., self.new], last_step[..., self.new] = state[..., self.new], step[..., self.new]
-            slot, known = self.count % DEPTH, min(self.count + 1, DEPTH)
-            row, right = blocks.remember(self.turns[:known], self.sums, slot, state, step, last_state, last_step)
-            self.count += 1
-            self.gram[slot, :known], self.gram[:known, slot] = row, row
-            weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
-            mixed = blocks.mix(state, step, self.sums[:known], weights)
-        else:
-            mixed = state + step
-        self.last = state, step
-        self.new[:] = False
+        mixed = state + step if self.last is None else self._mixed(state, step, *self.last)
+        self.last, self.count = (state, step), self.count + 1
         return mixed
 
+    def _mixed(self, state: Array, step: Single, last_state: Array, last_step: Single) -> Array:
+        slot, known = (self.count - 1) % DEPTH, min(self.count, DEPTH)
+        row, right = blocks.remember(self.turns[:known], self.sums, slot, state, step, last_state, last_step)
+        self.filled[slot] = self.count
+        own = self.filled[:known, None] > self.since
+        row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
+        self.gram[slot, :known], self.gram[:known, slot] = row, row
+        weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
+        return blocks.mix(state, step, self.sums[:known], weights)
 
-def _lanes(values: Any, lanes: np.ndarray, entering: int) -> Any:
-    """Some lanes, and behind them as many of zeros as enter."""
-    wanted = np.zeros((*values.shape[:-1], lanes.size + entering), values.dtype)
-    wanted[..., : lanes.size] = values[..., lanes]
-    return wanted
+
+def _lanes(values: Any, lanes: np.ndarray) -> Any:
+    return np.ascontiguousarray(values[..., lanes])
 
 
 def stream(
@@ -99,9 +100,10 @@ def stream(
     """
     if not queue.size:
         return
-    here, waiting = queue[:lanes], queue[lanes:]
+    here, waiting = queue[:lanes].copy(), queue[lanes:]
     part, state = take(problem, here), starts_of(here)
-    carried, thin = _carried(part, state, shared)
+    thin = thin_faces(part, state, shared.thick)
+    carried = _carried(part, state, thin, shared)
     age, best, running = np.zeros(here.size, dtype=np.int64), np.full(here.size, np.inf), np.ones(here.size, dtype=bool)
     memory = _Memory(state.shape)
     while True:
@@ -117,32 +119,41 @@ def stream(
             running = running & ~ended
         if not running.any() and not waiting.size:
             return
-        # Members that ended stay in their lane until the next cut: they must not spoil the arithmetic of others.
+        # Members that ended stay in their lane until another enters: they must not spoil the arithmetic of others.
         step[..., ~running] = 0.0
         carried = memory.next_state(carried, step)
         state = carried.copy()
         carry(part, state, state, thin, shared.thick, back=True)
-        if 2 * running.sum() <= running.size:
-            keep = np.flatnonzero(running)
-            entering, waiting = np.split(waiting, [lanes - keep.size])
-            here = np.concatenate([here[keep], entering])
-            part, state = take(problem, here), _lanes(state, keep, entering.size)
-            if entering.size:
-                state[..., keep.size :] = starts_of(entering)
+        free = np.flatnonzero(~running)
+        if waiting.size and free.size >= ENTER:
+            free, entering, waiting = free[: waiting.size], waiting[: free.size], waiting[free.size :]
+            here[free], age[free], best[free], running[free] = entering, 0, np.inf, True
+            part, start = take(problem, here), starts_of(entering)
+            state[..., free] = start
+            thin = _joined(thin, thin_faces(take(problem, entering), start, shared.thick), state.shape)
             # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
-            carried, thin = _carried(part, state, shared)
-            memory.keep(keep, entering.size)
-            age = np.concatenate([age[keep], np.zeros(entering.size, dtype=np.int64)])
-            best = np.concatenate([best[keep], np.full(entering.size, np.inf)])
-            running = np.ones(here.size, dtype=bool)
+            carried = _carried(part, state, thin, shared)
+            memory.forget(free)
+        elif not waiting.size and 2 * running.sum() <= running.size:
+            keep = np.flatnonzero(running)
+            here, age, best, running = here[keep], age[keep], best[keep], running[keep]
+            part, state, carried = take(problem, here), _lanes(state, keep), _lanes(carried, keep)
+            memory.keep(keep)
 
 
-def _carried(part: Problem, state: Array, shared: Factors) -> tuple[Array, NDArray[np.int64]]:
-    """The unknowns of chord steps for a state, and the faces where they are other than it."""
-    thin = thin_faces(part, state, shared.thick)
+def _joined(some: NDArray[np.int64], others: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Faces that are in one list or the other."""
+    marked = np.zeros(shape[:-1], dtype=bool)
+    for faces in (some, others):
+        marked[tuple(faces.T)] = True
+    return np.argwhere(marked)
+
+
+def _carried(part: Problem, state: Array, thin: NDArray[np.int64], shared: Factors) -> Array:
+    """The unknowns of chord steps for a state."""
     carried = state.copy()
     carry(part, carried, state, thin, shared.thick)
-    return carried, thin
+    return carried
 
 
 def _step(

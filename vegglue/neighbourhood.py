@@ -1,6 +1,6 @@
 """Members solved together: cut into neighbourhoods of the prior, each led by a centre whose factors serve the others.
 
-Coordinates s (m, d) are the members' places in the unit cube (prior probabilities), in which every parameter is alike.
+Places s (m, d) are those of the members in the unit cube (prior probabilities); who is near whom, `nearness` says.
 """
 
 from collections.abc import Callable
@@ -14,6 +14,7 @@ from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual
 from vegglue.jacobian import Factors
 from vegglue.march import settle
+from vegglue.nearness import Crowd, crowd, leaves, nearest, spread, squared
 from vegglue.start import backwater
 from vegglue.steady import CLOSE, finish, newton
 
@@ -32,7 +33,7 @@ ProblemOf = Callable[[Array], Problem]
 
 @dataclass(frozen=True)
 class Solved:
-    """Members in the order asked for: states (nx, 3, ny, m) and how each was reached."""
+    """Members in the order asked for: states (nx, 3, ny, m), each in one piece of memory, and how each was reached."""
 
     state: Array
     status: np.ndarray
@@ -56,25 +57,6 @@ class Known:
         return predicted
 
 
-def leaves(places: Array, size: int) -> list[np.ndarray]:
-    """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the
-    last.
-    """
-
-    def cut(index: np.ndarray, parts: int, upwards: bool) -> list[np.ndarray]:
-        if parts == 1:
-            return [index]
-        longest = int(np.argmax(np.ptp(places[index], axis=0)))
-        ordered = index[np.argsort(places[index, longest], kind="stable")]
-        fewer = parts // 2
-        border = index.size * fewer // parts
-        low, high = (ordered[:border], fewer), (ordered[border:], parts - fewer)
-        first, second = (low, high) if upwards else (high, low)
-        return cut(*first, True) + cut(*second, False)
-
-    return cut(np.arange(len(places)), -(-len(places) // size), True)
-
-
 def known_middle(problem_of: ProblemOf, parameters: int, tolerance: float) -> Known | None:
     """The member in the middle of the prior, for all others to begin from; None if it has to be marched."""
     middle = np.full(parameters, 0.5)
@@ -88,34 +70,39 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
     """
     whole = problem_of(places)
     (nx, ny), m = whole.shape, len(places)
-    solved = Solved(np.full((nx, 3, ny, m), np.nan), np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
+    state = np.moveaxis(np.full((m, nx, 3, ny), np.nan), 0, -1)
+    solved = Solved(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
     known = [] if begin is None else [begin]
-    for leaf in leaves(places, SIZE):
+    everyone = crowd(places, [one.slopes for one in known])
+    for leaf in leaves(everyone.spots, SIZE):
         pending = leaf
         while pending.size:
-            there = np.flatnonzero(solved.status != FAILED)
-            centre = _next_centre(places, pending, leaf, there)
-            warm = _warm_start(places, centre, there, solved.state, known)
-            lead = _solve_centre(problem_of, places[centre], warm, tolerance)
+            centre = _next_centre(everyone.spots, pending, leaf, _there(solved))
+            lead = _solve_centre(problem_of, places[centre], _warm_start(everyone, centre, solved, known), tolerance)
             solved.iterations[centre] += lead.iterations
             solved.status[centre], solved.reason[centre] = lead.status, lead.reason
             solved.state[..., centre] = lead.state[..., 0]
             pending = pending[pending != centre]
             if lead.known is not None:
                 known.append(lead.known)
-                _follow(whole, places, pending, lead, solved, tolerance)
+                _follow(whole, everyone, pending, lead, solved, tolerance)
                 pending = pending[solved.status[pending] == FAILED]
     return solved
 
 
+def _there(solved: Solved) -> np.ndarray:
+    return np.flatnonzero(solved.status != FAILED)
+
+
 def _follow(
-    whole: Problem, places: Array, pending: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
+    whole: Problem, everyone: Crowd, pending: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
 ) -> None:
     """Solve the neighbours of a centre with its factors and note them in `solved`, those that fail or outgrow its band
     apart.
     """
     assert lead.known is not None
     assert lead.factors is not None
+    queue = spread(everyone.spots, pending, lead.known.place @ everyone.axes)
     part, band, ny = crop(whole, *lead.band), lead.band, solved.state.shape[2]
 
     def note(members: np.ndarray, ended: Solution) -> None:
@@ -125,45 +112,38 @@ def _follow(
         solved.state[..., members[good]] = widen(ended.state[..., good], ny, band)
 
     def starts_of(members: np.ndarray) -> Array:
-        return inside(_starts(places, lead, solved, members), band)
+        return inside(_starts(everyone, lead, solved, members), band)
 
-    queue = _spread(places, lead.known.place, pending)
     stream(part, queue, starts_of, lead.factors, tolerance, MOST, LANES, note)
 
 
-def _spread(places: Array, centre: Array, pending: np.ndarray) -> np.ndarray:
-    """Pending members, the furthest from all before first, so that most of them lie between others."""
-    chosen, order = places[pending], []
-    distance = ((chosen - centre) ** 2).sum(axis=1)
-    for _ in range(pending.size):
-        order.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, ((chosen - chosen[order[-1]]) ** 2).sum(axis=1))
-        distance[order] = -1.0
-    return pending[order]
-
-
-def _starts(places: Array, lead: "_Lead", solved: Solved, batch: np.ndarray) -> Array:
+def _starts(everyone: Crowd, lead: "_Lead", solved: Solved, batch: np.ndarray) -> Array:
     """Cubic splines through the solved members nearest to the centre, its tangents while there are too few."""
     assert lead.known is not None
+    spots = everyone.spots
     there = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
-    near = there[np.argsort(((places[there] - lead.known.place) ** 2).sum(axis=1), kind="stable")[:NEAREST]]
-    if near.size < 3 * (places.shape[1] + 1):
-        return lead.known.predict(places[batch])
-    spline = RBFInterpolator(places[near], np.eye(near.size), kernel="cubic", degree=1)
-    found = solved.state[..., near].reshape(-1, near.size) @ spline(places[batch]).T
-    return found.reshape(*solved.state.shape[:3], batch.size)
+    near = nearest(spots, there, lead.known.place @ everyone.axes, NEAREST)
+    if near.size < 3 * (spots.shape[1] + 1):
+        return lead.known.predict(everyone.places[batch])
+    spline = RBFInterpolator(spots[near], np.eye(near.size), kernel="cubic", degree=1)
+    states = np.moveaxis(solved.state, -1, 0)[near]
+    found = spline(spots[batch]) @ states.reshape(near.size, -1)
+    return np.moveaxis(found.reshape(batch.size, *states.shape[1:]), 0, -1)
 
 
-def _warm_start(places: Array, centre: int, there: np.ndarray, state: Array, known: list[Known]) -> Array | None:
+def _warm_start(everyone: Crowd, centre: int, solved: Solved, known: list[Known]) -> Array | None:
     """From the nearest solved member, along the nearest tangents."""
     if not known:
         return None
-    here = places[centre]
-    tangents = min(known, key=lambda some: float(((some.place - here) ** 2).sum()))
+    here, place = everyone.spots[centre], everyone.places[centre]
+    tangents = known[int(np.argmin(squared(np.array([one.place for one in known]) @ everyone.axes, here)))]
+    there = _there(solved)
     if there.size == 0:
-        return tangents.predict(here[None])
-    nearest = there[np.argmin(((places[there] - here) ** 2).sum(axis=1))]
-    return replace(tangents, place=places[nearest], state=state[..., nearest : nearest + 1]).predict(here[None])
+        return tangents.predict(place[None])
+    start = int(nearest(everyone.spots, there, here, 1)[0])
+    return replace(tangents, place=everyone.places[start], state=solved.state[..., start : start + 1]).predict(
+        place[None]
+    )
 
 
 @dataclass(frozen=True)
@@ -179,12 +159,12 @@ class _Lead:
     band: tuple[int, int]
 
 
-def _next_centre(places: Array, pending: np.ndarray, leaf: np.ndarray, solved: np.ndarray) -> int:
+def _next_centre(spots: Array, pending: np.ndarray, leaf: np.ndarray, solved: np.ndarray) -> int:
     """The middle of a fresh leaf; afterwards the pending member nearest to a solved one."""
     if pending.size == leaf.size or solved.size == 0:
-        distance = ((places[pending] - places[leaf].mean(axis=0)) ** 2).sum(axis=1)
+        distance = squared(spots[pending], spots[leaf].mean(axis=0))
     else:
-        distance = ((places[pending][:, None] - places[solved][None]) ** 2).sum(axis=2).min(axis=1)
+        distance = ((spots[pending][:, None] - spots[solved][None]) ** 2).sum(axis=2).min(axis=1)
     return int(pending[np.argmin(distance)])
 
 
@@ -328,7 +308,7 @@ def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np
 
 def inside(state: Array, band: tuple[int, int]) -> Array:
     """The rows of a band, (nx, 3, rows, m)."""
-    rows = np.array(state[:, :, band[0] : band[1]])
+    rows = np.array(state[:, :, band[0] : band[1]], order="C")
     rows[:, ACROSS, 0] = 0.0
     return rows
 

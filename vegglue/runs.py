@@ -60,7 +60,8 @@ def _read_alone(model: Model, experiment: str, places: Array) -> Array:
     build = partial(_problem, model, experiment)
     solved = solve_members(build, places, model.case.numerics.tolerance)
     station = model.station.iloc[model.rows[experiment]]
-    prediction = read_sensors(build(places), solved.state, model.site.grid, station, ()).prediction
+    state = np.ascontiguousarray(solved.state)
+    prediction = read_sensors(build(places), state, model.site.grid, station, ()).prediction
     prediction[solved.status == FAILED] = np.nan
     return prediction
 

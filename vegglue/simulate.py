@@ -20,7 +20,8 @@ from vegglue.ensemble import FAILED, Header
 from vegglue.errors import InputError
 from vegglue.fields import QUANTITIES, Window, excess, window_of
 from vegglue.flow import FlowFields, Problem
-from vegglue.neighbourhood import SIZE, Known, known_middle, leaves, solve_members
+from vegglue.nearness import crowd, leaves
+from vegglue.neighbourhood import SIZE, Known, known_middle, solve_members
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile, sample_prior
 from vegglue.problem import build_problem
@@ -31,6 +32,8 @@ from vegglue.store import ensemble_writer
 
 # Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
+# Members read by the sensors at once, so that their fields stay small.
+READ = 16
 Rows = dict[str, np.ndarray]
 Begin = dict[str, Known | None]
 
@@ -58,14 +61,14 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
         raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
     theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
     places = unit_places(case, theta)
-    chunks = leaves(places, chunk_size(len(places)))
+    begin, chunks = begin_and_chunks(case, site, places)
     header = make_header(case, observations, theta, len(chunks), window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed = resumed, 0
         report(Progress(solved, len(places), failed, resumed))
-        for index, rows in _solve_all(case, site, observations, places, chunks, todo, jobs):
+        for index, rows in _solve_all(case, site, observations, places, chunks, todo, begin, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + int((rows["status"] == FAILED).sum())
@@ -77,6 +80,14 @@ def chunk_size(members: int) -> int:
     return min(max(-(-members // FEWEST_CHUNKS), SIZE), LARGEST_CHUNK)
 
 
+def begin_and_chunks(case: Case, site: Site, places: np.ndarray) -> tuple[Begin, list[np.ndarray]]:
+    """Where members come from, and what one task solves; a single chunk needs no common beginning."""
+    size = chunk_size(len(places))
+    begin = begin_at(case, site) if len(places) > size else {}
+    slopes = [known.slopes for known in begin.values() if known is not None]
+    return begin, leaves(crowd(places, slopes).spots, size)
+
+
 def _solve_all(
     case: Case,
     site: Site,
@@ -84,9 +95,9 @@ def _solve_all(
     places: np.ndarray,
     chunks: list[np.ndarray],
     todo: list[int],
+    begin: Begin,
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    begin = begin_at(case, site) if len(chunks) > 1 else {}
     tasks = ((index, case, site, observations, places[chunks[index]], begin) for index in todo)
     yield from as_finished(_solve_numbered, tasks, jobs)
 
@@ -132,11 +143,14 @@ def solve_chunk(
         build = partial(_problem_at, case, site, experiment)
         solved = solve_members(build, places, case.numerics.tolerance, (begin or {}).get(experiment))
         here = (station["experiment"] == experiment).to_numpy()
-        readings = read_sensors(build(places), solved.state, site.grid, station[here], sections, kept)
-        rows["prediction"][:, here] = readings.prediction
-        rows["section_flow"][:, number] = readings.section_flow
-        rows["fields"][:, number] = readings.fields
-        rows["mass_error"] = np.maximum(rows["mass_error"], readings.mass_error)
+        for first in range(0, members, READ):
+            few = slice(first, min(first + READ, members))
+            state = np.ascontiguousarray(solved.state[..., few])
+            readings = read_sensors(build(places[few]), state, site.grid, station[here], sections, kept)
+            rows["prediction"][few, here] = readings.prediction
+            rows["section_flow"][few, number] = readings.section_flow
+            rows["fields"][few, number] = readings.fields
+            rows["mass_error"][few] = np.maximum(rows["mass_error"][few], readings.mass_error)
         rows["status"] = np.maximum(rows["status"], solved.status.astype(np.int8))
         rows["iterations"] += solved.iterations.astype(np.int32)
         rows["seconds"] += (time.perf_counter() - began) / members
