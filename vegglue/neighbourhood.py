@@ -15,13 +15,16 @@ from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual
 from vegglue.jacobian import Factors
 from vegglue.march import settle
 from vegglue.nearness import Crowd, crowd, leaves, nearest, spread, squared
-from vegglue.start import backwater
+from vegglue.start import backwater, blend
 from vegglue.steady import CLOSE, finish, newton
 
 # Neighbours that one factorisation serves, and how many are solved at once.
 SIZE, LANES = 64, 16
 # Who is not there after so many steps waits for a centre of its own.
 MOST = 30
+# How far tangents reach, in spots: from 0.3 on, Newton had to help. On the way a correction of ROUGHLY [m, m/s]
+# will do.
+STRIDE, ROUGHLY = 0.2, 1e-3
 # Solved members that a start is drawn from.
 NEAREST = 48
 TANGENT_STEP = 1e-4
@@ -78,8 +81,9 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
         pending = leaf
         while pending.size:
             centre = _next_centre(everyone.spots, pending, leaf, _there(solved))
+            on_the_way = _approach(problem_of, everyone, centre, known, tolerance)
             lead = _solve_centre(problem_of, places[centre], _warm_start(everyone, centre, solved, known), tolerance)
-            solved.iterations[centre] += lead.iterations
+            solved.iterations[centre] += on_the_way + lead.iterations
             solved.status[centre], solved.reason[centre] = lead.status, lead.reason
             solved.state[..., centre] = lead.state[..., 0]
             pending = pending[pending != centre]
@@ -112,23 +116,47 @@ def _follow(
         solved.state[..., members[good]] = widen(ended.state[..., good], ny, band)
 
     def starts_of(members: np.ndarray) -> Array:
-        return inside(_starts(everyone, lead, solved, members), band)
+        return _starts(everyone, lead, solved, members)
 
     stream(part, queue, starts_of, lead.factors, tolerance, MOST, LANES, note)
 
 
 def _starts(everyone: Crowd, lead: "_Lead", solved: Solved, batch: np.ndarray) -> Array:
-    """Cubic splines through the solved members nearest to the centre, its tangents while there are too few."""
+    """Cubic splines through the solved members nearest to the centre, its tangents while there are too few; in its
+    band.
+    """
     assert lead.known is not None
     spots = everyone.spots
     there = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
     near = nearest(spots, there, lead.known.place @ everyone.axes, NEAREST)
     if near.size < 3 * (spots.shape[1] + 1):
-        return lead.known.predict(everyone.places[batch])
+        return inside(lead.known.predict(everyone.places[batch]), lead.band)
     spline = RBFInterpolator(spots[near], np.eye(near.size), kernel="cubic", degree=1)
-    states = np.moveaxis(solved.state, -1, 0)[near]
-    found = spline(spots[batch]) @ states.reshape(near.size, -1)
-    return np.moveaxis(found.reshape(batch.size, *states.shape[1:]), 0, -1)
+    states = np.moveaxis(solved.state, -1, 0)
+    blended = blend(states.reshape(len(states), -1), near, spline(spots[batch])).reshape(batch.size, *states.shape[1:])
+    return inside(np.moveaxis(blended, 0, -1), lead.band)
+
+
+def _approach(problem_of: ProblemOf, everyone: Crowd, centre: int, known: list[Known], tolerance: float) -> int:
+    """Go from what is known towards a member in strides its tangents reach, each noted in `known`; iterations spent."""
+    spent, target = 0, everyone.places[centre]
+    while known:
+        origin = _nearest_known(everyone, target, known)
+        distance = np.sqrt(squared(target[None] @ everyone.axes, origin.place @ everyone.axes)[0])
+        if distance <= STRIDE:
+            break
+        place = origin.place + (target - origin.place) * (STRIDE / distance)
+        lead = _solve_centre(problem_of, place, origin.predict(place[None]), max(tolerance, ROUGHLY))
+        spent += lead.iterations
+        if lead.known is None:
+            break
+        known.append(lead.known)
+    return spent
+
+
+def _nearest_known(everyone: Crowd, place: Array, known: list[Known]) -> Known:
+    spots = np.array([one.place for one in known]) @ everyone.axes
+    return known[int(np.argmin(squared(spots, place @ everyone.axes)))]
 
 
 def _warm_start(everyone: Crowd, centre: int, solved: Solved, known: list[Known]) -> Array | None:
@@ -136,7 +164,7 @@ def _warm_start(everyone: Crowd, centre: int, solved: Solved, known: list[Known]
     if not known:
         return None
     here, place = everyone.spots[centre], everyone.places[centre]
-    tangents = known[int(np.argmin(squared(np.array([one.place for one in known]) @ everyone.axes, here)))]
+    tangents = _nearest_known(everyone, place, known)
     there = _there(solved)
     if there.size == 0:
         return tangents.predict(place[None])

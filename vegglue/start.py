@@ -1,14 +1,17 @@
-"""A state to begin from: the gradually varied flow of each cross-section's conveyance."""
+"""States to begin from: the gradually varied flow of each cross-section's conveyance, and blends of solved states."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from vegglue import kernels
+from vegglue.elementary import compiled
 from vegglue.flow import ALONG, LEVEL, Array, Problem, drag
 
 # Steeper than this [-], the one-dimensional estimate would run away from the bed.
 STEEPEST = 0.02
+# Numbers blended together, so that what is summed up stays in the cache.
+BLOCK = 4096
 
 
 def backwater(problem: Problem) -> Array:
@@ -57,3 +60,18 @@ def _passing(problem: Problem) -> Array:
         share = np.clip((np.arange(problem.shape[0]) - inflow.start + 1) / (inflow.stop - inflow.start), 0.0, 1.0)
         passing += share[:, None] * inflow.discharge
     return passing
+
+
+@compiled
+def blend(states, some, weights):
+    """sum_n w_bn x_n, (b, size), x_n the state of member some[n]; states (m, size), weights (b, n)."""
+    size = states.shape[1]
+    blended = np.zeros((weights.shape[0], size))
+    for first in range(0, size, BLOCK):
+        for n in range(some.size):
+            source = states[some[n], first : first + BLOCK]
+            for b in range(weights.shape[0]):
+                target, weight = blended[b, first : first + BLOCK], weights[b, n]
+                for k in range(source.size):
+                    target[k] += weight * source[k]
+    return blended
