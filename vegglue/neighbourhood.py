@@ -12,7 +12,7 @@ from scipy.interpolate import RBFInterpolator
 from vegglue.chord import Solution, chord, stream
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow import ACROSS, LEVEL, Array, Problem, crop, residual
-from vegglue.jacobian import Factors
+from vegglue.jacobian import Factors, factors
 from vegglue.march import settle
 from vegglue.nearness import Crowd, crowd, leaves, nearest, spread, squared
 from vegglue.start import backwater, blend
@@ -77,21 +77,57 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
     solved = Solved(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
     known = [] if begin is None else [begin]
     everyone = crowd(places, [one.slopes for one in known])
-    for leaf in leaves(everyone.spots, SIZE):
-        pending = leaf
-        while pending.size:
-            centre = _next_centre(everyone.spots, pending, leaf, _there(solved))
-            on_the_way = _approach(problem_of, everyone, centre, known, tolerance)
-            lead = _solve_centre(problem_of, places[centre], _warm_start(everyone, centre, solved, known), tolerance)
-            solved.iterations[centre] += on_the_way + lead.iterations
-            solved.status[centre], solved.reason[centre] = lead.status, lead.reason
-            solved.state[..., centre] = lead.state[..., 0]
+    cuts = leaves(everyone.spots, SIZE)
+    heads = [_middle(everyone.spots, leaf) for leaf in cuts]
+    for leaf, head, next_head in zip(cuts, heads, [*heads[1:], None], strict=True):
+        pending, centre = leaf, head
+        while True:
+            lead = _lead_to(problem_of, everyone, centre, solved, known, tolerance)
             pending = pending[pending != centre]
             if lead.known is not None:
                 known.append(lead.known)
-                _follow(whole, everyone, pending, lead, solved, tolerance)
+                queue = _queue(everyone, pending, centre, next_head)
+                _follow(whole, everyone, queue, lead, solved, tolerance)
                 pending = pending[solved.status[pending] == FAILED]
+            if not pending.size:
+                break
+            centre = _nearest_to_solved(everyone.spots, pending, _there(solved))
     return solved
+
+
+def _middle(spots: Array, leaf: np.ndarray) -> int:
+    return int(nearest(spots, leaf, spots[leaf].mean(axis=0), 1)[0])
+
+
+def _nearest_to_solved(spots: Array, pending: np.ndarray, solved: np.ndarray) -> int:
+    """Which of those pending is the next centre: the one nearest to a solved one, if there is any."""
+    if not solved.size:
+        return int(pending[0])
+    distance = ((spots[pending][:, None] - spots[solved][None]) ** 2).sum(axis=2).min(axis=1)
+    return int(pending[np.argmin(distance)])
+
+
+def _lead_to(
+    problem_of: ProblemOf, everyone: Crowd, centre: int, solved: Solved, known: list[Known], tolerance: float
+) -> "_Lead":
+    """A centre, noted in `solved`: its factors if it came with the leaf before, else on the way from what is known."""
+    place = everyone.places[centre]
+    if solved.status[centre] == SOLVED_BY_NEWTON:
+        return _lead_at(problem_of, place, solved.state[..., centre : centre + 1])
+    on_the_way = _approach(problem_of, everyone, centre, known, tolerance)
+    lead = _solve_centre(problem_of, place, _warm_start(everyone, centre, solved, known), tolerance)
+    solved.iterations[centre] += on_the_way + lead.iterations
+    solved.status[centre], solved.reason[centre] = lead.status, lead.reason
+    solved.state[..., centre] = lead.state[..., 0]
+    return lead
+
+
+def _queue(everyone: Crowd, pending: np.ndarray, centre: int, next_head: int | None) -> np.ndarray:
+    """Those pending around a centre, with the last of them the head of the next leaf: what starts lean on is then
+    solved.
+    """
+    queue = spread(everyone.spots, pending, everyone.spots[centre])
+    return queue if next_head is None else np.insert(queue, max(queue.size - LANES, 0), next_head)
 
 
 def _there(solved: Solved) -> np.ndarray:
@@ -99,14 +135,12 @@ def _there(solved: Solved) -> np.ndarray:
 
 
 def _follow(
-    whole: Problem, everyone: Crowd, pending: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
+    whole: Problem, everyone: Crowd, queue: np.ndarray, lead: "_Lead", solved: Solved, tolerance: float
 ) -> None:
-    """Solve the neighbours of a centre with its factors and note them in `solved`, those that fail or outgrow its band
-    apart.
+    """Solve a queue of members with the factors of a centre and note those in `solved` that neither fail nor outgrow
+    its band.
     """
-    assert lead.known is not None
     assert lead.factors is not None
-    queue = spread(everyone.spots, pending, lead.known.place @ everyone.axes)
     part, band, ny = crop(whole, *lead.band), lead.band, solved.state.shape[2]
 
     def note(members: np.ndarray, ended: Solution) -> None:
@@ -187,15 +221,6 @@ class _Lead:
     band: tuple[int, int]
 
 
-def _next_centre(spots: Array, pending: np.ndarray, leaf: np.ndarray, solved: np.ndarray) -> int:
-    """The middle of a fresh leaf; afterwards the pending member nearest to a solved one."""
-    if pending.size == leaf.size or solved.size == 0:
-        distance = squared(spots[pending], spots[leaf].mean(axis=0))
-    else:
-        distance = ((spots[pending][:, None] - spots[solved][None]) ** 2).sum(axis=2).min(axis=1)
-    return int(pending[np.argmin(distance)])
-
-
 def _solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolerance: float) -> _Lead:
     """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
     problem = problem_of(place[None])
@@ -205,7 +230,7 @@ def _solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, toler
         spent += int(solution.iterations[0])
         if shared is None:
             continue
-        return _lead(problem_of, place, crop(problem, *band), band, solution, shared, spent)
+        return _lead(problem_of, place, crop(problem, *band), band, solution.state, shared, spent)
     return _marched(problem, spent, tolerance)
 
 
@@ -264,19 +289,27 @@ def _checked(
     return solution, shared, band
 
 
+def _lead_at(problem_of: ProblemOf, place: Array, state: Array) -> _Lead:
+    """What neighbours need of a solved state (nx, 3, ny, 1)."""
+    problem = problem_of(place[None])
+    band = _band(problem, state)
+    part, near = crop(problem, *band), inside(state, band)
+    return _lead(problem_of, place, part, band, near, factors(part, near), 0)
+
+
 def _lead(
     problem_of: ProblemOf,
     place: Array,
     part: Problem,
     band: tuple[int, int],
-    solution: Solution,
+    state: Array,
     shared: Factors,
     spent: int,
 ) -> _Lead:
     ny = problem_of(place[None]).shape[1]
-    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, solution.state, shared))
-    state = widen(solution.state, ny, band)
-    return _Lead(state, SOLVED_BY_NEWTON, "", spent, Known(place, state, slopes), shared, band)
+    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, state, shared))
+    wide = widen(state, ny, band)
+    return _Lead(wide, SOLVED_BY_NEWTON, "", spent, Known(place, wide, slopes), shared, band)
 
 
 def _tangents(

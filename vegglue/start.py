@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue import kernels
 from vegglue.elementary import compiled
@@ -63,7 +64,7 @@ def _passing(problem: Problem) -> Array:
 
 
 @compiled
-def blend(states, some, weights):
+def blend(states: Array, some: NDArray[np.int64], weights: Array) -> Array:
     """sum_n w_bn x_n, (b, size), x_n the state of member some[n]; states (m, size), weights (b, n)."""
     size = states.shape[1]
     blended = np.zeros((weights.shape[0], size))
