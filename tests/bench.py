@@ -5,7 +5,6 @@ import os
 import platform
 import pstats
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,12 @@ from joblib import Parallel, delayed
 from vegglue.config import load_case
 from vegglue.flow import crop, faces
 from vegglue.march import advance, march
-from vegglue.neighbourhood import inside, leaves, settled, solve_members
+from vegglue.nearness import leaves
+from vegglue.neighbourhood import inside, settled, solve_members
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
-from vegglue.simulate import _problem_at, begin_at, chunk_size, solve_chunk, unit_places
+from vegglue.simulate import begin_and_chunks, parameters_at, solve_chunk, unit_places
 from vegglue.site import build_site
 from vegglue.start import backwater
 
@@ -61,12 +61,17 @@ def marching(case) -> float:  # type: ignore[no-untyped-def]
     return seconds
 
 
+def ensemble(case):  # type: ignore[no-untyped-def]
+    """Site, measurements and the places of all members."""
+    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
+    return build_site(case), read_observations(case), places
+
+
 def steady(case) -> float:  # type: ignore[no-untyped-def]
     """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
-    site, observations = build_site(case), read_observations(case)
-    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    chunk = places[leaves(places, chunk_size(len(places)))[7]]
-    begin = begin_at(case, site)
+    site, observations, places = ensemble(case)
+    begin, chunks = begin_and_chunks(case, site, places)
+    chunk = places[chunks[7]]
     solve_chunk(case, site, observations, chunk[:2], begin)
     profile = cProfile.Profile()
     began = time.perf_counter()
@@ -85,8 +90,8 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
 
 
 def sizes(case) -> None:  # type: ignore[no-untyped-def]
-    """Seconds a member in one process, SAMPLE neighbours of the prior, on other cells and on shorter reaches."""
-    along = [on_grid(case, (x, 471.0), (0.5, 0.375)) for x in (300.0, 471.0 - 2 * 171.0, 0.0)]
+    """Seconds a member in one process, SAMPLE neighbours in the middle of the prior, on other cells and reaches."""
+    along = [on_grid(case, (471.0 - length, 471.0), (0.5, 0.375)) for length in (171.0, 684.0, 2736.0)]
     both = [on_grid(case, (300.0, 471.0), cell) for cell in ((1.0, 0.75), (0.5, 0.375), (0.25, 0.1875))]
     for words, cases in (("longer", along), ("refined both ways", both)):
         cells, seconds = np.array([timed(one) for one in cases]).T
@@ -109,10 +114,10 @@ def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: i
 
 def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
     """Cells, and seconds a member on one core."""
-    site, observations = build_site(case), read_observations(case)
-    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    chunk = places[leaves(places, SAMPLE)[SAMPLE // 4]]
-    begin = begin_at(case, site)
+    site, observations, places = ensemble(case)
+    begin, _ = begin_and_chunks(case, site, places)
+    around = [places[leaf] for leaf in leaves(places, SAMPLE)]
+    chunk = min(around, key=lambda some: np.linalg.norm(some.mean(axis=0) - 0.5))
     solve_chunk(case, site, observations, chunk[:2], begin)
     began = time.perf_counter()
     rows = solve_chunk(case, site, observations, chunk, begin)
@@ -127,7 +132,10 @@ def same(case) -> None:  # type: ignore[no-untyped-def]
     short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
     site = build_site(short)
     places = unit_places(short, sample_prior(short.parameters, 64, 1))
-    build = partial(_problem_at, short, site, "D3a")
+
+    def build(some):  # type: ignore[no-untyped-def]
+        return build_problem(short, site, "D3a", parameters_at(short, some))
+
     solved = solve_members(build, places, 1e-8)
     apart, moved = [], []
     for member, place in enumerate(places):
@@ -146,10 +154,9 @@ def same(case) -> None:  # type: ignore[no-untyped-def]
 
 def cores(case) -> None:  # type: ignore[no-untyped-def]
     """Speed-up from one to two processes over the same two chunks of the 5,000-member ensemble."""
-    site, observations = build_site(case), read_observations(case)
-    places = unit_places(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    chunks = leaves(places, chunk_size(len(places)))[8:10]
-    begin = begin_at(case, site)
+    site, observations, places = ensemble(case)
+    begin, chunks = begin_and_chunks(case, site, places)
+    chunks = chunks[8:10]
     members, spent = sum(chunk.size for chunk in chunks), []
     for jobs in (1, 2):
         with Parallel(n_jobs=jobs) as pool:

@@ -49,6 +49,22 @@ def test_a_member_that_strays_ends_and_spoils_no_other():
     assert np.isfinite(end.state[..., [0, 1, 3]]).all()
 
 
+def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
+    places = np.random.default_rng(10).random((6, 2))
+    batch = family(places)
+    centre = solved(take(batch, np.array([0])))
+    shared = factors(take(batch, np.array([0])), centre)
+    start = np.repeat(centre, 6, axis=3)
+    start[..., :2] = np.nan
+    found: dict[int, bool] = {}
+
+    def note(members: np.ndarray, ended: Solution) -> None:
+        found.update(zip(members.tolist(), ended.converged.tolist(), strict=True))
+
+    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, 25, 3, note)
+    assert found == {0: False, 1: False, 2: True, 3: True, 4: True, 5: True}
+
+
 def test_one_that_strayed_is_not_taken_up_again():
     """Its state may be anything: no factors are made there, and its correction says so."""
     problem = river()

@@ -119,8 +119,9 @@ def stream(
             running = running & ~ended
         if not running.any() and not waiting.size:
             return
-        # Members that ended stay in their lane until another enters: they must not spoil the arithmetic of others.
-        step[..., ~running] = 0.0
+        # Members that ended stay in their lane until another enters: they must not spoil the arithmetic of others, nor
+        # those that strayed what the lane remembers.
+        step[..., ~running], carried[..., strayed] = 0.0, 0.0
         carried = memory.next_state(carried, step)
         state = carried.copy()
         carry(part, state, state, thin, shared.thick, back=True)
