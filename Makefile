@@ -6,6 +6,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 VEGGLUE := $(BIN)/vegglue
+# One process a core, but no more than four: each takes some 1.2 GB. The tests of a file share what they set up.
+PYTEST := $(BIN)/pytest tests -n auto --maxprocesses 4 --dist loadfile
 CASES := d0 d3a d3b d3b_paper
 DEMO_CASES := d0 d3a d3b
 SOURCES := $(wildcard vegglue/*.py vegglue/effects/*.py vegglue/*.j2)
@@ -49,12 +51,12 @@ runs/%/report.html: runs/%/posterior.h5
 test: $(READY)  # everything that must pass
 	$(BIN)/ruff check vegglue tests
 	$(BIN)/mypy
-	$(BIN)/pytest tests
+	$(PYTEST)
 
 check: $(READY)  # the fast part
 	$(BIN)/ruff check vegglue tests
 	$(BIN)/mypy
-	$(BIN)/pytest tests -m 'not slow'
+	$(PYTEST) -m 'not slow'
 
 bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
 	$(BIN)/python -m tests.bench
