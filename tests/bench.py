@@ -27,7 +27,7 @@ PHASES = {
     "eased": "residual of chord steps",
     "jacobian": "Jacobian, its residuals included",
     "factor": "factorisation",
-    "solve": "back-substitution",
+    "step": "back-substitution",
     "next_state": "Anderson mixing",
     "_starts": "starts from solved neighbours",
 }

@@ -32,7 +32,7 @@ def a_header(**changes: Any) -> Header:
     parameters = {"z_last": np.linspace(1, 2, MEMBERS), "a_first": np.linspace(3, 4, MEMBERS)}
     header = Header(
         parameters, {"z_last": "m", "a_first": "-"}, station, ("D0",), (("D0", 1.0), ("D3", 7.0)), CHUNKS,
-        "name: d0\n", HASH, 5, "0.1.0",
+        "cut", "name: d0\n", HASH, 5, "0.1.0",
     )  # fmt: skip
     return replace(header, **changes)
 

@@ -113,7 +113,14 @@ OTHER_PARAMETERS = {"z_last": np.ones(MEMBERS), "a_first": np.ones(MEMBERS)}
 
 @pytest.mark.parametrize(
     "changes",
-    [{"config_hash": "e" * 64}, {"seed": 6}, {"version": "0.2.0"}, {"chunks": 4}, {"parameters": OTHER_PARAMETERS}],
+    [
+        {"config_hash": "e" * 64},
+        {"seed": 6},
+        {"version": "0.2.0"},
+        {"chunks": 4},
+        {"cut": "otherwise"},
+        {"parameters": OTHER_PARAMETERS},
+    ],
 )
 def test_unfinished_run_of_another_config_is_set_aside(path: Path, changes: dict[str, Any]) -> None:
     write_chunks(path, {1}, a_header())

@@ -1,7 +1,7 @@
 """Logarithm and cube root in plain arithmetic, which the compiler spreads over SIMD lanes as it cannot a library's.
 
-Three times as fast as calling the library, and within four units in the last place of it (tests/test_elementary.py);
-for positive normal numbers only.
+Six times as fast as the library's logarithm and power of a third (1 and 2 ns instead of 6 and 13), and within four
+units in the last place of it (tests/test_elementary.py); for positive normal numbers only.
 """
 
 import math
@@ -14,7 +14,7 @@ compiled = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_mode
 
 LN2, ROOT2 = math.log(2.0), math.sqrt(2.0)
 FRACTION, ONE = 0xFFFFFFFFFFFFF, 0x3FF0000000000000
-# Of the bit pattern of a cube root: two thirds of that of one; 3 % off at most.
+# Of the bit pattern of a cube root: two thirds of that of one; 3.3 % off at most.
 TWO_THIRDS = 0x2A9F7893782DA1CE
 
 

@@ -25,6 +25,7 @@ class Header:
     experiments: tuple[str, ...]
     sections: tuple[tuple[str, float], ...]  # name, x [m]
     chunks: int  # how many fixed sets of members the run is cut into
+    cut: str  # hash of these sets
     config: str  # resolved YAML
     config_hash: str
     seed: int

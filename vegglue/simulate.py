@@ -4,6 +4,7 @@ A chunk is what one task solves: neighbours in the prior, the same set whatever 
 results are too.
 """
 
+import hashlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -62,7 +63,7 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
     theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
     places = unit_places(case, theta)
     begin, chunks = begin_and_chunks(case, site, places)
-    header = make_header(case, observations, theta, len(chunks), window_of(case, site.grid))
+    header = make_header(case, observations, theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
@@ -180,7 +181,11 @@ def _problem_at(case: Case, site: Site, experiment: str, places: np.ndarray) -> 
 
 
 def make_header(
-    case: Case, observations: Observations, theta: dict[str, np.ndarray], chunks: int, window: Window | None
+    case: Case,
+    observations: Observations,
+    theta: dict[str, np.ndarray],
+    chunks: list[np.ndarray],
+    window: Window | None,
 ) -> Header:
     return Header(
         parameters=theta,
@@ -188,7 +193,8 @@ def make_header(
         station=observations.table,
         experiments=tuple(case.experiments),
         sections=section_places(observations),
-        chunks=chunks,
+        chunks=len(chunks),
+        cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
         config=resolved_yaml(case),
         config_hash=simulation_hash(case),
         seed=case.simulate.seed,

@@ -81,7 +81,8 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
     """Open `path`.part for appending, resuming what an earlier run of the same header left; rename it to `path` when
     the block ends with every chunk appended. Fields wait in `fields.part` beside it and become `fields.h5` just before.
 
-    A part file of another config, seed or version, or a broken one, is moved to `path`.part.old, never mixed in.
+    A part file of another config, seed, version or cut into chunks, or a broken one, is moved to `path`.part.old, never
+    mixed in.
     Errors: StorageError when another run holds the folder or the disk is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -175,7 +176,7 @@ def _read(path: Path, expected_hash: str | None, step: str, understand: Callable
 
 
 def _attributes(header: Header) -> dict[str, Any]:
-    own = {name: getattr(header, name) for name in ("config", "config_hash", "seed", "version")}
+    own = {name: getattr(header, name) for name in ("config", "config_hash", "seed", "version", "cut")}
     return own | {"format": ENSEMBLE_FORMAT}
 
 
