@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
+from vegglue.band import inside
+from vegglue.centre import settled
 from vegglue.config import load_case
 from vegglue.flow import crop, faces
 from vegglue.march import advance, march
 from vegglue.nearness import leaves
-from vegglue.neighbourhood import inside, settled, solve_members
+from vegglue.neighbourhood import solve_members
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem

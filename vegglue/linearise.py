@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr, ndtri
 
+from vegglue.band import chord_in_band, widen
+from vegglue.centre import settled
 from vegglue.cores import in_threads
 from vegglue.effect import Amplitude, Array
 from vegglue.flow import ACROSS, ALONG, Problem, crop, residual
 from vegglue.jacobian import Factors
-from vegglue.neighbourhood import chord_in_band, settled, widen
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile
 from vegglue.problem import build_problem

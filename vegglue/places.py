@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.band import widen
 from vegglue.effect import Array
 from vegglue.flow import faces
 from vegglue.linearise import Model, Point, force_response, problem_at
-from vegglue.neighbourhood import widen
 
 # Radius of the spot over the half width of the floor, and spacing of places over the radius.
 RADIUS, SPACING = 0.3, 1.0

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue import __version__
+from vegglue.centre import Known, known_middle
 from vegglue.config import resolved_yaml, simulation_hash
 from vegglue.cores import as_finished
 from vegglue.ensemble import FAILED, Header
@@ -22,7 +23,7 @@ from vegglue.errors import InputError
 from vegglue.fields import QUANTITIES, Window, excess, window_of
 from vegglue.flow import FlowFields, Problem
 from vegglue.nearness import crowd, leaves
-from vegglue.neighbourhood import SIZE, Known, known_middle, solve_members
+from vegglue.neighbourhood import SIZE, solve_members
 from vegglue.observations import Observations
 from vegglue.prior import probability, quantile, sample_prior
 from vegglue.problem import build_problem
