@@ -21,8 +21,9 @@ from vegglue.observations import read_observations
 from vegglue.simulate import chunk_size, simulate
 from vegglue.store import read_ensemble
 
-CHUNKS = 4
-CHUNK = chunk_size(512)
+# So many that a run is still on its way when it is stopped, on a busy machine too.
+CHUNKS = 8
+CHUNK = chunk_size(2048)
 ENSEMBLE = Path("runs/brook/ensemble.h5")
 PART = Path("runs/brook/ensemble.h5.part")
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
