@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from channels import family
 from reach import COARSE, write_reach
 
+from vegglue.chord import Solution, stream
 from vegglue.config import load_case
 from vegglue.ensemble import FAILED, SOLVED_BY_NEWTON
+from vegglue.flow import Problem
 from vegglue.infer import glue
 from vegglue.nearness import axes, leaves
-from vegglue.neighbourhood import SIZE
+from vegglue.neighbourhood import SIZE, solve_members
 from vegglue.observations import Observations, read_observations
 from vegglue.prior import sample_prior
 from vegglue.schema import Case
@@ -161,3 +164,24 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     assert (posterior.weights[failed] == 0).all()
     assert posterior.weights.sum() == pytest.approx(1.0)
     assert parameters_at(case, places_of(case, 8))["outlet"] == pytest.approx(ensemble.parameters["outlet"])
+
+
+def test_nobody_solved_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor the head of the next leaf, which comes with this one, when stragglers get centres of their own."""
+    done: set[int] = set()
+
+    def watched(problem: Problem, queue: np.ndarray, *others: Any) -> None:
+        *between, deliver = others
+        assert not done.intersection(queue.tolist())
+
+        def note(members: np.ndarray, ended: Solution) -> None:
+            done.update(members[ended.converged].tolist())
+            deliver(members, ended)
+
+        stream(problem, queue, *between, note)
+
+    monkeypatch.setattr("vegglue.neighbourhood.stream", watched)
+    monkeypatch.setattr("vegglue.neighbourhood.MOST", 5)
+    solved = solve_members(family, np.random.default_rng(1).random((2 * SIZE, 2)), 1e-6)
+    assert (solved.status == SOLVED_BY_NEWTON).all()
+    assert len(done) < 2 * SIZE - 2, "some were centres besides the heads"

@@ -20,8 +20,8 @@ from vegglue.start import blend
 SIZE, LANES = 64, 16
 # Who is not there after so many steps waits for a centre of its own.
 MOST = 30
-# How far tangents reach, in spots: from 0.3 on, Newton had to help. On the way a correction of ROUGHLY [m, m/s]
-# will do.
+# How far tangents reach, in spots: on the way to four chunks Newton had to help twice with 0.3, once with 0.2, and not
+# with 0.14, which takes more strides. A correction of ROUGHLY [m, m/s] will do there.
 STRIDE, ROUGHLY = 0.2, 1e-3
 # Solved members that a start is drawn from.
 NEAREST = 48
@@ -59,7 +59,7 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
                 known.append(lead.known)
                 queue = _queue(everyone, pending, centre, next_head)
                 _follow(whole, everyone, queue, lead, solved, tolerance)
-                pending = pending[solved.status[pending] == FAILED]
+                pending, next_head = pending[solved.status[pending] == FAILED], None
             if not pending.size:
                 break
             centre = _nearest_to_solved(everyone.spots, pending, _there(solved))
