@@ -22,7 +22,9 @@ Attempt = tuple[Solution, Factors | None, tuple[int, int]]
 
 @dataclass(frozen=True)
 class Known:
-    """A state (nx, 3, ny, 1) solved at one place of the unit cube, and d state / d s_p there."""
+    """A state (nx, 3, ny, 1) solved at one place of the unit cube, on the way to others roughly, and d state / d s_p
+    there.
+    """
 
     place: Array
     state: Array
@@ -64,7 +66,7 @@ def solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolera
         spent += int(solution.iterations[0])
         if shared is None:
             continue
-        return _lead(problem_of, place, crop(problem, *band), band, solution.state, shared, spent)
+        return _lead(problem_of, place, problem, band, solution.state, shared, spent)
     return _marched(problem, spent, tolerance)
 
 
@@ -72,8 +74,8 @@ def lead_at(problem_of: ProblemOf, place: Array, state: Array) -> Lead:
     """What neighbours need of a solved state (nx, 3, ny, 1)."""
     problem = problem_of(place[None])
     band = wet_band(problem, state)
-    part, near = crop(problem, *band), inside(state, band)
-    return _lead(problem_of, place, part, band, near, factors(part, near), 0)
+    near = inside(state, band)
+    return _lead(problem_of, place, problem, band, near, factors(crop(problem, *band), near), 0)
 
 
 def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
@@ -131,13 +133,13 @@ def _checked(
 def _lead(
     problem_of: ProblemOf,
     place: Array,
-    part: Problem,
+    problem: Problem,
     band: tuple[int, int],
     state: Array,
     shared: Factors,
     spent: int,
 ) -> Lead:
-    ny = problem_of(place[None]).shape[1]
+    part, ny = crop(problem, *band), problem.shape[1]
     slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, state, shared))
     wide = widen(state, ny, band)
     return Lead(wide, SOLVED_BY_NEWTON, "", spent, Known(place, wide, slopes), shared, band)
