@@ -34,9 +34,8 @@ def axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
     """A (d, d), the principal axes of G = sum S'S, S the tangents d state/ds of one flow or more; each as long as the
     square root of the change along it, the longest one.
 
-    How far factors reach goes with how much they change, not the flow; along axes as long as the change itself, cuts
-    were too fine across. Rounded, so that sets cut with them are the same on another machine. The unit cube without
-    tangents.
+    Along axes as long as the change itself members take more steps (DECISIONS). Rounded, so that sets cut with them are
+    the same on another machine. The unit cube without tangents.
     """
     gram = np.zeros((parameters, parameters))
     for some in slopes:
