@@ -20,7 +20,7 @@ from vegglue.neighbourhood import solve_members
 from vegglue.observations import read_observations
 from vegglue.prior import sample_prior
 from vegglue.problem import build_problem
-from vegglue.simulate import begin_and_chunks, parameters_at, solve_chunk, unit_places
+from vegglue.simulate import begin_and_chunks, begin_at, parameters_at, solve_chunk, unit_places
 from vegglue.site import build_site
 from vegglue.start import backwater
 
@@ -117,7 +117,7 @@ def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: i
 def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
     """Cells, and seconds a member on one core."""
     site, observations, places = ensemble(case)
-    begin, _ = begin_and_chunks(case, site, places)
+    begin = begin_at(case, site)
     around = [places[leaf] for leaf in leaves(places, SAMPLE)]
     chunk = min(around, key=lambda some: np.linalg.norm(some.mean(axis=0) - 0.5))
     solve_chunk(case, site, observations, chunk[:2], begin)

@@ -4,16 +4,21 @@ import numpy as np
 from channels import family, river, solved
 
 from vegglue.chord import Solution, chord, stream
-from vegglue.flow import take
-from vegglue.jacobian import factors
+from vegglue.flow import Problem, take
+from vegglue.jacobian import Factors, factors
 from vegglue.steady import finish
 
 
+def neighbours(seed: int, members: int) -> tuple[Problem, np.ndarray, Factors]:
+    """Members at random places, the state of the first, and its factors."""
+    batch = family(np.random.default_rng(seed).random((members, 2)))
+    first = take(batch, np.array([0]))
+    centre = solved(first)
+    return batch, centre, factors(first, centre)
+
+
 def test_members_pass_through_few_lanes_as_they_would_all_at_once():
-    places = np.random.default_rng(8).random((11, 2))
-    batch = family(places)
-    centre = solved(take(batch, np.array([0])))
-    shared = factors(take(batch, np.array([0])), centre)
+    batch, centre, shared = neighbours(8, 11)
     together = chord(batch, np.repeat(centre, 11, axis=3), shared, 1e-9)
     found: dict[int, tuple[bool, np.ndarray]] = {}
     entered: list[int] = []
@@ -38,10 +43,7 @@ def test_members_pass_through_few_lanes_as_they_would_all_at_once():
 
 
 def test_a_member_that_strays_ends_and_spoils_no_other():
-    places = np.random.default_rng(9).random((4, 2))
-    batch = family(places)
-    centre = solved(take(batch, np.array([0])))
-    shared = factors(take(batch, np.array([0])), centre)
+    batch, centre, shared = neighbours(9, 4)
     start = np.repeat(centre, 4, axis=3)
     start[..., 2] = np.nan
     end = chord(batch, start, shared, 1e-8)
@@ -50,10 +52,7 @@ def test_a_member_that_strays_ends_and_spoils_no_other():
 
 
 def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
-    places = np.random.default_rng(10).random((6, 2))
-    batch = family(places)
-    centre = solved(take(batch, np.array([0])))
-    shared = factors(take(batch, np.array([0])), centre)
+    batch, centre, shared = neighbours(10, 6)
     start = np.repeat(centre, 6, axis=3)
     start[..., :2] = np.nan
     found: dict[int, bool] = {}
