@@ -108,7 +108,8 @@ def sizes(case) -> None:  # type: ignore[no-untyped-def]
 
 def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: ignore[no-untyped-def]
     """A case on part of its channel, with the depth it has at its end, and on other cells."""
-    rise = -case.bed[0].trapezoid.bed_slope * (x[1] - case.grid.x[1])
+    shorter = np.ptp(case.grid.x) - np.ptp(x)
+    rise = case.bed[0].trapezoid.bed_slope * shorter  # the floor is at one level at the start of any grid
     experiments = {name: one.model_copy(update={"level": one.level + rise}) for name, one in case.experiments.items()}
     grid = case.grid.model_copy(update={"x": x, "cell": cell})
     return case.model_copy(update={"grid": grid, "experiments": experiments})
