@@ -34,7 +34,11 @@ def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np
 
 def inside(state: Array, band: tuple[int, int]) -> Array:
     """The rows of a band, (nx, 3, rows, m)."""
-    rows = np.array(state[:, :, band[0] : band[1]], order="C")
+    return walled(np.array(state[:, :, band[0] : band[1]], order="C"))
+
+
+def walled(rows: Array) -> Array:
+    """The same rows, with no flow through their first side."""
     rows[:, ACROSS, 0] = 0.0
     return rows
 

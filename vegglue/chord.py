@@ -131,7 +131,7 @@ def stream(
             here[free], age[free], best[free], running[free] = entering, 0, np.inf, True
             part, start = take(problem, here), starts_of(entering)
             state[..., free] = start
-            thin = _joined(thin, thin_faces(take(problem, entering), start, shared.thick), state.shape)
+            thin |= thin_faces(take(problem, entering), start, shared.thick)
             # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
             carried = _carried(part, state, thin, shared)
             memory.forget(free)
@@ -142,15 +142,7 @@ def stream(
             memory.keep(keep)
 
 
-def _joined(some: NDArray[np.int64], others: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """Faces that are in one list or the other."""
-    marked = np.zeros(shape[:-1], dtype=bool)
-    for faces in (some, others):
-        marked[tuple(faces.T)] = True
-    return np.argwhere(marked)
-
-
-def _carried(part: Problem, state: Array, thin: NDArray[np.int64], shared: Factors) -> Array:
+def _carried(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Array:
     """The unknowns of chord steps for a state."""
     carried = state.copy()
     carry(part, carried, state, thin, shared.thick)
@@ -158,7 +150,7 @@ def _carried(part: Problem, state: Array, thin: NDArray[np.int64], shared: Facto
 
 
 def _step(
-    part: Problem, state: Array, carried: Array, thin: NDArray[np.int64], shared: Factors
+    part: Problem, state: Array, carried: Array, thin: NDArray[np.bool_], shared: Factors
 ) -> tuple[Single, Array]:
     """The correction in the unknowns of chord steps, and the state after it."""
     rates = eased(part, state, shared.slope)

@@ -111,18 +111,42 @@ def answers(state, bed, lift, reach, film, thick):
 
 
 @compiled
+def thin(state, bed, lift, reach, film, thick):
+    """Faces (nx, 3, ny) whose rho may differ from one: thin at the centre or in any member of a state."""
+    nx, _, ny, m = state.shape
+    found = np.zeros((nx, 3, ny), np.bool_)
+    for i in range(nx):
+        for e in (1, 2):
+            for j in range(ny):
+                if thick[i, e, j] == np.inf:
+                    continue
+                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                lowest = np.inf
+                for k in range(m):
+                    lowest = min(lowest, _above(state, bed, lift, i, j, a, b, k))
+                least = wet_depth(lowest, 0.5 * (reach[i, j] + reach[a, b]), film)
+                found[i, e, j] = min(least, thick[i, e, j]) < THIN * film
+    return found
+
+
+@compiled
 def stretch(values, state, faces, bed, lift, reach, film, thick, back):
-    """Entries of some faces times rho at the levels of a state, or divided by it, in place; values (nx, 3, ny, m)."""
-    m = state.shape[3]
-    for f in range(len(faces)):
-        i, e, j = faces[f]
-        a, b = (i + 1, j) if e == 2 else (i, j - 1)
-        wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
-        for k in range(m):
-            h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
-            share = min(min(h, centre) / (THIN * film), 1.0)
-            rho = 1.0 + (1.0 - share * share) * (h / centre - 1.0)
-            values[i, e, j, k] *= 1.0 / rho if back else rho
+    """Entries of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx, 3,
+    ny, m).
+    """
+    nx, _, ny, m = state.shape
+    for i in range(nx):
+        for e in (1, 2):
+            for j in range(ny):
+                if not faces[i, e, j]:
+                    continue
+                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
+                for k in range(m):
+                    h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
+                    share = min(min(h, centre) / (THIN * film), 1.0)
+                    rho = 1.0 + (1.0 - share * share) * (h / centre - 1.0)
+                    values[i, e, j, k] *= 1.0 / rho if back else rho
 
 
 @compiled

@@ -335,14 +335,13 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
     return thick, easing.answers(state, problem.bed, problem.lift, problem.reach, problem.film, thick)
 
 
-def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.int64]:
-    """Where `carry` does something: faces (column, unknown, row) thin at the centre or in any member of a state."""
-    thinnest = np.minimum(face_depths(problem, state).min(axis=3), thick)
-    return np.argwhere(thinnest < easing.THIN * problem.film)
+def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
+    """Where `carry` does something, (nx, 3, ny): faces thin at the centre or in any member of a state."""
+    return np.asarray(easing.thin(state, problem.bed, problem.lift, problem.reach, problem.film, thick))
 
 
 def carry(
-    problem: Problem, values: Array, state: Array, thin: NDArray[np.int64], thick: Array, back: bool = False
+    problem: Problem, values: Array, state: Array, thin: NDArray[np.bool_], thick: Array, back: bool = False
 ) -> None:
     """Velocities or their rates (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
     easing.stretch(values, state, thin, problem.bed, problem.lift, problem.reach, problem.film, thick, back)

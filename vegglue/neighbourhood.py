@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from vegglue.band import inside, overflows, widen
+from vegglue.band import inside, overflows, walled, widen
 from vegglue.centre import Known, Lead, ProblemOf, lead_at, solve_centre
 from vegglue.chord import Solution, stream
 from vegglue.ensemble import FAILED, SOLVED_BY_NEWTON
@@ -135,9 +135,8 @@ def _starts(everyone: Crowd, lead: Lead, solved: Solved, batch: np.ndarray) -> A
     if near.size < 3 * (spots.shape[1] + 1):
         return inside(lead.known.predict(everyone.places[batch]), lead.band)
     spline = RBFInterpolator(spots[near], np.eye(near.size), kernel="cubic", degree=1)
-    states = np.moveaxis(solved.state, -1, 0)
-    blended = blend(states.reshape(len(states), -1), near, spline(spots[batch])).reshape(batch.size, *states.shape[1:])
-    return inside(np.moveaxis(blended, 0, -1), lead.band)
+    blended = blend(np.moveaxis(solved.state, -1, 0), near, spline(spots[batch]), *lead.band)
+    return walled(blended)
 
 
 def _approach(problem_of: ProblemOf, everyone: Crowd, centre: int, known: list[Known], tolerance: float) -> int:

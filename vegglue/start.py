@@ -11,8 +11,6 @@ from vegglue.flow import ALONG, LEVEL, Array, Problem, drag
 
 # Steeper than this [-], the one-dimensional estimate would run away from the bed.
 STEEPEST = 0.02
-# Numbers blended together, so that what is summed up stays in the cache.
-BLOCK = 4096
 
 
 def backwater(problem: Problem) -> Array:
@@ -64,15 +62,23 @@ def _passing(problem: Problem) -> Array:
 
 
 @compiled
-def blend(states: Array, some: NDArray[np.int64], weights: Array) -> Array:
-    """sum_n w_bn x_n, (b, size), x_n the state of member some[n]; states (m, size), weights (b, n)."""
-    size = states.shape[1]
-    blended = np.zeros((weights.shape[0], size))
-    for first in range(0, size, BLOCK):
+def blend(states: Array, some: NDArray[np.int64], weights: Array, south: int, north: int) -> Array:
+    """sum_n w_bn x_n in the rows south..north-1, (nx, 3, rows, b), x_n the state of member some[n]; states (m, nx, 3,
+    ny), weights (b, n).
+    """
+    nx, rows, members = states.shape[1], north - south, weights.shape[0]
+    blended, column = np.empty((nx, 3, rows, members)), np.empty((members, 3, rows))
+    for i in range(nx):
+        column[:] = 0.0
         for n in range(some.size):
-            source = states[some[n], first : first + BLOCK]
-            for b in range(weights.shape[0]):
-                target, weight = blended[b, first : first + BLOCK], weights[b, n]
-                for k in range(source.size):
-                    target[k] += weight * source[k]
+            for e in range(3):
+                source = states[some[n], i, e, south:north]
+                for b in range(members):
+                    target, weight = column[b, e], weights[b, n]
+                    for j in range(rows):
+                        target[j] += weight * source[j]
+        for e in range(3):
+            for j in range(rows):
+                for b in range(members):
+                    blended[i, e, j, b] = column[b, e, j]
     return blended

@@ -14,10 +14,8 @@ from vegglue.chord import LONGEST, Solution, chord
 from vegglue.flow import LEVEL, Array, Problem, eased, friction_slope, storage
 from vegglue.jacobian import Factors, Single, factors, jacobian, solved
 
-# Near enough [m, m/s] for chord steps to do the rest.
+# Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there.
 CLOSE = 2e-2
-# Factors of a state further than this [m, m/s] from the root are renewed before neighbours lean on them.
-FRESH = 0.3
 
 
 def _stored(problem: Problem, state: Array) -> Single:
@@ -58,7 +56,7 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
         moved = float(np.abs(end.state - state).max())
         end = replace(end, iterations=np.array([spent]))
         if end.converged[0]:
-            return end, shared if moved < FRESH else factors(problem, end.state)
+            return end, shared if moved < CLOSE else factors(problem, end.state)
         if not end.correction[0] < min(largest, LONGEST):
             break
         state, largest = end.state, float(end.correction[0])
