@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegglue.band import inside, overflows, wet_band, widen
+from vegglue.band import chord_in_band, inside, overflows, wet_band, widen
 from vegglue.chord import Solution
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow import Array, Problem, crop, residual
@@ -76,6 +76,19 @@ def lead_at(problem_of: ProblemOf, place: Array, state: Array) -> Lead:
     band = wet_band(problem, state)
     near = inside(state, band)
     return _lead(problem_of, place, problem, band, near, factors(crop(problem, *band), near), 0)
+
+
+def lead_beside(problem_of: ProblemOf, place: Array, lead: Lead, tolerance: float) -> Lead:
+    """A centre near another: with the factors of that one, if they reach, else on its own."""
+    assert lead.known is not None
+    assert lead.factors is not None
+    problem, start = problem_of(place[None]), lead.known.predict(place[None])
+    end = chord_in_band(problem, inside(start, lead.band), lead.factors, lead.band, tolerance)
+    spent = int(end.iterations[0])
+    if end.converged[0]:
+        return replace(lead_at(problem_of, place, widen(end.state, problem.shape[1], lead.band)), iterations=spent)
+    alone = solve_centre(problem_of, place, start, tolerance)
+    return replace(alone, iterations=spent + alone.iterations)
 
 
 def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 
 from vegglue.band import inside, overflows, walled, widen
-from vegglue.centre import Known, Lead, ProblemOf, lead_at, solve_centre
+from vegglue.centre import Known, Lead, ProblemOf, lead_at, lead_beside, solve_centre
 from vegglue.chord import Solution, stream
 from vegglue.ensemble import FAILED, SOLVED_BY_NEWTON
 from vegglue.flow import Array, Problem, crop
@@ -85,9 +85,10 @@ def _lead_to(
     place = everyone.places[centre]
     if solved.status[centre] == SOLVED_BY_NEWTON:
         return lead_at(problem_of, place, solved.state[..., centre : centre + 1])
-    on_the_way = _approach(problem_of, everyone, centre, known, tolerance)
-    lead = solve_centre(problem_of, place, _warm_start(everyone, centre, solved, known), tolerance)
-    solved.iterations[centre] += on_the_way + lead.iterations
+    lead = _approached(problem_of, everyone, centre, known, tolerance)
+    if lead is None:
+        lead = solve_centre(problem_of, place, _warm_start(everyone, centre, solved, known), tolerance)
+    solved.iterations[centre] += lead.iterations
     solved.status[centre], solved.reason[centre] = lead.status, lead.reason
     solved.state[..., centre] = lead.state[..., 0]
     return lead
@@ -139,21 +140,32 @@ def _starts(everyone: Crowd, lead: Lead, solved: Solved, batch: np.ndarray) -> A
     return walled(blended)
 
 
-def _approach(problem_of: ProblemOf, everyone: Crowd, centre: int, known: list[Known], tolerance: float) -> int:
-    """Go from what is known towards a member in strides its tangents reach, each noted in `known`; iterations spent."""
-    spent, target = 0, everyone.places[centre]
-    while known:
-        origin = _nearest_known(everyone, target, known)
-        distance = np.sqrt(squared(target[None] @ everyone.axes, origin.place @ everyone.axes)[0])
-        if distance <= STRIDE:
-            break
-        place = origin.place + (target - origin.place) * (STRIDE / distance)
-        lead = solve_centre(problem_of, place, origin.predict(place[None]), max(tolerance, ROUGHLY))
+def _approached(
+    problem_of: ProblemOf, everyone: Crowd, centre: int, known: list[Known], tolerance: float
+) -> Lead | None:
+    """A centre far from what is known, in strides that tangents reach, each with the factors of the last and noted in
+    `known`; None if it is near, or could not be reached.
+    """
+    target = everyone.places[centre]
+    if not known or _apart(everyone, target, _nearest_known(everyone, target, known)) <= STRIDE:
+        return None
+    origin, spent = _nearest_known(everyone, target, known), 0
+    lead = lead_at(problem_of, origin.place, origin.state)
+    while lead.known is not None:
+        here, distance = lead.known, _apart(everyone, target, lead.known)
+        place = target if distance <= STRIDE else here.place + (target - here.place) * (STRIDE / distance)
+        enough = tolerance if distance <= STRIDE else max(tolerance, ROUGHLY)
+        lead = lead_beside(problem_of, place, lead, enough)
         spent += lead.iterations
-        if lead.known is None:
-            break
-        known.append(lead.known)
-    return spent
+        if distance <= STRIDE:
+            return replace(lead, iterations=spent)
+        if lead.known is not None:
+            known.append(lead.known)
+    return None
+
+
+def _apart(everyone: Crowd, place: Array, known: Known) -> float:
+    return float(np.sqrt(squared(place[None] @ everyone.axes, known.place @ everyone.axes)[0]))
 
 
 def _nearest_known(everyone: Crowd, place: Array, known: list[Known]) -> Known:
