@@ -95,8 +95,8 @@ def stream(
 ) -> None:
     """Members of a queue through so many lanes with one factorisation, each handed over as it ends.
 
-    starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do. A member ends when it converged,
-    strayed, or took `most` steps.
+    starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do, written over. A member ends when
+    it converged, strayed, or took `most` steps.
     """
     if not queue.size:
         return
@@ -105,9 +105,11 @@ def stream(
     thin = thin_faces(part, state, shared.thick)
     carried = _carried(part, state, thin, shared)
     age, best, running = np.zeros(here.size, dtype=np.int64), np.full(here.size, np.inf), np.ones(here.size, dtype=bool)
-    memory = _Memory(state.shape)
+    memory, after = _Memory(state.shape), np.empty_like(state)
     while True:
-        step, after = _step(part, state, carried, thin, shared)
+        step = _step(part, state, thin, shared)
+        np.add(carried, step, out=after)
+        carry(part, after, after, thin, shared.thick, back=True)
         size = correction(part, after, state)
         age[running] += 1
         best[running] = np.minimum(best, size)[running]
@@ -123,7 +125,7 @@ def stream(
         # those that strayed what the lane remembers.
         step[..., ~running], carried[..., strayed] = 0.0, 0.0
         carried = memory.next_state(carried, step)
-        state = carried.copy()
+        np.copyto(state, carried)
         carry(part, state, state, thin, shared.thick, back=True)
         free = np.flatnonzero(~running)
         if waiting.size and free.size >= ENTER:
@@ -140,6 +142,7 @@ def stream(
             here, age, best, running = here[keep], age[keep], best[keep], running[keep]
             part, state, carried = take(problem, here), _lanes(state, keep), _lanes(carried, keep)
             memory.keep(keep)
+            after = np.empty_like(state)
 
 
 def _carried(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Array:
@@ -149,16 +152,11 @@ def _carried(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Facto
     return carried
 
 
-def _step(
-    part: Problem, state: Array, carried: Array, thin: NDArray[np.bool_], shared: Factors
-) -> tuple[Single, Array]:
-    """The correction in the unknowns of chord steps, and the state after it."""
+def _step(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Single:
+    """The correction in the unknowns of chord steps."""
     rates = eased(part, state, shared.slope)
     carry(part, rates, state, thin, shared.thick)
-    step = shared.step(rates)
-    after = carried + step
-    carry(part, after, after, thin, shared.thick, back=True)
-    return step, after
+    return shared.step(rates)
 
 
 def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> Solution:

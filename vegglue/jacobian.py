@@ -11,7 +11,8 @@ from vegglue.flow import Array, Problem, friction_slope, residual, take, thickne
 Single = NDArray[np.float32]
 
 STEP = 1e-6
-LANES = 15
+# Disturbed together: 15, as many as there are colours in a quarter, take a quarter longer than 16.
+LANES = 16
 
 
 @dataclass(frozen=True)

@@ -265,7 +265,7 @@ class Numerics(Part):
         default="constant", description="phi or phi h/h_d where h < h_d"
     )
     tolerance: Positive = Field(
-        default=5e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
+        default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
     )
 
 
