@@ -43,32 +43,31 @@ def _carried(law: int, coefficient: float, depth: float, floor: float) -> float:
 
 
 @compiled
-def _on_slope(drag, depth, reach, law, coefficient, floor, film):
+def _over_cell(drag, depth, reach, law, coefficient, floor, film):
     """k = g h^2 / <C h^(3/2)>^2 [1/m] of one cell, the mean over its wet part by three Gauss points.
 
     As in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324: one slope of the surface drives each depth.
     """
     dry, (p1, p2, p3), (w1, w2, w3) = 0.1 * film, GAUSS_PLACE, GAUSS_WEIGHT
-    # Each law has a loop of its own, so that the compiler can do members side by side.
-    if law == KEULEGAN:
-        for k in range(depth.size):
-            c = coefficient[k]
-            lowest, highest = _wet_part(depth[k] - dry, reach)
-            span = highest - lowest
-            h1, h2, h3 = lowest + span * p1, lowest + span * p2, lowest + span * p3
-            carried = w1 * _keulegan(c, h1, floor) * math.sqrt(h1) + w2 * _keulegan(c, h2, floor) * math.sqrt(h2)
-            carried += w3 * _keulegan(c, h3, floor) * math.sqrt(h3)
-            of_film = _keulegan(c, dry, floor) * math.sqrt(dry)
-            drag[k] = GRAVITY * (depth[k] / (carried * 0.5 * span / reach + of_film)) ** 2
+    for k in range(depth.size):
+        c = coefficient[k]
+        lowest, highest = _wet_part(depth[k] - dry, reach)
+        span = highest - lowest
+        h1, h2, h3 = lowest + span * p1, lowest + span * p2, lowest + span * p3
+        carried = w1 * _carried(law, c, h1, floor) + w2 * _carried(law, c, h2, floor)
+        carried += w3 * _carried(law, c, h3, floor)
+        drag[k] = GRAVITY * (depth[k] / (carried * 0.5 * span / reach + _carried(law, c, dry, floor))) ** 2
+
+
+@compiled
+def _on_slope(drag, depth, reach, law, coefficient, floor, film):
+    """The same, its law a constant in each loop, so that the compiler can do members side by side."""
+    if law == MANNING:
+        _over_cell(drag, depth, reach, MANNING, coefficient, floor, film)
+    elif law == KEULEGAN:
+        _over_cell(drag, depth, reach, KEULEGAN, coefficient, floor, film)
     else:
-        for k in range(depth.size):
-            c = coefficient[k]
-            lowest, highest = _wet_part(depth[k] - dry, reach)
-            span = highest - lowest
-            h1, h2, h3 = lowest + span * p1, lowest + span * p2, lowest + span * p3
-            carried = w1 * _carried(law, c, h1, floor) + w2 * _carried(law, c, h2, floor)
-            carried += w3 * _carried(law, c, h3, floor)
-            drag[k] = GRAVITY * (depth[k] / (carried * 0.5 * span / reach + _carried(law, c, dry, floor))) ** 2
+        _over_cell(drag, depth, reach, CHEZY, coefficient, floor, film)
 
 
 @compiled
