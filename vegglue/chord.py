@@ -8,16 +8,14 @@ Thin water is eased, see `easing`. A member is there when its correction, in m a
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vegglue import blocks
+from vegglue.anderson import Memory, kept
 from vegglue.flow import Array, Problem, carry, correction, eased, take, thin_faces
 from vegglue.jacobian import Factors, Single
 
-DEPTH = 6
 # So many lanes are free before other members enter them.
 ENTER = 2
 # A step this long [m, m/s] leaves the range where the linearisation means anything.
@@ -40,47 +38,85 @@ StartsOf = Callable[[np.ndarray], Array]
 Deliver = Callable[[np.ndarray, Solution], None]
 
 
-class _Memory:
-    """The last DEPTH changes of every lane's correction, for Anderson's mixing; filled in place, slot by slot."""
+@dataclass
+class _Lanes:
+    """Members side by side, each in its lane (m,) until it ends: who they are, their states and unknowns of chord steps
+    (nx, 3, ny, m), their steps so far, their least correction, and which lanes are at work.
+    """
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self.turns: Single = np.zeros((DEPTH, *shape), np.float32)
-        self.sums: Single = np.zeros((DEPTH, *shape), np.float32)
-        self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
-        self.last: tuple[Array, Single] | None = None
-        # When each slot was filled and since when each lane has had its member, counted in steps.
-        self.filled, self.since, self.count = np.zeros(DEPTH, dtype=np.int64), np.zeros(shape[-1], dtype=np.int64), 0
+    problem: Problem
+    shared: Factors
+    member: NDArray[np.int64]
+    part: Problem
+    state: Array
+    thin: NDArray[np.bool_]
+    carried: Array
+    after: Array
+    memory: Memory
+    age: np.ndarray
+    best: Array
+    running: np.ndarray
 
-    def keep(self, lanes: np.ndarray) -> None:
-        """Some lanes only."""
-        self.turns, self.sums, self.gram = (_lanes(values, lanes) for values in (self.turns, self.sums, self.gram))
-        self.since = self.since[lanes]
-        if self.last is not None:
-            self.last = _lanes(self.last[0], lanes), _lanes(self.last[1], lanes)
+    def try_step(self, tolerance: float, most: int) -> tuple[Single, np.ndarray, Solution]:
+        """A chord step of all, the members that end with it, and how. They stay in their lanes until others enter."""
+        step = _step(self.part, self.state, self.thin, self.shared)
+        np.add(self.carried, step, out=self.after)
+        carry(self.part, self.after, self.after, self.thin, self.shared.thick, back=True)
+        size = correction(self.part, self.after, self.state)
+        self.age[self.running] += 1
+        self.best[self.running] = np.minimum(self.best, size)[self.running]
+        strayed = self.running & ~(size < 4.0 * LONGEST)
+        self.best[strayed] = np.inf
+        ended = strayed | self.running & ((size < tolerance) | (self.age >= most))
+        solution = Solution(self.after[..., ended], self.best[ended], self.age[ended], size[ended] < tolerance)
+        self.running &= ~ended
+        # Those that ended must not spoil the arithmetic of others, nor those that strayed what the lane remembers.
+        step[..., ~self.running], self.carried[..., strayed] = 0.0, 0.0
+        return step, self.member[ended], solution
 
-    def forget(self, lanes: np.ndarray) -> None:
-        """Lanes in which other members begin."""
-        self.gram[..., lanes], self.since[lanes] = 0.0, self.count
+    def move(self, step: Single) -> None:
+        """To the states that the step leads to, mixed."""
+        self.carried = self.memory.next_state(self.carried, step)
+        np.copyto(self.state, self.carried)
+        carry(self.part, self.state, self.state, self.thin, self.shared.thick, back=True)
 
-    def next_state(self, state: Array, step: Single) -> Array:
-        """x + f, less what the memory knows to overshoot."""
-        mixed = state + step if self.last is None else self._mixed(state, step, *self.last)
-        self.last, self.count = (state, step), self.count + 1
-        return mixed
+    def enter(self, free: np.ndarray, entering: np.ndarray, start: Array) -> None:
+        """Members begin in free lanes."""
+        self.member[free], self.age[free], self.best[free], self.running[free] = entering, 0, np.inf, True
+        self.part = take(self.problem, self.member)
+        self.state[..., free] = start
+        self.thin |= thin_faces(take(self.problem, entering), start, self.shared.thick)
+        # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
+        self.carried = _carried(self.part, self.state, self.thin, self.shared)
+        self.memory.forget(free)
 
-    def _mixed(self, state: Array, step: Single, last_state: Array, last_step: Single) -> Array:
-        slot, known = (self.count - 1) % DEPTH, min(self.count, DEPTH)
-        row, right = blocks.remember(self.turns[:known], self.sums, slot, state, step, last_state, last_step)
-        self.filled[slot] = self.count
-        own = self.filled[:known, None] > self.since
-        row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
-        self.gram[slot, :known], self.gram[:known, slot] = row, row
-        weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
-        return blocks.mix(state, step, self.sums[:known], weights)
+    def narrow(self) -> None:
+        """Lanes at work only."""
+        keep = np.flatnonzero(self.running)
+        self.member, self.age = self.member[keep], self.age[keep]
+        self.best, self.running = self.best[keep], self.running[keep]
+        self.state, self.carried = kept(self.state, keep), kept(self.carried, keep)
+        self.part, self.after = take(self.problem, self.member), np.empty_like(self.state)
+        self.memory.keep(keep)
 
 
-def _lanes(values: Any, lanes: np.ndarray) -> Any:
-    return np.ascontiguousarray(values[..., lanes])
+def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors) -> _Lanes:
+    part, count = take(problem, members), members.size
+    thin = thin_faces(part, start, shared.thick)
+    return _Lanes(
+        problem=problem,
+        shared=shared,
+        member=members.copy(),
+        part=part,
+        state=start,
+        thin=thin,
+        carried=_carried(part, start, thin, shared),
+        after=np.empty_like(start),
+        memory=Memory(start.shape),
+        age=np.zeros(count, dtype=np.int64),
+        best=np.full(count, np.inf),
+        running=np.ones(count, dtype=bool),
+    )
 
 
 def stream(
@@ -90,59 +126,30 @@ def stream(
     shared: Factors,
     tolerance: float,
     most: int,
-    lanes: int,
+    width: int,
     deliver: Deliver,
 ) -> None:
-    """Members of a queue through so many lanes with one factorisation, each handed over as it ends.
+    """Members of a queue through `width` lanes with one factorisation, each handed over as it ends.
 
     starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do, written over. A member ends when
     it converged, strayed, or took `most` steps.
     """
     if not queue.size:
         return
-    here, waiting = queue[:lanes].copy(), queue[lanes:]
-    part, state = take(problem, here), starts_of(here)
-    thin = thin_faces(part, state, shared.thick)
-    carried = _carried(part, state, thin, shared)
-    age, best, running = np.zeros(here.size, dtype=np.int64), np.full(here.size, np.inf), np.ones(here.size, dtype=bool)
-    memory, after = _Memory(state.shape), np.empty_like(state)
+    lanes, waiting = _begun(problem, queue[:width], starts_of(queue[:width]), shared), queue[width:]
     while True:
-        step = _step(part, state, thin, shared)
-        np.add(carried, step, out=after)
-        carry(part, after, after, thin, shared.thick, back=True)
-        size = correction(part, after, state)
-        age[running] += 1
-        best[running] = np.minimum(best, size)[running]
-        strayed = running & ~(size < 4.0 * LONGEST)
-        best[strayed] = np.inf
-        ended = strayed | running & ((size < tolerance) | (age >= most))
-        if ended.any():
-            deliver(here[ended], Solution(after[..., ended], best[ended], age[ended], size[ended] < tolerance))
-            running = running & ~ended
-        if not running.any() and not waiting.size:
+        step, members, ended = lanes.try_step(tolerance, most)
+        if members.size:
+            deliver(members, ended)
+        if not lanes.running.any() and not waiting.size:
             return
-        # Members that ended stay in their lane until another enters: they must not spoil the arithmetic of others, nor
-        # those that strayed what the lane remembers.
-        step[..., ~running], carried[..., strayed] = 0.0, 0.0
-        carried = memory.next_state(carried, step)
-        np.copyto(state, carried)
-        carry(part, state, state, thin, shared.thick, back=True)
-        free = np.flatnonzero(~running)
-        if waiting.size and free.size >= ENTER:
-            free, entering, waiting = free[: waiting.size], waiting[: free.size], waiting[free.size :]
-            here[free], age[free], best[free], running[free] = entering, 0, np.inf, True
-            part, start = take(problem, here), starts_of(entering)
-            state[..., free] = start
-            thin |= thin_faces(take(problem, entering), start, shared.thick)
-            # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
-            carried = _carried(part, state, thin, shared)
-            memory.forget(free)
-        elif not waiting.size and 2 * running.sum() <= running.size:
-            keep = np.flatnonzero(running)
-            here, age, best, running = here[keep], age[keep], best[keep], running[keep]
-            part, state, carried = take(problem, here), _lanes(state, keep), _lanes(carried, keep)
-            memory.keep(keep)
-            after = np.empty_like(state)
+        lanes.move(step)
+        free = np.flatnonzero(~lanes.running)[: waiting.size]
+        if waiting.size and (free.size >= ENTER or not lanes.running.any()):
+            entering, waiting = waiting[: free.size], waiting[free.size :]
+            lanes.enter(free, entering, starts_of(entering))
+        elif not waiting.size and 2 * lanes.running.sum() <= lanes.running.size:
+            lanes.narrow()
 
 
 def _carried(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Array:

@@ -1,0 +1,59 @@
+"""Anderson's mixing of fixed-point steps f, lane by lane: x <- x + f - sum_d g_d s_d, with g the least squares of
+f - sum_d g_d t_d; t the change from one step to the next, s that change and the one of x.
+
+Walker and Ni 2011, doi:10.1137/10078356X.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from vegglue import blocks
+from vegglue.flow import Array
+from vegglue.jacobian import Single
+
+DEPTH = 6
+
+
+class Memory:
+    """The last DEPTH changes of every lane's correction, for Anderson's mixing; filled in place, slot by slot."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.turns: Single = np.zeros((DEPTH, *shape), np.float32)
+        self.sums: Single = np.zeros((DEPTH, *shape), np.float32)
+        self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
+        self.last: tuple[Array, Single] | None = None
+        # When each slot was filled and since when each lane has had its member, counted in steps.
+        self.filled, self.since, self.count = np.zeros(DEPTH, dtype=np.int64), np.zeros(shape[-1], dtype=np.int64), 0
+
+    def keep(self, lanes: np.ndarray) -> None:
+        """Some lanes only."""
+        self.turns, self.sums, self.gram = (kept(values, lanes) for values in (self.turns, self.sums, self.gram))
+        self.since = self.since[lanes]
+        if self.last is not None:
+            self.last = kept(self.last[0], lanes), kept(self.last[1], lanes)
+
+    def forget(self, lanes: np.ndarray) -> None:
+        """Lanes in which other members begin."""
+        self.gram[..., lanes], self.since[lanes] = 0.0, self.count
+
+    def next_state(self, state: Array, step: Single) -> Array:
+        """x + f, less what the memory knows to overshoot."""
+        mixed = state + step if self.last is None else self._mixed(state, step, *self.last)
+        self.last, self.count = (state, step), self.count + 1
+        return mixed
+
+    def _mixed(self, state: Array, step: Single, last_state: Array, last_step: Single) -> Array:
+        slot, known = (self.count - 1) % DEPTH, min(self.count, DEPTH)
+        row, right = blocks.remember(self.turns[:known], self.sums, slot, state, step, last_state, last_step)
+        self.filled[slot] = self.count
+        own = self.filled[:known, None] > self.since
+        row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
+        self.gram[slot, :known], self.gram[:known, slot] = row, row
+        weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
+        return blocks.mix(state, step, self.sums[:known], weights)
+
+
+def kept(values: Any, lanes: np.ndarray) -> Any:
+    """Some lanes of an array (.., m), in one piece of memory."""
+    return np.ascontiguousarray(values[..., lanes])
