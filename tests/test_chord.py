@@ -75,3 +75,36 @@ def test_one_that_strayed_is_not_taken_up_again():
     assert np.isinf(end.correction[0])
     _, kept = finish(problem, far, 1e-8)
     assert kept is None
+
+
+def test_one_lane_serves_all():
+    batch, centre, shared = neighbours(11, 3)
+    ends: list[int] = []
+    stream(
+        batch,
+        np.arange(3),
+        lambda some: np.repeat(centre, len(some), axis=3),
+        shared,
+        1e-8,
+        40,
+        1,
+        lambda members, end: ends.extend(members[end.converged]),
+    )
+    assert ends == [0, 1, 2]
+
+
+def test_who_waits_alone_enters_while_others_are_at_work():
+    """Two of four lanes are free at once, and a single member waits: it does not wait for all."""
+    batch, centre, shared = neighbours(12, 5)
+    together = chord(batch, np.repeat(centre, 5, axis=3), shared, 1e-9)
+    asked: list[tuple[int, int]] = []
+    done: list[int] = []
+
+    def starts_of(some: np.ndarray) -> np.ndarray:
+        asked.append((len(some), len(done)))
+        return np.repeat(centre, len(some), axis=3)
+
+    stream(batch, np.arange(5), starts_of, shared, 1e-9, 60, 4, lambda members, end: done.extend(members))
+    assert len(set(together.iterations)) > 1, "else all end at once"
+    assert asked[1][0] == 1
+    assert asked[1][1] < 4

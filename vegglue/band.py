@@ -38,7 +38,7 @@ def inside(state: Array, band: tuple[int, int]) -> Array:
 
 
 def walled(rows: Array) -> Array:
-    """The same rows, with no flow through their first side."""
+    """The rows given, in place, with no flow through their first side."""
     rows[:, ACROSS, 0] = 0.0
     return rows
 

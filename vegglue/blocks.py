@@ -3,7 +3,7 @@ channel.
 
 Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from
 downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the reach above
-it under a given level: no exchange of rows between blocks is needed.
+it under a given level: no exchange of rows between blocks is needed. Also the loops of `anderson` over such states.
 """
 
 import numpy as np

@@ -86,7 +86,8 @@ def lead_beside(problem_of: ProblemOf, place: Array, lead: Lead, tolerance: floa
     end = chord_in_band(problem, inside(start, lead.band), lead.factors, lead.band, tolerance)
     spent = int(end.iterations[0])
     if end.converged[0]:
-        return replace(lead_at(problem_of, place, widen(end.state, problem.shape[1], lead.band)), iterations=spent)
+        state = widen(end.state, problem.shape[1], lead.band)
+        return replace(lead_at(problem_of, place, state), state=state, iterations=spent)
     alone = solve_centre(problem_of, place, start, tolerance)
     return replace(alone, iterations=spent + alone.iterations)
 

@@ -1,7 +1,5 @@
 """Chord steps x <- x - M^-1 R(x) of many members with the factors M of one, accelerated by Anderson's mixing.
 
-Walker and Ni 2011, doi:10.1137/10078356X.
-
 Members pass through a few lanes that are computed side by side; as soon as some are done, others enter their lanes.
 Thin water is eased, see `easing`. A member is there when its correction, in m and m/s, is below the tolerance.
 """
@@ -40,8 +38,9 @@ Deliver = Callable[[np.ndarray, Solution], None]
 
 @dataclass
 class _Lanes:
-    """Members side by side, each in its lane (m,) until it ends: who they are, their states and unknowns of chord steps
-    (nx, 3, ny, m), their steps so far, their least correction, and which lanes are at work.
+    """Members side by side, each in its lane (m,) until it ends: who they are, the part of the problem that is theirs,
+    their states, their unknowns of chord steps (`carried`) and room for what a step leads to (nx, 3, ny, m), faces thin
+    in any of them so far, their steps, their least correction, and which lanes are at work.
     """
 
     problem: Problem
@@ -57,7 +56,7 @@ class _Lanes:
     best: Array
     running: np.ndarray
 
-    def try_step(self, tolerance: float, most: int) -> tuple[Single, np.ndarray, Solution]:
+    def step(self, tolerance: float, most: int) -> tuple[Single, np.ndarray, Solution]:
         """A chord step of all, the members that end with it, and how. They stay in their lanes until others enter."""
         step = _step(self.part, self.state, self.thin, self.shared)
         np.add(self.carried, step, out=self.after)
@@ -108,10 +107,10 @@ def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors)
         shared=shared,
         member=members.copy(),
         part=part,
-        state=start,
+        state=np.array(start, order="C"),
         thin=thin,
         carried=_carried(part, start, thin, shared),
-        after=np.empty_like(start),
+        after=np.empty(start.shape),
         memory=Memory(start.shape),
         age=np.zeros(count, dtype=np.int64),
         best=np.full(count, np.inf),
@@ -131,22 +130,22 @@ def stream(
 ) -> None:
     """Members of a queue through `width` lanes with one factorisation, each handed over as it ends.
 
-    starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do, written over. A member ends when
-    it converged, strayed, or took `most` steps.
+    starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do. A member ends when it converged,
+    strayed, or took `most` steps.
     """
     if not queue.size:
         return
     lanes, waiting = _begun(problem, queue[:width], starts_of(queue[:width]), shared), queue[width:]
     while True:
-        step, members, ended = lanes.try_step(tolerance, most)
+        step, members, ended = lanes.step(tolerance, most)
         if members.size:
             deliver(members, ended)
         if not lanes.running.any() and not waiting.size:
             return
         lanes.move(step)
-        free = np.flatnonzero(~lanes.running)[: waiting.size]
+        free = np.flatnonzero(~lanes.running)
         if waiting.size and (free.size >= ENTER or not lanes.running.any()):
-            entering, waiting = waiting[: free.size], waiting[free.size :]
+            free, entering, waiting = free[: waiting.size], waiting[: free.size], waiting[free.size :]
             lanes.enter(free, entering, starts_of(entering))
         elif not waiting.size and 2 * lanes.running.sum() <= lanes.running.size:
             lanes.narrow()

@@ -111,7 +111,7 @@ def answers(state, bed, lift, reach, film, thick):
 
 
 @compiled
-def thin(state, bed, lift, reach, film, thick):
+def stretched(state, bed, lift, reach, film, thick):
     """Faces (nx, 3, ny) whose rho may differ from one: thin at the centre or in any member of a state."""
     nx, _, ny, m = state.shape
     found = np.zeros((nx, 3, ny), np.bool_)

@@ -337,7 +337,7 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
 
 def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
     """Where `carry` does something, (nx, 3, ny): faces thin at the centre or in any member of a state."""
-    return np.asarray(easing.thin(state, problem.bed, problem.lift, problem.reach, problem.film, thick))
+    return np.asarray(easing.stretched(state, problem.bed, problem.lift, problem.reach, problem.film, thick))
 
 
 def carry(

@@ -85,10 +85,11 @@ def _lead_to(
     place = everyone.places[centre]
     if solved.status[centre] == SOLVED_BY_NEWTON:
         return lead_at(problem_of, place, solved.state[..., centre : centre + 1])
-    lead = _approached(problem_of, everyone, centre, known, tolerance)
+    lead, spent = _approached(problem_of, everyone, centre, known, tolerance)
     if lead is None:
         lead = solve_centre(problem_of, place, _warm_start(everyone, centre, solved, known), tolerance)
-    solved.iterations[centre] += lead.iterations
+        spent += lead.iterations
+    solved.iterations[centre] += spent
     solved.status[centre], solved.reason[centre] = lead.status, lead.reason
     solved.state[..., centre] = lead.state[..., 0]
     return lead
@@ -142,26 +143,26 @@ def _starts(everyone: Crowd, lead: Lead, solved: Solved, batch: np.ndarray) -> A
 
 def _approached(
     problem_of: ProblemOf, everyone: Crowd, centre: int, known: list[Known], tolerance: float
-) -> Lead | None:
+) -> tuple[Lead | None, int]:
     """A centre far from what is known, in strides that tangents reach, each with the factors of the last and noted in
-    `known`; None if it is near, or could not be reached.
+    `known`, and iterations spent; no centre if it is near, or could not be reached.
     """
-    target = everyone.places[centre]
-    if not known or _apart(everyone, target, _nearest_known(everyone, target, known)) <= STRIDE:
-        return None
-    origin, spent = _nearest_known(everyone, target, known), 0
+    target, spent = everyone.places[centre], 0
+    origin = _nearest_known(everyone, target, known) if known else None
+    if origin is None or _apart(everyone, target, origin) <= STRIDE:
+        return None, spent
     lead = lead_at(problem_of, origin.place, origin.state)
     while lead.known is not None:
         here, distance = lead.known, _apart(everyone, target, lead.known)
-        place = target if distance <= STRIDE else here.place + (target - here.place) * (STRIDE / distance)
-        enough = tolerance if distance <= STRIDE else max(tolerance, ROUGHLY)
-        lead = lead_beside(problem_of, place, lead, enough)
+        last = distance <= STRIDE
+        place = target if last else here.place + (target - here.place) * (STRIDE / distance)
+        lead = lead_beside(problem_of, place, lead, tolerance if last else max(tolerance, ROUGHLY))
         spent += lead.iterations
-        if distance <= STRIDE:
-            return replace(lead, iterations=spent)
         if lead.known is not None:
+            if last:
+                return lead, spent
             known.append(lead.known)
-    return None
+    return None, spent
 
 
 def _apart(everyone: Crowd, place: Array, known: Known) -> float:
