@@ -1,4 +1,6 @@
-"""One member solved on its own, with what its neighbours need of it: factors, tangents, and the band they hold for."""
+"""One member solved alone or beside another, with what neighbours need of it: factors, tangents, and the band they
+hold for.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
