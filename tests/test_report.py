@@ -23,7 +23,7 @@ from vegglue.report_tables import parameter_rows
 from vegglue.reported import Run, is_synthetic, zones
 from vegglue.schema import Case
 from vegglue.site import Site, build_site
-from vegglue.summary import verdict
+from vegglue.summary import key_numbers, verdict
 from vegglue.survey import read_survey, rigid_cylinder
 
 pytestmark = pytest.mark.slow  # whole pages
@@ -352,8 +352,12 @@ def test_says_when_few_members_carry_the_weight(d3a: tuple[Run, str], size: floa
     run, _ = d3a
     text, doubt = said(run, "weights", effective_size=size, pareto_k=0.2)
     assert ("simulate more members" in text) == doubt == provisional
-    sentence = verdict(run.case, replace(run.posterior, effective_size=size))
+    posterior = replace(run.posterior, effective_size=size)
+    sentence = verdict(run.case, posterior)
     assert sentence.startswith("A first look only") == provisional
+    assert ("too few to say what is identified" in sentence) == provisional
+    assert key_numbers(run.case, posterior)[0].remark.startswith("too few members to tell") == provisional
+    assert parameter_rows(replace(run, posterior=posterior))[0].known.startswith("too few members") == provisional
 
 
 @pytest.mark.parametrize(("error", "hides"), [(0.001, True), (0.5, False)])

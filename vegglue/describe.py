@@ -60,6 +60,13 @@ def _worth(posterior: Posterior) -> list[str]:
     return sentences
 
 
+def how_known(posterior: Posterior, name: str) -> str:
+    """Whether the data tell a parameter, which few members cannot say."""
+    if posterior.effective_size < CLAIMED_FROM:
+        return "too few members to tell"
+    return "identified" if posterior.identified[name] else "not identified"
+
+
 def _parameter(posterior: Posterior, name: str) -> list[str]:
     unit = posterior.unit[name].removesuffix("-")
     low, high = posterior.quantiles[name][[0, -1]]

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from vegglue.describe import how_known
 from vegglue.figure_posterior import (
     Reference,
     Unknown,
@@ -75,7 +76,7 @@ def _marginal(run: Run, name: str) -> Picture:
     references = [] if canopy is not None and canopy.parameter == name else _references(run, name)
     figure = draw_marginal(_unknown(run, name), run.posterior.weights, references)
     width = percent(run.posterior.width_ratio[name])
-    known = "identified" if run.posterior.identified[name] else "not identified"
+    known = how_known(run.posterior, name)
     caption = f"{symbol(run.case, name)} = {estimate(run.posterior, name)}: {known}, {width} of the prior width."
     alt = (
         f"Prior and posterior density of {name}; {known}; marked: {', '.join(r.name for r in references) or 'nothing'}."

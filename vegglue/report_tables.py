@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.config import case_hash
+from vegglue.describe import how_known
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
 from vegglue.posterior import CorrectedCanopy
 from vegglue.reported import Run, zones
@@ -16,6 +17,7 @@ from vegglue.schema import Case
 from vegglue.typography import NARROW, as_given, fixed, percent, plus_minus, short
 from vegglue.wording import as_power, estimate, largest_mass_error, symbol
 
+SHORTLY = {"identified": "yes", "not identified": "no"}
 STATUS = {
     SOLVED_BY_NEWTON: "solved by Newton's method",
     SOLVED_BY_MARCHING: "solved by marching in time",
@@ -94,7 +96,8 @@ def _parameter_row(run: Run, name: str, beside: _Beside) -> ParameterRow:
     posterior = run.posterior
     low, high = posterior.quantiles[name][[0, -1]]
     bound = " and ".join(side for side, hit in zip(("lower", "upper"), posterior.bound_hit[name], strict=True) if hit)
-    known = f"{'yes' if posterior.identified[name] else 'no'}, {percent(posterior.width_ratio[name])}"
+    answer = how_known(posterior, name)
+    known = f"{SHORTLY.get(answer, answer)}, {percent(posterior.width_ratio[name])}"
     return ParameterRow(
         symbol(run.case, name),
         html.escape(run.case.parameters[name].meaning),

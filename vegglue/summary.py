@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegglue.describe import CLAIMED_FROM
+from vegglue.describe import CLAIMED_FROM, how_known
 from vegglue.posterior import Posterior
 from vegglue.schema import Case
 from vegglue.typography import count, percent, short
@@ -22,28 +22,28 @@ class KeyNumber:
 
 def verdict(case: Case, posterior: Posterior) -> str:
     """The one sentence on top: what is known now, and how well the model does."""
+    if posterior.effective_size < CLAIMED_FROM:
+        size = max(posterior.effective_size, 1.0)
+        few = f"the weights are worth {size:.0f} of {posterior.members:,} members, too few to say what is identified"
+        return f"A first look only: {few}. {_how_well(posterior)}"
     known = [name for name in posterior.parameters if posterior.identified[name]]
     unknown = [name for name in posterior.parameters if not posterior.identified[name]]
     by = f"by these {count(posterior.used, 'station')}"
     sentence = f"{_listed(case, known)} {_are(known)} identified {by}" if known else f"Nothing is identified {by}"
     if unknown:
         sentence += f"; {_listed(case, unknown)} {_are(unknown)} not"
-    size = max(posterior.effective_size, 1.0)
-    caution = f"A first look only, for the weights are worth {size:.0f} of {posterior.members:,} members: " * (
-        size < CLAIMED_FROM
-    )
-    return f"{caution}{sentence}. {_how_well(posterior)}"
+    return f"{sentence}. {_how_well(posterior)}"
 
 
 def _how_well(posterior: Posterior) -> str:
     kind = next(iter(posterior.rmse))
     error, miss = measurement_error(posterior, kind), posterior.rmse[kind]
-    told = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
+    missed = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
     if not np.isfinite(error):
-        return f"{told}; their own error is not known."
+        return f"{missed}; their own error is not known."
     if unexplained(posterior, kind, miss):
-        return f"{told}, {short(miss / error, 2)} times their own error."
-    return f"{told}, as much as their own error of {with_unit(error, kind)} explains."
+        return f"{missed}, {short(miss / error, 2)} times their own error."
+    return f"{missed}, as much as their own error of {with_unit(error, kind)} explains."
 
 
 def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
@@ -64,8 +64,7 @@ def _remark(posterior: Posterior, name: str) -> str:
     side = pressed_side(posterior, name)
     if side:
         return f"presses against its {side} bound"
-    share = percent(posterior.width_ratio[name])
-    return f"{'identified' if posterior.identified[name] else 'not identified'}: {share} of the prior width"
+    return f"{how_known(posterior, name)}: {percent(posterior.width_ratio[name])} of the prior width"
 
 
 def _listed(case: Case, names: list[str]) -> str:
