@@ -21,6 +21,7 @@ from vegglue.prior import sample_prior
 from vegglue.schema import Case
 from vegglue.simulate import LARGEST_CHUNK, begin_and_chunks, parameters_at, simulate, solve_chunk, unit_places
 from vegglue.site import Site, build_site
+from vegglue.start import blend
 from vegglue.store import read_ensemble
 
 CHUNK = LARGEST_CHUNK
@@ -185,3 +186,11 @@ def test_nobody_solved_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
     solved = solve_members(family, np.random.default_rng(1).random((2 * SIZE, 2)), 1e-6)
     assert (solved.status == SOLVED_BY_NEWTON).all()
     assert len(done) < 2 * SIZE - 2, "some were centres besides the heads"
+
+
+def test_starts_are_weighted_sums_of_solved_states_in_the_rows_of_a_band() -> None:
+    random = np.random.default_rng(7)
+    states, weights = random.random((9, 5, 3, 8)), random.random((4, 3))
+    some = np.array([7, 0, 3])
+    expected = np.einsum("bn,nxej->xejb", weights, states[some][..., 2:6])
+    assert blend(states, some, weights, 2, 6) == pytest.approx(expected, rel=1e-12)
