@@ -74,7 +74,10 @@ def solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolera
 
 def lead_at(problem_of: ProblemOf, place: Array, state: Array) -> Lead:
     """What neighbours need of a solved state (nx, 3, ny, 1)."""
-    problem = problem_of(place[None])
+    return _lead_in(problem_of, place, problem_of(place[None]), state)
+
+
+def _lead_in(problem_of: ProblemOf, place: Array, problem: Problem, state: Array) -> Lead:
     band = wet_band(problem, state)
     near = inside(state, band)
     return _lead(problem_of, place, problem, band, near, factors(crop(problem, *band), near), 0)
@@ -89,7 +92,7 @@ def lead_beside(problem_of: ProblemOf, place: Array, lead: Lead, tolerance: floa
     spent = int(end.iterations[0])
     if end.converged[0]:
         state = widen(end.state, problem.shape[1], lead.band)
-        return replace(lead_at(problem_of, place, state), state=state, iterations=spent)
+        return replace(_lead_in(problem_of, place, problem, state), state=state, iterations=spent)
     alone = solve_centre(problem_of, place, start, tolerance)
     return replace(alone, iterations=spent + alone.iterations)
 
