@@ -1,10 +1,11 @@
-"""Developed flow in the paper's section, over banks that fall dry, mixed by eddy viscosity.
+"""Developed flow in the paper's section, over banks that fall dry, mixed by eddy viscosity or a mixing length.
 
-    g h S - c_f |u| u + d/dy(nu h du/dy) = 0,    c_f = g / C^2,    h = 0 at the waterline: nothing passes it.
+    g h S - c_f |u| u + d/dy((nu + l^2 |du/dy|) h du/dy) = 0,    c_f = g / C^2,    h = 0 at the waterline.
 
-The reference solves this on 1,900 cells whose outermost ends at the waterline. Slow to converge on cells of a bank: the
-mean of its conveyance, that of velocities which do not mix, is too easy on one whose velocities do (DECISIONS).
+The reference solves this on 1,900 cells whose outermost ends at the waterline.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,14 +13,18 @@ from channels import GRAVITY, centres, make_problem, solved, trapezoid
 from scipy.linalg import solve_banded
 
 from vegglue import roughness
-from vegglue.flow import Array, faces
+from vegglue.effect import Acting, Ground
+from vegglue.effects import library
+from vegglue.flow import Array, Problem, faces
+from vegglue.steady import newton
 
 FLOOR, BANK, SLOPE, DEPTH = 0.03, 0.3, 0.001, 1.1
 LENGTH, COLUMNS = 1500.0, 60
-STATIONS = np.linspace(-3.0, 0.0, 11)
+# Further out, what rows of 0.375 m put between their centres is wrong by 0.04 m/s however right they are.
+STATIONS = np.linspace(-2.7, 0.0, 10)
 
 
-def across(viscosity: float, cells: int = 1900) -> tuple[Array, float]:
+def across(viscosity: float, length: float, cells: int = 1900) -> tuple[Array, float]:
     """u [m/s] at the stations and the discharge [m3/s] where the floor is DEPTH under water."""
     half = 1.5 + 1.5 * DEPTH
     y, edges = centres(2.0 * half, cells) - half, np.linspace(-half, half, cells + 1)
@@ -27,9 +32,9 @@ def across(viscosity: float, cells: int = 1900) -> tuple[Array, float]:
     h, between = (DEPTH - np.maximum(np.abs(place) - 1.5, 0.0) / 1.5 for place in (y, edges[1:-1]))
     law = 18.0 * np.log10(np.maximum(12.0 * h / BANK, 1.3))
     rough = GRAVITY / np.where(np.abs(y) < 1.5, h ** (1.0 / 6.0) / FLOOR, law) ** 2
-    link = viscosity * between / width
     u, change = np.full(cells, 0.5), 1.0
     while change > 1e-11:
+        link = (viscosity + length**2 * np.abs(np.diff(u)) / width) * between / width
         bands = np.zeros((3, cells))
         bands[1] = 2.0 * rough * np.abs(u) * width + np.append(link, 0.0) + np.append(0.0, link)
         bands[0, 1:], bands[2, :-1] = -link, -link
@@ -38,9 +43,16 @@ def across(viscosity: float, cells: int = 1900) -> tuple[Array, float]:
     return np.interp(STATIONS, y, u), float((u * h).sum() * width)
 
 
-def developed(viscosity: float, flow: float, rows: int) -> tuple[Array, float]:
+def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[Array, float]:
     """u [m/s] at the stations in the middle of a long reach, and the depth on its floor [m]."""
     bed, banks = trapezoid(LENGTH, 4.5, (COLUMNS, rows))
+    y, nothing = centres(9.0, rows) - 4.5, np.zeros((COLUMNS, rows, 1))
+    far = nothing + np.inf
+    ground = Ground(
+        x=centres(LENGTH, COLUMNS)[:, None, None], y=y[None, :, None], dx=LENGTH / COLUMNS, dy=9.0 / rows,
+        bed=bed[..., None], offset=nothing, half_width=nothing + 1.5, side_slope=nothing,
+        bank=banks[..., None].astype(float), planted=nothing, front=far, edge=far, wake=far, patch=nothing - 1.0,
+    )  # fmt: skip
     problem = make_problem(
         bed,
         (LENGTH / COLUMNS, 9.0 / rows),
@@ -51,25 +63,40 @@ def developed(viscosity: float, flow: float, rows: int) -> tuple[Array, float]:
         friction_class=banks,
         viscosity=np.array([viscosity]),
         film=0.01,
+        ground=ground,
     )
-    found, i = faces(problem, solved(problem, 1e-7)), COLUMNS // 2
-    u = np.interp(STATIONS, centres(9.0, rows) - 4.5, found.u[i, :, 0])
+    found, i = faces(problem, _mixed(problem, length)), COLUMNS // 2
+    u = np.interp(STATIONS, y, found.u[i, :, 0])
     return u, float(found.cell[i, rows // 2, 0])
 
 
+def _mixed(problem: Problem, length: float) -> Array:
+    """The steady state with a mixing length, reached by shorter ones: from none at once Newton does not get there."""
+    state = solved(problem, 1e-6)
+    for share in (0.4, 0.7, 1.0) if length else ():
+        mixing = Acting(library()["mixing_length"], {"length": np.array([share * length])})
+        solution = newton(replace(problem, acting=(mixing,)), state, 1e-6)
+        assert solution.converged[0]
+        state = solution.state
+    return state
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("viscosity", [0.01, 0.05])
-def test_velocity_and_depth_where_banks_fall_dry(viscosity: float) -> None:
-    """On rows of 0.375, 0.1875 and 0.094 m wrong by 0.024, 0.014 and 0.002 m/s, depths at most 3 mm too small; with
-    five times that viscosity by 0.034, 0.028 and 0.002 m/s, 20, 14 and 2 mm.
+@pytest.mark.parametrize(("viscosity", "length"), [(0.01, 0.0), (0.05, 0.0), (0.01, 0.5)])
+def test_velocity_and_depth_where_banks_fall_dry(viscosity: float, length: float) -> None:
+    """On rows of 0.375, 0.1875 and 0.094 m wrong by 0.003, 0.001 and 0.001 m/s, depths by 0.2 mm at most; with five
+    times that viscosity by 0.012, 0.007 and 0.004 m/s, 10, 6 and 3 mm; mixed over 0.5 m by 0.026, 0.018 and 0.006 m/s,
+    27, 20 and 6 mm, all too shallow: what is mixed well feels the shallow end of a cell more than its mean says.
     """
-    exact, flow = across(viscosity)
+    exact, flow = across(viscosity, length)
     errors, depths = [], []
     for rows in (24, 48, 96):
-        u, depth = developed(viscosity, flow, rows)
+        u, depth = developed(viscosity, length, flow, rows)
         errors.append(float(np.sqrt(np.mean((u - exact) ** 2))))
         depths.append(depth - DEPTH)
-    print(f"nu {viscosity}:", ", ".join(f"{e:.4f} m/s, {1e3 * d:.1f} mm" for e, d in zip(errors, depths, strict=True)))
+    told = ", ".join(f"{e:.4f} m/s, {1e3 * d:.1f} mm" for e, d in zip(errors, depths, strict=True))
+    print(f"nu {viscosity}, l {length}: {told}")
     assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 4e-3
-    assert abs(depths[2]) < 2e-3
+    assert errors[0] < 0.03
+    assert errors[2] < 6e-3
+    assert abs(depths[2]) < 7e-3

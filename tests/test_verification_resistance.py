@@ -104,33 +104,31 @@ def test_drag_follows_depth(law):
 @pytest.mark.parametrize(
     ("law", "value", "chezy"),
     [
-        (roughness.MANNING, 0.05, manning),
-        (roughness.KEULEGAN, 1.0, keulegan),
+        (roughness.MANNING, 0.05, lambda h, n: manning(h.mean(), n)),
+        (roughness.KEULEGAN, 1.0, lambda h, k_s: np.mean([keulegan(depth, k_s) for depth in h])),
         (roughness.CHEZY, 30.0, lambda h, c: c),
     ],
     ids=["manning", "keulegan", "chezy"],
 )
-def test_a_cell_on_a_slope_conveys_what_its_slope_conveys(law, value, chezy):
-    """k = g (h / K)^2 with K the mean of C h^(3/2) over the bed of the cell, here of 20,000 strips.
+def test_a_cell_on_a_slope_conveys_what_its_wet_part_does(law, value, chezy):
+    """k = g (h / K)^2 with K = s C h_w^(3/2): share s, mean depth h_w and C of the wet ones of 5,000 strips.
 
-    Three points of the solver: measured within 4e-6 where all of a cell is deep, 0.14 % where the waterline crosses it,
-    1.3 % where the clip of the logarithm does.
+    The wet depth is rounded off, by up to 9 % where the waterline leaves the cell, so that it has a derivative.
     """
     slope, film = 0.5, 1e-5
     bed = np.repeat(slope * (np.arange(12) + 0.5)[None], 6, axis=0)
-    inside = slope * ((np.arange(20000) + 0.5) / 20000 - 0.5)
+    inside = slope * ((np.arange(5000) + 0.5) / 5000 - 0.5)
     for level in (3.3, 3.44, 3.57):
         problem = make_problem(bed, (1.0, 1.0), 0.0, level, (law, value), film=film)
         depth = faces(problem, np.stack([np.full((6, 12, 1), level)] + 2 * [np.zeros((6, 12, 1))], axis=1)).cell
         rates = drag(problem, depth)[2, :, 0]
         for row in np.flatnonzero(level - bed[2] > -0.2):
-            strips = np.maximum(level - bed[2, row] - inside, 0.0)
+            strips = level - bed[2, row] - inside
             wet = strips[strips > 0.0]
-            conveyed = sum(chezy(h, value) * h**1.5 for h in wet) / strips.size
-            expected = 9.81 * (strips.mean() / conveyed) ** 2
-            clipped = law == roughness.KEULEGAN and strips.min() < 0.2
-            tolerance = 1e-5 if strips.min() > 0.5 else 2e-2 if clipped else 2e-3
-            assert rates[row] == pytest.approx(expected, rel=tolerance)
+            conveyed = wet.size / strips.size * chezy(wet, value) * wet.mean() ** 1.5
+            expected = 9.81 * (np.maximum(strips, 0.0).mean() / conveyed) ** 2
+            away = abs(np.log(wet.mean() / 0.25)) > 0.7
+            assert rates[row] == pytest.approx(expected, rel=0.015 if away else 0.11)
 
 
 def test_emergent_conventions_differ_below_the_canopy_only():

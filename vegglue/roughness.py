@@ -9,91 +9,64 @@ from vegglue.kernels import GRAVITY
 
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
 LOG_SLOPE = 18.0 / math.log(10.0)
-GAUSS_PLACE = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
-GAUSS_WEIGHT = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 
 
 @compiled
-def _manning(coefficient: float, depth: float) -> float:
-    """C h = h^(7/6) / n [m^3/2/s]."""
-    return depth * math.sqrt(cube_root(depth)) / coefficient
+def _wet_depths(out, depth, reach, dry):
+    """Mean depth [m] of the wet part of one cell for all members, f + h^(1/2) (h^4 + w^4)^(1/8), f of the film.
 
-
-@compiled
-def _keulegan(coefficient: float, depth: float, floor: float) -> float:
-    """C h = 18 log10(max(12 h/k_s, floor)) h [m^3/2/s] (Keulegan 1938)."""
-    return LOG_SLOPE * logarithm(max(12.0 * depth / coefficient, floor)) * depth
-
-
-@compiled
-def _wet_part(mean: float, reach: float) -> tuple[float, float]:
-    """Least and greatest depth [m] of a cell of mean depth `mean` whose bed rises evenly by 2 w, where it is wet."""
-    above = mean if mean > reach else 2.0 * math.sqrt(reach * max(mean, 0.0)) - reach
-    return max(above - reach, 0.0), max(above + reach, 1e-30)
-
-
-@compiled
-def _carried(law: int, coefficient: float, depth: float, floor: float) -> float:
-    """C h^(3/2) [m^2/s] of one depth."""
-    if law == MANNING:
-        return _manning(coefficient, depth) * math.sqrt(depth)
-    if law == KEULEGAN:
-        return _keulegan(coefficient, depth, floor) * math.sqrt(depth)
-    return coefficient * depth * math.sqrt(depth)
-
-
-@compiled
-def _over_cell(drag, depth, reach, law, coefficient, floor, film):
-    """k = g h^2 / <C h^(3/2)>^2 [1/m] of one cell, the mean over its wet part by three Gauss points.
-
-    As in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324: one slope of the surface drives each depth.
+    That is (h w)^(1/2) where the waterline crosses the cell, h where it is far from it, and smooth between.
     """
-    dry, (p1, p2, p3), (w1, w2, w3) = 0.1 * film, GAUSS_PLACE, GAUSS_WEIGHT
+    reach_4 = reach**4
     for k in range(depth.size):
-        c = coefficient[k]
-        lowest, highest = _wet_part(depth[k] - dry, reach)
-        span = highest - lowest
-        h1, h2, h3 = lowest + span * p1, lowest + span * p2, lowest + span * p3
-        carried = w1 * _carried(law, c, h1, floor) + w2 * _carried(law, c, h2, floor)
-        carried += w3 * _carried(law, c, h3, floor)
-        drag[k] = GRAVITY * (depth[k] / (carried * 0.5 * span / reach + _carried(law, c, dry, floor))) ** 2
+        mean = max(depth[k] - dry, 1e-12)
+        square = mean * mean
+        out[k] = dry + math.sqrt(mean * math.sqrt(math.sqrt(square * square + reach_4)))
 
 
 @compiled
-def _on_slope(drag, depth, reach, law, coefficient, floor, film):
-    """The same, its law a constant in each loop, so that the compiler can do members side by side."""
-    if law == MANNING:
-        _over_cell(drag, depth, reach, MANNING, coefficient, floor, film)
-    elif law == KEULEGAN:
-        _over_cell(drag, depth, reach, KEULEGAN, coefficient, floor, film)
-    else:
-        _over_cell(drag, depth, reach, CHEZY, coefficient, floor, film)
+def _chezys(out, wet, reach, law, coefficient, floor):
+    """C [m^1/2/s] of the wet part of one cell for all members, of mean depth h between h - w and h + w.
 
-
-@compiled
-def _on_flat(drag, depth, law, coefficient, floor):
-    """k = g / (C^2 h) [1/m] of one cell."""
+    h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, floor))
+    (Keulegan 1938), whose floor would stop Newton where all of a cell met it at once.
+    """
     if law == MANNING:
-        for k in range(depth.size):
-            drag[k] = GRAVITY * depth[k] / _manning(coefficient[k], depth[k]) ** 2
+        for k in range(wet.size):
+            out[k] = math.sqrt(cube_root(wet[k])) / coefficient[k]
     elif law == KEULEGAN:
-        for k in range(depth.size):
-            drag[k] = GRAVITY * depth[k] / _keulegan(coefficient[k], depth[k], floor) ** 2
+        log_floor = math.log(floor)
+        for k in range(wet.size):
+            per, half = 12.0 / coefficient[k], min(wet[k], reach)
+            high, low = per * (wet[k] + half), per * (wet[k] - half)
+            up, down = max(high, floor), max(low, floor)
+            above = up * (logarithm(up) - 1.0 - log_floor) - down * (logarithm(down) - 1.0 - log_floor)
+            out[k] = LOG_SLOPE * (log_floor + above / (high - low))
     else:
-        for k in range(depth.size):
-            drag[k] = GRAVITY / (coefficient[k] ** 2 * depth[k])
+        for k in range(wet.size):
+            out[k] = coefficient[k]
 
 
 @compiled
 def class_drag(depth, reach, friction_class, law, coefficient, log_argument_minimum, film):
-    """k = g / (C^2 h) [1/m] of the class laws; on a slope g h^2 / <C h^(3/2)>^2, the same for one depth throughout."""
-    nx, ny, _ = depth.shape
-    drag = np.empty(depth.shape)
+    """k = g h^2 / (s K(h / s) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
+
+    depth (nx, ny, m) is h, the mean of the cell; reach: half the range of its bed, w [m]. The slope of the surface
+    drives either part, as in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324; but the wet part moves
+    as one, not each of its depths as if the water beside it did not matter (`test_verification_banks`).
+    """
+    (nx, ny, m), dry = depth.shape, 0.1 * film
+    drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))
+    for c in range(law.size):
+        _chezys(on_film[c], wet, dry, law[c], coefficient[c], log_argument_minimum)
+    on_film *= dry * math.sqrt(dry)
     for i in range(nx):
         for j in range(ny):
-            c = friction_class[i, j]
-            if reach[i, j] > 4.0001 * film:
-                _on_slope(drag[i, j], depth[i, j], reach[i, j], law[c], coefficient[c], log_argument_minimum, film)
-            else:
-                _on_flat(drag[i, j], depth[i, j], law[c], coefficient[c], log_argument_minimum)
+            c, out = friction_class[i, j], drag[i, j]
+            _wet_depths(wet, depth[i, j], reach[i, j], dry)
+            _chezys(out, wet, reach[i, j], law[c], coefficient[c], log_argument_minimum)
+            for k in range(m):
+                share = max(depth[i, j, k] - dry, 1e-12) / (wet[k] - dry)
+                carried = share * out[k] * wet[k] * math.sqrt(wet[k]) + (1.0 - share) * on_film[c, k]
+                out[k] = GRAVITY * (depth[i, j, k] / carried) ** 2
     return drag
