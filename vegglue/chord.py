@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.anderson import Memory, kept
-from vegglue.flow import Array, Problem, carry, correction, eased, take, thin_faces
+from vegglue.flow import Array, Problem, carry, correction, eased, take, thin_places
 from vegglue.jacobian import Factors, Single
 
 # So many lanes are free before other members enter them.
@@ -39,8 +39,8 @@ Deliver = Callable[[np.ndarray, Solution], None]
 @dataclass
 class _Lanes:
     """Members side by side, each in its lane (m,) until it ends: who they are, the part of the problem that is theirs,
-    their states, their unknowns of chord steps (`carried`) and room for what a step leads to (nx, 3, ny, m), faces thin
-    in any of them so far, their steps, their least correction, and which lanes are at work.
+    their states, their unknowns of chord steps (`carried`) and room for what a step leads to (nx, 3, ny, m), where
+    it was thin when any of them began, their steps, their least correction, and which lanes are at work.
     """
 
     problem: Problem
@@ -61,7 +61,7 @@ class _Lanes:
         step = _step(self.part, self.state, self.thin, self.shared)
         np.add(self.carried, step, out=self.after)
         carry(self.part, self.after, self.after, self.thin, self.shared.thick, back=True)
-        size = correction(self.part, self.after, self.state)
+        size = correction(self.part, self.after, self.state, self.thin)
         self.age[self.running] += 1
         self.best[self.running] = np.minimum(self.best, size)[self.running]
         strayed = self.running & ~(size < 4.0 * LONGEST)
@@ -84,7 +84,7 @@ class _Lanes:
         self.member[free], self.age[free], self.best[free], self.running[free] = entering, 0, np.inf, True
         self.part = take(self.problem, self.member)
         self.state[..., free] = start
-        self.thin |= thin_faces(take(self.problem, entering), start, self.shared.thick)
+        self.thin |= thin_places(take(self.problem, entering), start, self.shared.thick)
         # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
         self.carried = _carried(self.part, self.state, self.thin, self.shared)
         self.memory.forget(free)
@@ -101,7 +101,7 @@ class _Lanes:
 
 def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors) -> _Lanes:
     part, count = take(problem, members), members.size
-    thin = thin_faces(part, start, shared.thick)
+    thin = thin_places(part, start, shared.thick)
     return _Lanes(
         problem=problem,
         shared=shared,

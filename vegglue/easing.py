@@ -92,6 +92,14 @@ def ease(out, state, depth, drag, west, slope, film):
 
 
 @compiled
+def _beyond(i, e, j):
+    """The cell beyond the face of an unknown of cell i, j; for a level this cell itself."""
+    if e == 0:
+        return i, j
+    return (i + 1, j) if e == 2 else (i, j - 1)
+
+
+@compiled
 def _above(state, bed, lift, i, j, a, b, k):
     """Level above the bed [m] at the face between the cells i, j and a, b, the mean of both."""
     above = 0.5 * (state[i, 0, j, k] - bed[i, j] + state[a, 0, b, k] - bed[a, b])
@@ -103,7 +111,7 @@ def answers(state, bed, lift, reach, film, thick):
     """u d(rho)/dz [1/s] of one member's faces (nx, 3, ny) where rho is one, z the level of either cell beside."""
     answer = np.zeros(thick.shape)
     for i, e, j in np.argwhere(thick < THIN * film):
-        a, b = (i + 1, j) if e == 2 else (i, j - 1)
+        a, b = _beyond(i, e, j)
         wide, share = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j] / (THIN * film)
         wet = min(max(0.5 * (_above(state, bed, lift, i, j, a, b, 0) - 0.1 * film + wide) / wide, 0.0), 1.0)
         answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / thick[i, e, j] * state[i, e, j, 0]
@@ -111,16 +119,16 @@ def answers(state, bed, lift, reach, film, thick):
 
 
 @compiled
-def stretched(state, bed, lift, reach, film, thick):
-    """Faces (nx, 3, ny) whose rho may differ from one: thin at the centre or in any member of a state."""
+def thin_places(state, bed, lift, reach, film, thick):
+    """Cells and faces (nx, 3, ny) that are thin at the centre (thick, faces only) or in any member of a state."""
     nx, _, ny, m = state.shape
     found = np.zeros((nx, 3, ny), np.bool_)
     for i in range(nx):
-        for e in (1, 2):
-            for j in range(ny):
-                if thick[i, e, j] == np.inf:
+        for j in range(ny):
+            for e in range(3):
+                if e > 0 and thick[i, e, j] == np.inf:
                     continue
-                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                a, b = _beyond(i, e, j)
                 lowest = np.inf
                 for k in range(m):
                     lowest = min(lowest, _above(state, bed, lift, i, j, a, b, k))
@@ -140,7 +148,7 @@ def stretch(values, state, faces, bed, lift, reach, film, thick, back):
             for j in range(ny):
                 if not faces[i, e, j]:
                     continue
-                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                a, b = _beyond(i, e, j)
                 wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
                 for k in range(m):
                     h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
@@ -158,26 +166,32 @@ def tilt(step, answer):
             for e in (1, 2):
                 if answer[i, e, j] == 0.0:
                     continue
-                a, b = (i + 1, j) if e == 2 else (i, j - 1)
+                a, b = _beyond(i, e, j)
                 for k in range(m):
                     step[i, e, j, k] += answer[i, e, j] * (step[i, 0, j, k] + step[a, 0, b, k])
 
 
 @compiled
-def correction(after, before, depth, film):
-    """Largest change of each member (m,) [m, m/s], in thin water in proportion to its depth; NaN if any entry is."""
+def correction(after, before, thin, bed, lift, reach, film):
+    """Largest change of each member (m,) [m, m/s], NaN if any is; in thin places in proportion to the depth there, that
+    of its face for a velocity.
+    """
     nx, _, ny, m = after.shape
-    thin = THIN * film
-    largest, total = np.zeros(m), np.zeros(m)
+    largest, total, per_thin = np.zeros(m), np.zeros(m), 1.0 / (THIN * film)
     for i in range(nx):
-        east = min(i + 1, nx - 1)
-        for j in range(ny):
-            south = max(j - 1, 0)
-            for k in range(m):
-                here = min(depth[i, j, k], thin)
-                level = abs(after[i, 0, j, k] - before[i, 0, j, k]) * here
-                across = abs(after[i, 1, j, k] - before[i, 1, j, k]) * max(here, min(depth[i, south, k], thin))
-                along = abs(after[i, 2, j, k] - before[i, 2, j, k]) * max(here, min(depth[east, j, k], thin))
-                largest[k] = max(largest[k], max(level, max(across, along)))
-                total[k] += level + across + along
-    return largest / thin + 0.0 * total
+        for e in range(3):
+            for j in range(ny):
+                if not thin[i, e, j]:
+                    for k in range(m):
+                        change = abs(after[i, e, j, k] - before[i, e, j, k])
+                        largest[k] = max(largest[k], change)
+                        total[k] += change
+                    continue
+                a, b = _beyond(i, e, j)
+                wide = 0.5 * (reach[i, j] + reach[a, b])
+                for k in range(m):
+                    h = wet_depth(_above(before, bed, lift, i, j, a, b, k), wide, film)
+                    change = abs(after[i, e, j, k] - before[i, e, j, k]) * min(h * per_thin, 1.0)
+                    largest[k] = max(largest[k], change)
+                    total[k] += change
+    return largest + 0.0 * total

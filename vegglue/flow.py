@@ -335,9 +335,9 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
     return thick, easing.answers(state, problem.bed, problem.lift, problem.reach, problem.film, thick)
 
 
-def thin_faces(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
-    """Where `carry` does something, (nx, 3, ny): faces thin at the centre or in any member of a state."""
-    return np.asarray(easing.stretched(state, problem.bed, problem.lift, problem.reach, problem.film, thick))
+def thin_places(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
+    """Where water is thin, (nx, 3, ny): cells in any member of a state, faces there or at the centre."""
+    return np.asarray(easing.thin_places(state, problem.bed, problem.lift, problem.reach, problem.film, thick))
 
 
 def carry(
@@ -347,9 +347,9 @@ def carry(
     easing.stretch(values, state, thin, problem.bed, problem.lift, problem.reach, problem.film, thick, back)
 
 
-def correction(problem: Problem, after: Array, before: Array) -> Array:
+def correction(problem: Problem, after: Array, before: Array, thin: NDArray[np.bool_]) -> Array:
     """Largest change from one state to another [m, m/s] (m,), in thin water in proportion to its depth."""
-    return easing.correction(after, before, _depth(problem, before), problem.film)
+    return np.asarray(easing.correction(after, before, thin, problem.bed, problem.lift, problem.reach, problem.film))
 
 
 def friction_slope(problem: Problem, state: Array) -> Array:
