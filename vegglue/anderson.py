@@ -1,5 +1,6 @@
 """Anderson's mixing of fixed-point steps f, lane by lane: x <- x + f - sum_d g_d s_d, with g the least squares of
-f - sum_d g_d t_d; t the change from one step to the next, s that change and the one of x.
+f - sum_d g_d t_d; t the change from one step to the next, s that change and the one of x. The least squares see one
+column in a few only, which lead to the same weights with a fraction of the memory to read.
 
 Walker and Ni 2011, doi:10.1137/10078356X.
 """
@@ -19,10 +20,11 @@ class Memory:
     """The last DEPTH changes of every lane's correction, for Anderson's mixing; filled in place, slot by slot."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
-        self.turns: Single = np.zeros((DEPTH, *shape), np.float32)
+        self.turns: Single = np.zeros((DEPTH, -(-shape[0] // blocks.SPARSE), *shape[1:]), np.float32)
         self.sums: Single = np.zeros((DEPTH, *shape), np.float32)
         self.gram = np.zeros((DEPTH, DEPTH, shape[-1]))
-        self.last: tuple[Array, Single] | None = None
+        # The last step, and by how much it moved the state once mixed.
+        self.last: tuple[Single, Single] | None = None
         # When each slot was filled and since when each lane has had its member, counted in steps.
         self.filled, self.since, self.count = np.zeros(DEPTH, dtype=np.int64), np.zeros(shape[-1], dtype=np.int64), 0
 
@@ -37,21 +39,22 @@ class Memory:
         """Lanes in which other members begin."""
         self.gram[..., lanes], self.since[lanes] = 0.0, self.count
 
-    def next_state(self, state: Array, step: Single) -> Array:
-        """x + f, less what the memory knows to overshoot."""
-        mixed = state + step if self.last is None else self._mixed(state, step, *self.last)
-        self.last, self.count = (state, step), self.count + 1
-        return mixed
+    def next_state(self, state: Array, step: Single) -> None:
+        """x <- x + f, less what the memory knows to overshoot, in place."""
+        known = min(self.count, DEPTH)
+        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(step, *self.last)
+        self.last = step, blocks.mix(state, step, self.sums[:known], weights)
+        self.count += 1
 
-    def _mixed(self, state: Array, step: Single, last_state: Array, last_step: Single) -> Array:
+    def _weights(self, step: Single, last_step: Single, moved: Single) -> Array:
+        """g (slots, m) of what is known, its next slot filled."""
         slot, known = (self.count - 1) % DEPTH, min(self.count, DEPTH)
-        row, right = blocks.remember(self.turns[:known], self.sums, slot, state, step, last_state, last_step)
+        row, right = blocks.remember(self.turns[:known], self.sums, slot, moved, step, last_step)
         self.filled[slot] = self.count
         own = self.filled[:known, None] > self.since
         row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
         self.gram[slot, :known], self.gram[:known, slot] = row, row
-        weights = blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right)
-        return blocks.mix(state, step, self.sums[:known], weights)
+        return np.asarray(blocks.minimise(np.ascontiguousarray(self.gram[:known, :known]), right))
 
 
 def kept(values: Any, lanes: np.ndarray) -> Any:

@@ -15,6 +15,8 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 # unknowns this far apart may be disturbed together.
 ALONG_PERIOD, ROWS_REACH = 4, 2
 ACROSS_PERIOD = 2 * ROWS_REACH + 1
+# Of so many columns one tells Anderson's mixing how steps change.
+SPARSE = 4
 
 
 @compiled
@@ -80,41 +82,47 @@ def solve(blocks, far, right):
 
 
 @compiled
-def remember(turns, sums, slot, state, step, last_state, last_step):
-    """Slot of the memory: t = f - f_last, s = (x - x_last) + t, member by member.
+def remember(turns, sums, slot, moved, step, last_step):
+    """Slot of the memory: t = f - f_last, s = t + (x - x_last), member by member; t of every SPARSE-th column only.
 
     Returned: inner products per member of that turn with every turn, and of every turn with f, two arrays (depth, m).
     """
-    depth, nx, _, ny, m = turns.shape
+    depth, m = turns.shape[0], turns.shape[4]
+    _, nx, _, ny, _ = sums.shape
     gram, right = np.zeros((depth, m)), np.zeros((depth, m))
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
                 for k in range(m):
-                    turn = step[i, e, j, k] - last_step[i, e, j, k]
-                    turns[slot, i, e, j, k] = turn
-                    sums[slot, i, e, j, k] = turn + state[i, e, j, k] - last_state[i, e, j, k]
+                    sums[slot, i, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k] + moved[i, e, j, k]
+                if i % SPARSE:
+                    continue
+                c = i // SPARSE
+                for k in range(m):
+                    turns[slot, c, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k]
                 for d in range(depth):
                     for k in range(m):
-                        gram[d, k] += turns[slot, i, e, j, k] * turns[d, i, e, j, k]
-                        right[d, k] += turns[d, i, e, j, k] * step[i, e, j, k]
+                        gram[d, k] += turns[slot, c, e, j, k] * turns[d, c, e, j, k]
+                        right[d, k] += turns[d, c, e, j, k] * step[i, e, j, k]
     return gram, right
 
 
 @compiled
 def mix(state, step, sums, weights):
-    """Anderson's next state x + f - sum_d g_d s_d."""
+    """Anderson's next state x + f - sum_d g_d s_d, in place; returned: by how much that differs (nx, 3, ny, m)."""
     depth, nx, _, ny, m = sums.shape
-    mixed = np.empty_like(state)
+    moved = np.empty_like(step)
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
                 for k in range(m):
-                    mixed[i, e, j, k] = state[i, e, j, k] + step[i, e, j, k]
+                    moved[i, e, j, k] = step[i, e, j, k]
                 for d in range(depth):
                     for k in range(m):
-                        mixed[i, e, j, k] -= weights[d, k] * sums[d, i, e, j, k]
-    return mixed
+                        moved[i, e, j, k] -= weights[d, k] * sums[d, i, e, j, k]
+                for k in range(m):
+                    state[i, e, j, k] += moved[i, e, j, k]
+    return moved
 
 
 @compiled

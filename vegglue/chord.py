@@ -39,8 +39,8 @@ Deliver = Callable[[np.ndarray, Solution], None]
 @dataclass
 class _Lanes:
     """Members side by side, each in its lane (m,) until it ends: who they are, the part of the problem that is theirs,
-    their states, their unknowns of chord steps (`carried`) and room for what a step leads to (nx, 3, ny, m), where
-    it was thin when any of them began, their steps, their least correction, and which lanes are at work.
+    their states (nx, 3, ny, m), where these were thin when any of them began, their steps, their least correction, and
+    which lanes are at work.
     """
 
     problem: Problem
@@ -49,8 +49,6 @@ class _Lanes:
     part: Problem
     state: Array
     thin: NDArray[np.bool_]
-    carried: Array
-    after: Array
     memory: Memory
     age: np.ndarray
     best: Array
@@ -59,34 +57,46 @@ class _Lanes:
     def step(self, tolerance: float, most: int) -> tuple[Single, np.ndarray, Solution]:
         """A chord step of all, the members that end with it, and how. They stay in their lanes until others enter."""
         step = _step(self.part, self.state, self.thin, self.shared)
-        np.add(self.carried, step, out=self.after)
-        carry(self.part, self.after, self.after, self.thin, self.shared.thick, back=True)
-        size = correction(self.part, self.after, self.state, self.thin)
+        size = correction(self.part, step, self.state, self.thin, self.shared.thick)
         self.age[self.running] += 1
         self.best[self.running] = np.minimum(self.best, size)[self.running]
         strayed = self.running & ~(size < 4.0 * LONGEST)
         self.best[strayed] = np.inf
         ended = strayed | self.running & ((size < tolerance) | (self.age >= most))
-        solution = Solution(self.after[..., ended], self.best[ended], self.age[ended], size[ended] < tolerance)
+        solution = Solution(self._after(step, ended), self.best[ended], self.age[ended], size[ended] < tolerance)
         self.running &= ~ended
         # Those that ended must not spoil the arithmetic of others, nor those that strayed what the lane remembers.
-        step[..., ~self.running], self.carried[..., strayed] = 0.0, 0.0
+        step[..., ~self.running], self.state[..., strayed] = 0.0, 0.0
         return step, self.member[ended], solution
+
+    def _after(self, step: Single, lanes: np.ndarray) -> Array:
+        """Where a step leads to, of some lanes."""
+        some = np.flatnonzero(lanes)
+        after = kept(self.state, some)
+        if some.size:
+            part = take(self.part, some)
+            self._carry(part, after)
+            after += step[..., some]
+            self._carry(part, after, back=True)
+        return after
+
+    def _carry(self, part: Problem, state: Array, back: bool = False) -> None:
+        """States to the unknowns of chord steps or back, in place."""
+        carry(part, state, state, self.thin, self.shared.thick, back)
 
     def move(self, step: Single) -> None:
         """To the states that the step leads to, mixed."""
-        self.carried = self.memory.next_state(self.carried, step)
-        np.copyto(self.state, self.carried)
-        carry(self.part, self.state, self.state, self.thin, self.shared.thick, back=True)
+        self._carry(self.part, self.state)
+        self.memory.next_state(self.state, step)
+        self._carry(self.part, self.state, back=True)
 
     def enter(self, free: np.ndarray, entering: np.ndarray, start: Array) -> None:
         """Members begin in free lanes."""
         self.member[free], self.age[free], self.best[free], self.running[free] = entering, 0, np.inf, True
         self.part = take(self.problem, self.member)
         self.state[..., free] = start
-        self.thin |= thin_places(take(self.problem, entering), start, self.shared.thick)
         # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
-        self.carried = _carried(self.part, self.state, self.thin, self.shared)
+        self.thin |= thin_places(take(self.problem, entering), start, self.shared.thick)
         self.memory.forget(free)
 
     def narrow(self) -> None:
@@ -94,23 +104,19 @@ class _Lanes:
         keep = np.flatnonzero(self.running)
         self.member, self.age = self.member[keep], self.age[keep]
         self.best, self.running = self.best[keep], self.running[keep]
-        self.state, self.carried = kept(self.state, keep), kept(self.carried, keep)
-        self.part, self.after = take(self.problem, self.member), np.empty_like(self.state)
+        self.state, self.part = kept(self.state, keep), take(self.problem, self.member)
         self.memory.keep(keep)
 
 
 def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors) -> _Lanes:
     part, count = take(problem, members), members.size
-    thin = thin_places(part, start, shared.thick)
     return _Lanes(
         problem=problem,
         shared=shared,
         member=members.copy(),
         part=part,
         state=np.array(start, order="C"),
-        thin=thin,
-        carried=_carried(part, start, thin, shared),
-        after=np.empty(start.shape),
+        thin=thin_places(part, start, shared.thick),
         memory=Memory(start.shape),
         age=np.zeros(count, dtype=np.int64),
         best=np.full(count, np.inf),
@@ -149,13 +155,6 @@ def stream(
             lanes.enter(free, entering, starts_of(entering))
         elif not waiting.size and 2 * lanes.running.sum() <= lanes.running.size:
             lanes.narrow()
-
-
-def _carried(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Array:
-    """The unknowns of chord steps for a state."""
-    carried = state.copy()
-    carry(part, carried, state, thin, shared.thick)
-    return carried
 
 
 def _step(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Single:

@@ -138,6 +138,13 @@ def thin_places(state, bed, lift, reach, film, thick):
 
 
 @compiled
+def _rho(h: float, centre: float, per_thin: float) -> float:
+    """h / h_c of a thin face, one of a deep one."""
+    share = min(min(h, centre) * per_thin, 1.0)
+    return 1.0 + (1.0 - share * share) * (h / centre - 1.0)
+
+
+@compiled
 def stretch(values, state, faces, bed, lift, reach, film, thick, back):
     """Entries of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx, 3,
     ny, m).
@@ -152,8 +159,7 @@ def stretch(values, state, faces, bed, lift, reach, film, thick, back):
                 wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
                 for k in range(m):
                     h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
-                    share = min(min(h, centre) / (THIN * film), 1.0)
-                    rho = 1.0 + (1.0 - share * share) * (h / centre - 1.0)
+                    rho = _rho(h, centre, 1.0 / (THIN * film))
                     values[i, e, j, k] *= 1.0 / rho if back else rho
 
 
@@ -172,26 +178,32 @@ def tilt(step, answer):
 
 
 @compiled
-def correction(after, before, thin, bed, lift, reach, film):
-    """Largest change of each member (m,) [m, m/s], NaN if any is; in thin places in proportion to the depth there, that
-    of its face for a velocity.
+def correction(step, state, thin, bed, lift, reach, film, thick):
+    """Largest change of each member (m,) [m, m/s] by a step in the unknowns of chord steps, NaN if any is.
+
+    In thin places in proportion to the depth there, that of its face for a velocity.
     """
-    nx, _, ny, m = after.shape
+    nx, _, ny, m = state.shape
     largest, total, per_thin = np.zeros(m), np.zeros(m), 1.0 / (THIN * film)
     for i in range(nx):
         for e in range(3):
             for j in range(ny):
                 if not thin[i, e, j]:
                     for k in range(m):
-                        change = abs(after[i, e, j, k] - before[i, e, j, k])
+                        change = abs(step[i, e, j, k])
                         largest[k] = max(largest[k], change)
                         total[k] += change
                     continue
                 a, b = _beyond(i, e, j)
-                wide = 0.5 * (reach[i, j] + reach[a, b])
+                wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
                 for k in range(m):
-                    h = wet_depth(_above(before, bed, lift, i, j, a, b, k), wide, film)
-                    change = abs(after[i, e, j, k] - before[i, e, j, k]) * min(h * per_thin, 1.0)
+                    above = _above(state, bed, lift, i, j, a, b, k)
+                    h, change = wet_depth(above, wide, film), step[i, e, j, k]
+                    if e > 0:
+                        risen = wet_depth(above + 0.5 * (step[i, 0, j, k] + step[a, 0, b, k]), wide, film)
+                        carried = _rho(h, centre, per_thin) * state[i, e, j, k] + change
+                        change = carried / _rho(risen, centre, per_thin) - state[i, e, j, k]
+                    change = abs(change) * min(h * per_thin, 1.0)
                     largest[k] = max(largest[k], change)
                     total[k] += change
     return largest + 0.0 * total

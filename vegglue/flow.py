@@ -347,9 +347,12 @@ def carry(
     easing.stretch(values, state, thin, problem.bed, problem.lift, problem.reach, problem.film, thick, back)
 
 
-def correction(problem: Problem, after: Array, before: Array, thin: NDArray[np.bool_]) -> Array:
-    """Largest change from one state to another [m, m/s] (m,), in thin water in proportion to its depth."""
-    return np.asarray(easing.correction(after, before, thin, problem.bed, problem.lift, problem.reach, problem.film))
+def correction(
+    problem: Problem, step: NDArray[np.float32], state: Array, thin: NDArray[np.bool_], thick: Array
+) -> Array:
+    """Largest change of each member (m,) [m, m/s] by a step of what is carried, in proportion to depth where thin."""
+    bed, lift, reach, film = problem.bed, problem.lift, problem.reach, problem.film
+    return np.asarray(easing.correction(step, state, thin, bed, lift, reach, film, thick))
 
 
 def friction_slope(problem: Problem, state: Array) -> Array:
