@@ -17,7 +17,7 @@ from vegglue.nearness import Crowd, crowd, leaves, nearest, spread, squared
 from vegglue.start import blend
 
 # Neighbours that one factorisation serves, and how many are solved at once.
-SIZE, LANES = 64, 16
+SIZE, LANES = 64, 24
 # Who is not there after so many steps waits for a centre of its own.
 MOST = 30
 # How far tangents reach, in spots: on the way to four chunks Newton had to help twice with 0.3, once with 0.2, and not
@@ -44,7 +44,7 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
     """
     whole = problem_of(places)
     (nx, ny), m = whole.shape, len(places)
-    state = np.moveaxis(np.full((m, nx, 3, ny), np.nan), 0, -1)
+    state = np.moveaxis(np.empty((m, nx, 3, ny)), 0, -1)
     solved = Solved(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
     known = [] if begin is None else [begin]
     everyone = crowd(places, [one.slopes for one in known])
@@ -63,6 +63,7 @@ def solve_members(problem_of: ProblemOf, places: Array, tolerance: float, begin:
             if not pending.size:
                 break
             centre = _nearest_to_solved(everyone.spots, pending, _there(solved))
+    solved.state[..., solved.status == FAILED] = np.nan
     return solved
 
 
