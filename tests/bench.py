@@ -32,7 +32,7 @@ PHASES = {
     "eased": "residual of chord steps",
     "jacobian": "Jacobian, its residuals included",
     "factor": "factorisation",
-    "step": "back-substitution",
+    "solve": "back-substitution",
     "next_state": "Anderson mixing",
     "_starts": "starts from solved neighbours",
 }

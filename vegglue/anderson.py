@@ -1,6 +1,6 @@
 """Anderson's mixing of fixed-point steps f, lane by lane: x <- x + f - sum_d g_d s_d, with g the least squares of
 f - sum_d g_d t_d; t the change from one step to the next, s that change and the one of x. The least squares see one
-column in a few only, which lead to the same weights with a fraction of the memory to read.
+column in a few only, which lead to nearly the same weights with a fraction of the memory to read.
 
 Walker and Ni 2011, doi:10.1137/10078356X.
 """
@@ -42,13 +42,13 @@ class Memory:
     def next_state(self, state: Array, step: Single) -> None:
         """x <- x + f, less what the memory knows to overshoot, in place."""
         known = min(self.count, DEPTH)
-        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(step, *self.last)
+        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(known, step, *self.last)
         self.last = step, blocks.mix(state, step, self.sums[:known], weights)
         self.count += 1
 
-    def _weights(self, step: Single, last_step: Single, moved: Single) -> Array:
+    def _weights(self, known: int, step: Single, last_step: Single, moved: Single) -> Array:
         """g (slots, m) of what is known, its next slot filled."""
-        slot, known = (self.count - 1) % DEPTH, min(self.count, DEPTH)
+        slot = (self.count - 1) % DEPTH
         row, right = blocks.remember(self.turns[:known], self.sums, slot, moved, step, last_step)
         self.filled[slot] = self.count
         own = self.filled[:known, None] > self.since

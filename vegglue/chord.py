@@ -40,7 +40,7 @@ Deliver = Callable[[np.ndarray, Solution], None]
 class _Lanes:
     """Members side by side, each in its lane (m,) until it ends: who they are, the part of the problem that is theirs,
     their states (nx, 3, ny, m), where these were thin when any of them began, their steps, their least correction, and
-    which lanes are at work.
+    which lanes are at work. What grows thin later counts in full, which is stricter.
     """
 
     problem: Problem

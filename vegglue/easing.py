@@ -150,6 +150,7 @@ def stretch(values, state, faces, bed, lift, reach, film, thick, back):
     ny, m).
     """
     nx, _, ny, m = state.shape
+    per_thin = 1.0 / (THIN * film)
     for i in range(nx):
         for e in (1, 2):
             for j in range(ny):
@@ -159,7 +160,7 @@ def stretch(values, state, faces, bed, lift, reach, film, thick, back):
                 wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
                 for k in range(m):
                     h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
-                    rho = _rho(h, centre, 1.0 / (THIN * film))
+                    rho = _rho(h, centre, per_thin)
                     values[i, e, j, k] *= 1.0 / rho if back else rho
 
 

@@ -164,8 +164,8 @@ class Ground:
 
 @dataclass(frozen=True)
 class Cells:
-    """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k = g / (C^2 h)
-    [1/m], the part of it that is the bed's, and viscosity [m2/s]; gradients [1/s].
+    """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k [1/m], the
+    part of it that is the bed's, and viscosity [m2/s]; gradients [1/s].
     """
 
     ground: Ground

@@ -3,9 +3,9 @@
     dh/dt + d(hu)/dx + d(hv)/dy = 0
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
 
-with k = g / (C^2 h) [1/m] from the friction laws. A state of m members is one array (nx, 3, ny, m): level at cell
-centres, v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the east face of each
-cell.
+with k = g / (C^2 h) [1/m] from the friction laws where all of a cell is wet. A state of m members is one array (nx, 3,
+ny, m): level at cell centres, v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the
+east face of each cell.
 """
 
 from dataclasses import dataclass, field, replace
@@ -246,7 +246,7 @@ def faces(problem: Problem, state: Array) -> Faces:
 
 
 def bed_drag(problem: Problem, depth: Array) -> Array:
-    """k = g / (C^2 h) [1/m] of the class laws at cell centres; depth (nx, ny, m) [m]."""
+    """k [1/m] of the class laws at cell centres, see `roughness`; depth (nx, ny, m) [m]."""
     return roughness.class_drag(
         depth,
         problem.reach,
@@ -259,7 +259,7 @@ def bed_drag(problem: Problem, depth: Array) -> Array:
 
 
 def drag(problem: Problem, depth: Array, plants: tuple[Array, Array] | None = None) -> Array:
-    """Friction k = g / (C^2 h) [1/m] at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m].
+    """Friction k [1/m] of classes and plants at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m].
 
     plants: phi and canopy height (cell, m) when they are not those of the problem.
     """

@@ -13,9 +13,9 @@ LOG_SLOPE = 18.0 / math.log(10.0)
 
 @compiled
 def _wet_depths(out, depth, reach, dry):
-    """Mean depth [m] of the wet part of one cell for all members, f + h^(1/2) (h^4 + w^4)^(1/8), f of the film.
+    """Mean depth [m] of the wet part of one cell for all members, f + a^(1/2) (a^4 + w^4)^(1/8), a = h - f.
 
-    That is (h w)^(1/2) where the waterline crosses the cell, h where it is far from it, and smooth between.
+    f: depth of the film. Without it (a w)^(1/2) where the waterline crosses the cell, a far from it, smooth between.
     """
     reach_4 = reach**4
     for k in range(depth.size):
@@ -26,7 +26,7 @@ def _wet_depths(out, depth, reach, dry):
 
 @compiled
 def _chezys(out, wet, reach, law, coefficient, floor):
-    """C [m^1/2/s] of the wet part of one cell for all members, of mean depth h between h - w and h + w.
+    """C [m^1/2/s] of the wet part of one cell for all members, of mean depth h: between h - w and h + w, or 0 and 2 h.
 
     h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, floor))
     (Keulegan 1938), whose floor would stop Newton where all of a cell met it at once.
@@ -49,11 +49,12 @@ def _chezys(out, wet, reach, law, coefficient, floor):
 
 @compiled
 def class_drag(depth, reach, friction_class, law, coefficient, log_argument_minimum, film):
-    """k = g h^2 / (s K(h / s) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
+    """k = g h^2 / (s K(h_w) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
 
-    depth (nx, ny, m) is h, the mean of the cell; reach: half the range of its bed, w [m]. The slope of the surface
-    drives either part, as in the subgrid friction of Volp et al. 2013, doi:10.1002/wrcr.20324; but the wet part moves
-    as one, not each of its depths as if the water beside it did not matter (`test_verification_banks`).
+    depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; reach: half the range of the bed across the flow
+    in a cell, w [m]. The slope of the surface drives either part, as in the subgrid friction of Volp et al. 2013,
+    doi:10.1002/wrcr.20324; but the wet part is asked once, at its mean depth, and not each depth as if the water beside
+    it did not matter (`test_verification_banks`).
     """
     (nx, ny, m), dry = depth.shape, 0.1 * film
     drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))
