@@ -29,12 +29,12 @@ from vegglue.store import read_ensemble
 
 CONFIG = Path(__file__).parents[1] / "configs" / "d3a.yaml"
 PHASES = {
-    "eased": "residual of chord steps",
-    "jacobian": "Jacobian, its residuals included",
-    "factor": "factorisation",
-    "solve": "back-substitution",
-    "next_state": "Anderson mixing",
-    "_starts": "starts from solved neighbours",
+    "flow.eased": "residual of chord steps",
+    "jacobian.jacobian": "Jacobian, its residuals included",
+    "blocks.factor": "factorisation",
+    "blocks.solve": "back-substitution",
+    "anderson.next_state": "Anderson mixing",
+    "neighbourhood._starts": "starts from solved neighbours",
 }
 PAPER_STEPS = 6000
 SAMPLE = 128
@@ -89,7 +89,8 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
         f"{np.median(rows['iterations']):.0f} iterations a member, mass error {np.nanmax(rows['mass_error']):.0e}, "
         f"{int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed"
     )
-    calls = {key[2]: (value[1], value[3]) for key, value in pstats.Stats(profile).stats.items() if "vegglue" in key[0]}  # type: ignore[attr-defined]
+    found = pstats.Stats(profile).stats.items()  # type: ignore[attr-defined]
+    calls = {f"{Path(file).stem}.{name}": (value[1], value[3]) for (file, _, name), value in found}
     for name, words in PHASES.items():
         count, spent = calls[name]
         print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
