@@ -284,6 +284,14 @@ def test_the_hash_follows_contents_and_not_places():
     assert case_hash(one) != before
 
 
+def test_results_of_other_equations_do_not_fit(monkeypatch):
+    case = load_case(write(SMALL))
+    before = case_hash(case), simulation_hash(case)
+    monkeypatch.setattr("vegglue.config.EQUATIONS", 1)
+    assert case_hash(case) != before[0]
+    assert simulation_hash(case) != before[1]
+
+
 def test_an_ensemble_outlives_another_likelihood_but_not_another_prior():
     case = load_case(write(SMALL))
     other = load_case(changed("name: small", "name: small\ninfer: {likelihood: nse, behavioural: 0.5}"))

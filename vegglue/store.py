@@ -166,8 +166,8 @@ def _read(path: Path, expected_hash: str | None, step: str, understand: Callable
         found = str(file.attrs.get("config_hash", "none"))
         if expected_hash is not None and found != expected_hash:
             raise InputError(
-                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config or a data file "
-                f"changed since this was made; {remedy} again."
+                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config, a data file "
+                f"or vegglue changed since this was made; {remedy} again."
             )
         try:
             return understand(_read_groups(file), dict(file.attrs))
