@@ -96,7 +96,6 @@ def test_the_report_needs_no_network(finished: Finished) -> None:
     assert [place[:60] for place in places if not place.startswith(("#", "data:"))] == []
 
 
-@pytest.mark.filterwarnings("ignore:.*ArviZ is undergoing:FutureWarning")
 def test_the_snippet_of_the_readme_runs(
     finished: Finished, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,8 +14,6 @@ from vegglue.errors import InputError, StorageError
 from vegglue.posterior import LEVELS, CorrectedCanopy, Posterior
 from vegglue.store import read_posterior, stored_hash, write_posterior
 
-QUIET_ARVIZ = pytest.mark.filterwarnings("ignore:.*ArviZ is undergoing:FutureWarning")  # once a day, on import
-
 
 def a_posterior(canopy: bool) -> Posterior:
     """Two parameters, two stations of which one is used; every number differs from every other."""
@@ -86,7 +84,6 @@ def test_failed_write_leaves_the_older_posterior(tmp_path: Path, monkeypatch: py
     assert list(tmp_path.iterdir()) == [path]
 
 
-@QUIET_ARVIZ
 def test_xarray_opens_every_group_of_a_posterior(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     write_posterior(tmp_path / "posterior.h5", a_posterior(True), "", HASH)
@@ -100,7 +97,6 @@ def test_xarray_opens_every_group_of_a_posterior(tmp_path: Path) -> None:
             assert not any(variable.startswith("phony") for variable in data.sizes)
 
 
-@QUIET_ARVIZ
 def test_arviz_summarises_and_plots_a_posterior(tmp_path: Path) -> None:
     arviz, matplotlib = pytest.importorskip("arviz"), pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
