@@ -1,5 +1,7 @@
 """Score tests on problems whose answer is known: fingerprints and residuals made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -81,6 +83,36 @@ def test_the_true_effect_is_seldom_rejected(problem: tuple[np.ndarray, np.ndarra
         size += int((behind <= slack).sum())
     assert kept >= 182, "at least 91 % of 200"
     assert size / 200 < 4.0, "not by keeping everything"
+
+
+def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
+    """One of six effects, the last of three shapes, is there, 3 standard errors long: sets hold it as often as said."""
+    slopes, prints = problem
+    random, family, tries = np.random.default_rng(2), [np.array([j]) for j in range(5)] + [np.array([5, 6, 7])], 800
+    projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
+    one_sided = np.arange(PRINTS) % 2 == 0
+    said, held, sizes = 0.0, 0, []
+    for _ in range(tries):
+        true = int(random.integers(len(family)))
+        column = int(random.choice(family[true]))
+        sign = 1.0 if one_sided[column] else random.choice([-1.0, 1.0])
+        residual = sign * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
+        chance = score.chances(replace(projected, residual=residual), one_sided, family, 3.0)
+        kept = score.fewest(chance, 0.9)
+        said, held = said + chance[kept].sum(), held + (true in kept)
+        sizes.append(len(kept))
+    assert held == pytest.approx(said, abs=4.0 * np.sqrt(0.09 * tries))
+    assert said >= 0.9 * tries
+    assert np.mean(sizes) < 3.0, "six would hold everything and say nothing"
+
+
+def test_without_a_score_all_are_as_likely(problem: tuple[np.ndarray, np.ndarray]) -> None:
+    slopes, prints = problem
+    projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
+    family = [np.arange(3), np.arange(3, PRINTS)]
+    assert score.chances(projected, np.zeros(PRINTS, bool), family, 3.0) == pytest.approx([0.5, 0.5])
+    assert score.fewest(np.array([0.2, 0.5, 0.3]), 0.6) == [1, 2]
+    assert score.fewest(score.chances(projected, np.zeros(PRINTS, bool), [], 3.0), 0.9) == []
 
 
 def test_names_with_one_trace_form_a_group() -> None:

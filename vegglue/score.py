@@ -89,6 +89,26 @@ def rivals(projected: Projected, family: Sequence[np.ndarray], fitted: Array, se
     return found
 
 
+def chances(projected: Projected, one_sided: np.ndarray, family: Sequence[np.ndarray], length: float) -> Array:
+    """Chance of each family (k,) to be the one thing that is missing, its trace `length` standard errors long [-].
+
+        p_j ~ mean_i exp(length T_i - length^2 / 2), over its fingerprints i and the signs they may have
+
+    All families are as likely before (Bayes).
+    """
+    up = length * (projected.units.T @ projected.residual)
+    either = np.where(one_sided, up, np.logaddexp(up, -up) - np.log(2.0))
+    of_family = np.array([np.logaddexp.reduce(either[columns]) - np.log(len(columns)) for columns in family])
+    weight = np.exp(of_family - of_family.max(initial=-np.inf))
+    return np.asarray(weight / weight.sum())
+
+
+def fewest(chance: Array, level: float) -> list[int]:
+    """Places of the fewest entries that together hold a chance of `level`, the likeliest first."""
+    order = np.argsort(-chance)
+    return [int(j) for j in order[: np.searchsorted(np.cumsum(chance[order]), level) + 1]]
+
+
 def cosines(projected: Projected) -> Array:
     """Cosine between every two projected fingerprints (c, c) [-]."""
     return np.asarray(projected.units.T @ projected.units)

@@ -6,8 +6,12 @@ from vegglue import score
 from vegglue.diagnosis import Suspect
 from vegglue.suspicion import Look
 
-# What an effect scores at least, 19 times of 20, when its trace is three standard errors long.
-HIDING = 3.0 - 1.645
+# Length of a trace, in standard errors, that hides more often than not: the alarm is near a score of 3.2.
+HIDING = 3.0
+# Share of the chances that the effects listed as not excluded hold together.
+HELD = 0.9
+# Standard deviations of an effect's prior beyond which its size is not believed.
+BEYOND_BELIEF = 3.0
 # Amplitude seen in 19 of 20 tries at the 5 % level, over its standard error.
 SEEN = 3.5
 
@@ -45,18 +49,24 @@ def _suspect(seen: Look, candidate: int) -> Suspect:
 
 
 def hiding(seen: Look) -> tuple[tuple[str, ...], ...]:
-    """Groups of effects that may be there, three standard errors long, although none stands out, the best first.
+    """Groups of effects among which one that hides is in nine of ten cases, the likeliest first.
 
-    Their scores leave that open, and are not so far below the best one's that it must be another.
+    One is taken to be there, as long as hides more often than not, and at a size that may be believed.
     """
-    gains = seen.scores / np.maximum(seen.projected.length, 1e-300)
-    slack = score.rivals(seen.projected, seen.traces.columns, gains, seed=3)
-    best = {j: seen.best_score(j) for j in seen.order}
-    most = max((value**2 for value in best.values()), default=0.0)
-    kept = [j for j in seen.order if abs(best[j]) > HIDING and most - best[j] ** 2 <= slack[j]]
+    believed = [j for j in range(len(seen.traces.candidates)) if _believed(seen, seen.traces.columns[j])]
+    family = [seen.traces.columns[j] for j in believed]
+    chance = score.chances(seen.projected, seen.traces.one_sided, family, HIDING)
+    kept = [believed[j] for j in score.fewest(chance, HELD)]
     columns = [seen.best_column(j) for j in kept]
     cosine = score.cosines(seen.projected)[np.ix_(columns, columns)]
     return tuple(tuple(group) for group in score.groups([seen.traces.candidates[j].name for j in kept], cosine))
+
+
+def _believed(seen: Look, columns: np.ndarray) -> bool:
+    """Whether a trace of HIDING standard errors takes no size beyond belief."""
+    longest = columns[np.argmax(seen.projected.length[columns])]
+    amplitude, length = seen.traces.amplitudes[longest], max(float(seen.projected.length[longest]), 1e-300)
+    return amplitude.size(HIDING / length) < BEYOND_BELIEF * amplitude.scale
 
 
 def _mimic(seen: Look, column: int) -> tuple[str, float]:

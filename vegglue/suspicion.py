@@ -103,10 +103,9 @@ def look(base: Baseline, flagged: tuple[int, ...] = (), before: Look | None = No
     def against(values: Array) -> score.Projected:
         return score.project(noise.whiten(slope), noise.whiten(left), z, noise.whiten(values))
 
-    one_sided = np.array([amplitude.low >= amplitude.off for amplitude in traces.amplitudes], bool)
     projected, of_spots, of_stations = against(prints), against(spots), against(np.eye(left.size))
     errors = drawn(noise, score.DRAWS, np.random.default_rng((seed, 1)))
-    maxima, scores = _maxima(projected, one_sided, errors, seed), score.scores(projected, one_sided)
+    maxima, scores = _maxima(projected, traces.one_sided, errors, seed), score.scores(projected, traces.one_sided)
     return Look(
         base=replace(base, noise=noise),
         flagged=flagged,

@@ -28,6 +28,11 @@ class Traces:
     prints: Array
     spots: Spots
 
+    @property
+    def one_sided(self) -> np.ndarray:
+        """Which columns (c,) are of effects that can only grow from off."""
+        return np.array([amplitude.low >= amplitude.off for amplitude in self.amplitudes], bool)
+
 
 def traces_of(base: Baseline) -> Traces:
     """Those of the quick model: they only have to point the right way. Spots are sized by the model itself."""

@@ -137,7 +137,10 @@ def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int]) 
 def _open(groups: Sequence[Sequence[str]]) -> list[str]:
     names = [name for group in groups for name in group]
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    said = f"Not excluded, should something of three standard errors be there: {', '.join(names[:SHOWN])}{more}."
+    said = (
+        "Not excluded: should one effect of three standard errors be there, nine times of ten it is one of these, the "
+        f"likeliest first: {', '.join(names[:SHOWN])}{more}."
+    )
     return [said] if names else []
 
 
