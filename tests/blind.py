@@ -1,8 +1,8 @@
 """The study behind docs/blind.md: many small twins, something hidden in each, all diagnosed. `make blind`.
 
-    python tests/blind.py [--jobs N] [--share S] [--only KIND ...] [--config FILE] [--runs FOLDER]
+    python tests/blind.py [--jobs N] [--share S] [--only KIND ...] [--case NAME ...] [--runs FOLDER]
 
-One line of JSON for each data set in runs/blind/trials.jsonl. What stands there is not done again, so that the study
+One line of JSON for each data set in runs/blind/<case>.jsonl. What stands there is not done again, so that the study
 may be stopped and go on, or grow by a larger --share of its data sets. Parameters are true at one of PLACES places of
 the prior; the errors are new in each data set. Calibration starts at the true parameters, where an `infer` would have
 led: a search from nowhere, which takes half of the time, is left to `tests/test_open_cases.py`.
@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from blind_bound import at_best
 from blind_page import write_page
 
 from vegglue.baseline import Baseline, baseline
@@ -39,7 +40,9 @@ from vegglue.schema import Case
 from vegglue.twin import Answer, Ground, candidate_of, ground_at, hiding, measured, true_place
 
 ROOT = Path(__file__).parents[1]
-CONFIG, RUNS = ROOT / "configs" / "twin.yaml", ROOT / "runs" / "blind"
+CONFIGS, RUNS = ROOT / "configs", ROOT / "runs" / "blind"
+# Cases that are studied, and the share of all data sets that is made in each.
+CASES = {"twin": 1.0, "campaign": 0.1}
 PLACES = 16
 UNLISTED = tuple(f"unlisted:{name}" for name in ("pier", "jet", "sink", "fallen_tree", "scour_hole"))
 # Pairs that leave different traces, so that both could be found.
@@ -55,6 +58,8 @@ SIZES = {
 NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.
 OF_THE_GRID = ("smagorinsky",)
+# Places at which it is asked how small sets could be at all.
+BOUND_PLACES = (0, 5, 10)
 # Every so many data sets, held-out errors are taken before and after, and the measurement that `next` proposes is made.
 LOOKED_INTO = 4
 
@@ -210,17 +215,25 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=-1)
     parser.add_argument("--share", type=float, default=1.0, help="share of all data sets, 0 to 1")
     parser.add_argument("--only", nargs="*", choices=list(SIZES), default=list(SIZES), help="kinds of data sets")
-    parser.add_argument("--config", type=Path, default=CONFIG)
+    parser.add_argument("--case", nargs="*", choices=list(CASES), default=list(CASES))
     parser.add_argument("--runs", type=Path, default=RUNS)
     given = parser.parse_args()
-    records = run(given.config, given.runs, given.jobs, given.share, given.only)
-    write_page(records, ROOT / "docs")
+    for case in given.case:
+        run(case, given.runs, given.jobs, given.share * CASES[case], given.only)
+    grounds = [ground_of_study(config_of("twin"), place) for place in BOUND_PLACES]
+    bounds = {level: at_best(grounds, 3.0, level) for level in (0.95, 0.9)}
+    write_page({case: list(records_in(given.runs / f"{case}.jsonl")) for case in CASES}, bounds, ROOT / "docs")
 
 
-def run(config: Path, folder: Path, jobs: int, share: float, only: list[str]) -> list[dict[str, Any]]:
-    """Do what is not yet done of the first part of each kind, and return all there is."""
+def config_of(case: str) -> Path:
+    return CONFIGS / f"{case}.yaml"
+
+
+def run(case: str, folder: Path, jobs: int, share: float, only: list[str]) -> None:
+    """Do what is not yet done of the first part of each kind."""
     folder.mkdir(parents=True, exist_ok=True)
-    path, model = folder / "trials.jsonl", model_of_study(config)
+    path, config = folder / f"{case}.jsonl", config_of(case)
+    model = model_of_study(config)
     names = [one.name for one in candidates_of(model.case, model.station) if one.name not in OF_THE_GRID]
     trials = [one for one in planned_trials(names) if one.number < share * SIZES[one.group] and one.group in only]
     done = {record["key"] for record in records_in(path)}
@@ -230,7 +243,6 @@ def run(config: Path, folder: Path, jobs: int, share: float, only: list[str]) ->
             file.write(json.dumps(record) + "\n")
             file.flush()
             print(f"{count} of {len(todo)}: {record['key']} {record.get('verdict', 'left out')}", flush=True)
-    return list(records_in(path))
 
 
 def records_in(path: Path) -> Iterator[dict[str, Any]]:

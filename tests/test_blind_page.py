@@ -4,7 +4,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blind_page import caught, counts, covered, interval, pair_printed, set_size, told_apart, write_page, wrongly_named
+from blind_page import (
+    caught,
+    counts,
+    covered,
+    interval,
+    pair_printed,
+    set_size,
+    told_apart,
+    told_apart_from_nothing,
+    write_page,
+    wrongly_named,
+)
 from scipy import stats
 
 
@@ -38,7 +49,9 @@ def test_what_counts_as_what() -> None:
     assert counts(everything, ["snr3"], caught) == (0, 0)
     hiding = SILENT | {"not_excluded": [["sun"], ["eddies"]]}
     assert counts([*everything, hiding], ["snr6"], covered) == (3, 5), "not excluded where nothing stands out"
-    assert counts([hiding], ["snr6"], told_apart) == (1, 1)
+    two_or_three = [hiding, hiding | {"not_excluded": [["sun"], ["moon"], ["eddies"]]}]
+    assert counts(two_or_three, ["snr6"], told_apart) == (2, 2)
+    assert counts(two_or_three, ["snr6"], told_apart_from_nothing) == (1, 2)
     assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
 
 
@@ -59,10 +72,13 @@ def test_an_interval_of_a_share() -> None:
 
 
 def test_the_page(tmp_path: Path) -> None:
-    write_page([NAMED, WRONG, MANY, SILENT, LEFT_OUT], tmp_path)
+    studies = {"twin": [NAMED, WRONG, MANY, SILENT, LEFT_OUT], "campaign": [NAMED]}
+    write_page(studies, {0.95: (0.96, 0.381), 0.9: (0.93, 0.532)}, tmp_path)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert "Measured on 4 small twins" in page
     assert "| Hidden effect in the 95 % set, ratio 6 | 2 | 4 | 50.0% |" in page
+    assert "| Hidden effect in the 95 % set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
+    assert "three groups in 38% of such data" in page
     assert "`sun`" in page
     for name in ("sets", "alarms"):
         assert f"blind-{name}.svg" in page
