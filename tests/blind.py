@@ -53,8 +53,9 @@ TWO = (
 # Data sets of each kind at share 1; of those with an effect, up to a third cannot be made visible and are left out.
 SIZES = {
     "null-white": 200, "null-ar1": 200, "null-understated": 60, "snr3": 300, "snr6": 300, "unlisted": 60, "two": 30,
-    "probe": 30,
+    "probe": 30, "snr2": 50, "snr4": 50, "snr5": 50,
 }  # fmt: skip
+RATIO, USUAL_RATIO = "snr", 6.0
 NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.
 OF_THE_GRID = ("smagorinsky",)
@@ -81,11 +82,15 @@ class Trial:
 def planned_trials(names: list[str]) -> list[Trial]:
     """All data sets, mixed so that a study that is stopped has some of each kind."""
     found = [
-        Trial(group, number, _hidden(group, number, names), 3.0 if group == "snr3" else 6.0)
+        Trial(group, number, _hidden(group, number, names), _signal(group))
         for group, size in SIZES.items()
         for number in range(size)
     ]
     return sorted(found, key=lambda trial: (trial.number + 0.5) / SIZES[trial.group])
+
+
+def _signal(group: str) -> float:
+    return float(group.removeprefix(RATIO)) if group.startswith(RATIO) else USUAL_RATIO
 
 
 def _hidden(group: str, number: int, names: list[str]) -> tuple[str, ...]:
@@ -125,7 +130,7 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     found = diagnose(model, ground.here.z, jobs=1)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
     if found.steps and trial.number % LOOKED_INTO == 0:
-        record["gain"] = held_out_gain(model, found)
+        record |= held_out(model, found)
         if answer.hidden and len(found.steps[0].groups) > 1:
             record["next"] = measured_again(ground, model, answer, found, seed)
     return record
@@ -170,11 +175,16 @@ def with_accepted(model: Model, found: Diagnosis) -> Model:
     return replace(model, case=case)
 
 
-def held_out_gain(model: Model, found: Diagnosis) -> float:
-    """By how much the squared error of held-out sections falls with what was accepted [(m/s)^2]."""
+def held_out(model: Model, found: Diagnosis) -> dict[str, Any]:
+    """Errors of held-out sections without and with what was accepted [m/s], and by how much their squares fall."""
     before = rung(calibrated(model, found.first_parameters))
     after = rung(calibrated(with_accepted(model, found), {name: three[0] for name, three in found.parameters.items()}))
-    return improvement(before, after)[0]
+    errors = [one.sections[after.velocity] for one in (before, after)]
+    known = np.isfinite(errors[0]) & np.isfinite(errors[1])
+    return {
+        "gain": improvement(before, after)[0],
+        "held_out": [float(np.sqrt(np.mean(error[known] ** 2))) for error in errors],
+    }
 
 
 def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosis, seed: int) -> dict[str, Any] | None:
