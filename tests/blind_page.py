@@ -5,20 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.stats
-from matplotlib.figure import Figure
+from blind_figures import draw_confusion, draw_gains, draw_over_ratio, draw_shares, draw_sizes, interval
+
+from vegglue.figure_style import save
 
 Record = dict[str, Any]
 Studies = dict[str, list[Record]]  # by case
-
-
-def interval(successes: int, trials: int) -> tuple[float, float]:
-    """95 % interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404)."""
-    if trials == 0:
-        return 0.0, 1.0
-    low = scipy.stats.beta.ppf(0.025, successes, trials - successes + 1) if successes else 0.0
-    high = scipy.stats.beta.ppf(0.975, successes + 1, trials - successes) if successes < trials else 1.0
-    return float(low), float(high)
 
 
 def alarmed(record: Record) -> bool:
@@ -109,6 +101,17 @@ LINES: tuple[tuple[str, tuple[str, ...], Callable[[Record], bool | None], str], 
 )  # fmt: skip
 
 
+OVER_RATIO = (
+    ("in the 95 % set", covered), ("stands out", caught), ("in a set of at most three groups", told_apart),
+)  # fmt: skip
+
+
+def ratios_of(records: Sequence[Record]) -> list[tuple[str, float]]:
+    """Groups of one listed effect each and their ratios, the smallest first."""
+    found = {record["group"]: record["signal"] for record in records if record["group"].startswith("snr")}
+    return sorted(found.items(), key=lambda pair: pair[1])
+
+
 def counts(records: Sequence[Record], groups: Sequence[str], met: Callable[[Record], bool | None]) -> tuple[int, int]:
     answers = [met(record) for record in records if record["group"] in groups and "left_out" not in record]
     known = [answer for answer in answers if answer is not None]
@@ -135,9 +138,18 @@ def write_page(studies: Studies, bounds: dict[float, tuple[float, float]], folde
     )  # fmt: skip
     folder.mkdir(exist_ok=True)
     (folder / "blind.md").write_text(text, encoding="utf-8")
-    for name, draw in (("sets", _draw_sets), ("alarms", _draw_alarms)):
-        figure = draw(twin)
-        figure.savefig(folder / f"blind-{name}.svg", metadata={"Date": None})
+    shares = [(label, *counts(twin, groups, met)) for label, groups, met, _ in LINES]
+    by_ratio = {
+        label: [(ratio, *counts(twin, [group], met)) for group, ratio in ratios_of(twin)] for label, met in OVER_RATIO
+    }
+    for name, figure in (
+        ("alarms", draw_shares(shares)),
+        ("ratio", draw_over_ratio(by_ratio)),
+        ("sizes", draw_sizes(twin, set_size)),
+        ("sets", draw_confusion(twin)),
+        ("gains", draw_gains(twin)),
+    ):
+        save(figure, folder / f"blind-{name}.svg")
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -153,43 +165,6 @@ def _table(records: Sequence[Record]) -> str:
 
 def _seconds(records: Sequence[Record]) -> str:
     return f"{np.median([record['seconds'] for record in records]):.0f}" if records else "-"
-
-
-def _draw_sets(records: Sequence[Record]) -> Figure:
-    """Hidden effects against what was in the set: rows the hidden ones, columns the accepted ones, ratio 6."""
-    pairs = [
-        (record["hidden"][0]["name"], record["steps"][0]["accepted"] if record["steps"] else "(nothing)")
-        for record in records
-        if record["group"] == "snr6"
-    ]
-    hidden, said = sorted({a for a, _ in pairs}), sorted({b for _, b in pairs})
-    table = np.zeros((len(hidden), max(len(said), 1)))
-    for a, b in pairs:
-        table[hidden.index(a), said.index(b)] += 1
-    figure = Figure(figsize=(9, 9), layout="constrained")
-    axes = figure.subplots()
-    axes.imshow(table / np.maximum(table.sum(axis=1, keepdims=True), 1), cmap="Blues", vmin=0, vmax=1)
-    axes.set_xticks(range(len(said)), said, rotation=90, fontsize=6)
-    axes.set_yticks(range(len(hidden)), hidden, fontsize=6)
-    axes.set_xlabel("accepted first")
-    axes.set_ylabel("hidden, ratio 6")
-    return figure
-
-
-def _draw_alarms(records: Sequence[Record]) -> Figure:
-    """Shares with their intervals: alarms without anything hidden, finds by the ratio."""
-    counted = [(label, *counts(records, groups, met)) for label, groups, met, _ in LINES]
-    shown = [(label, good, size) for label, good, size in counted if size]
-    figure = Figure(figsize=(8, 0.8 + 0.24 * len(shown)), layout="constrained")
-    axes = figure.subplots()
-    for row, (_, good, size) in enumerate(shown):
-        axes.plot(interval(good, size), [-row, -row], color="#1c5d99")
-        axes.plot([good / size], [-row], "o", color="#1c5d99", markersize=4)
-    axes.set_yticks([-row for row in range(len(shown))], [f"{label} ({size})" for label, _, size in shown], fontsize=8)
-    axes.set_xlim(0, 1)
-    axes.grid(axis="x", linewidth=0.4)
-    axes.set_xlabel("share of data sets (their number), 95 % interval")
-    return figure
 
 
 PAGE = """# How often the diagnosis is right
@@ -218,6 +193,12 @@ in 90 % ({inside90}). Simulated on the traces of this twin (`tests/blind_bound.p
 anything is there: with a chance of 5 % of a false alarm over all effects, its threshold is a score of about 3.2.
 
 ![Shares and their intervals](blind-alarms.svg)
+
+![What a larger effect changes](blind-ratio.svg)
+
+![How large sets are](blind-sizes.svg)
+
+![Errors of held-out sections, before and after](blind-gains.svg)
 
 ![Which effect was accepted first for each hidden one](blind-sets.svg)
 

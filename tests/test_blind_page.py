@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from blind_figures import interval
 from blind_page import (
     caught,
     counts,
     covered,
-    interval,
     pair_printed,
     set_size,
     told_apart,
@@ -30,7 +30,7 @@ def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, 
     return {
         "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
         "verdict": verdict, "steps": steps, "set": list(rivals), "not_excluded": [], "alike": {}, "seconds": 3.0,
-        "gain": 1e-4 if rivals else None,
+        "gain": 1e-4 if rivals else None, "signal": 6.0, "held_out": [0.02, 0.01],
     } | changes  # fmt: skip
 
 
@@ -80,6 +80,6 @@ def test_the_page(tmp_path: Path) -> None:
     assert "| Hidden effect in the 95 % set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
     assert "three groups in 38% of such data" in page
     assert "`sun`" in page
-    for name in ("sets", "alarms"):
+    for name in ("alarms", "ratio", "sizes", "gains", "sets"):
         assert f"blind-{name}.svg" in page
         assert (tmp_path / f"blind-{name}.svg").stat().st_size > 1000
