@@ -10,12 +10,10 @@ from vegglue import score
 from vegglue.baseline import baseline
 from vegglue.effect import Array
 from vegglue.suspicion import Look, look
-from vegglue.twin import Ground, measured
+from vegglue.twin import LARGEST, Ground, measured
 
 # Data sets for each effect and ground, and groups that a set holds at most to count as small.
 DRAWS, SMALL = 60, 3
-# Standard deviations of its prior that a hidden effect may take.
-HIDDEN_AT_MOST = 4.0
 
 
 def at_best(grounds: list[Ground], signal: float, level: float) -> tuple[float, float]:
@@ -34,7 +32,7 @@ def _silent(ground: Ground) -> Look:
 def _sets(seen: Look, signal: float, level: float, random: np.random.Generator) -> Array:
     """Whether the truth is in the set, and its groups, (data sets, 2); each effect that may be as long is hidden."""
     units, one_sided = seen.projected.units, seen.traces.one_sided
-    family = [columns for columns in seen.traces.columns if _may_be(seen, columns, signal)]
+    family = [seen.traces.columns[j] for j in np.flatnonzero(seen.stretch(signal) < LARGEST)]
     found = []
     for true, columns in enumerate(family):
         for _ in range(DRAWS):
@@ -45,12 +43,6 @@ def _sets(seen: Look, signal: float, level: float, random: np.random.Generator) 
             kept = score.fewest(score.chances(drawn, one_sided, family, signal), level)
             found.append((true in kept, _groups(drawn, [family[j] for j in kept])))
     return np.array(found, dtype=float)
-
-
-def _may_be(seen: Look, columns: np.ndarray, signal: float) -> bool:
-    longest = columns[np.argmax(seen.projected.length[columns])]
-    amplitude, length = seen.traces.amplitudes[longest], max(float(seen.projected.length[longest]), 1e-300)
-    return amplitude.size(signal / length) < HIDDEN_AT_MOST * amplitude.scale
 
 
 def _groups(drawn: score.Projected, kept: list[np.ndarray]) -> int:

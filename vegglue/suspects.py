@@ -53,20 +53,13 @@ def hiding(seen: Look) -> tuple[tuple[str, ...], ...]:
 
     One is taken to be there, as long as hides more often than not, and at a size that may be believed.
     """
-    believed = [j for j in range(len(seen.traces.candidates)) if _believed(seen, seen.traces.columns[j])]
+    believed = np.flatnonzero(seen.stretch(HIDING) < BEYOND_BELIEF)
     family = [seen.traces.columns[j] for j in believed]
     chance = score.chances(seen.projected, seen.traces.one_sided, family, HIDING)
-    kept = [believed[j] for j in score.fewest(chance, HELD)]
+    kept = [int(believed[j]) for j in score.fewest(chance, HELD)]
     columns = [seen.best_column(j) for j in kept]
     cosine = score.cosines(seen.projected)[np.ix_(columns, columns)]
     return tuple(tuple(group) for group in score.groups([seen.traces.candidates[j].name for j in kept], cosine))
-
-
-def _believed(seen: Look, columns: np.ndarray) -> bool:
-    """Whether a trace of HIDING standard errors takes no size beyond belief."""
-    longest = columns[np.argmax(seen.projected.length[columns])]
-    amplitude, length = seen.traces.amplitudes[longest], max(float(seen.projected.length[longest]), 1e-300)
-    return amplitude.size(HIDING / length) < BEYOND_BELIEF * amplitude.scale
 
 
 def _mimic(seen: Look, column: int) -> tuple[str, float]:

@@ -81,6 +81,14 @@ class Look:
     def family_p(self, candidate: int) -> float:
         return score.family_p(self.best_score(candidate), self.maxima)
 
+    def stretch(self, length: float) -> Array:
+        """Size (c,) at which the trace of each candidate is `length` standard errors long, in standard deviations of
+        its prior [-], by the shape that shows most.
+        """
+        longest = [int(columns[np.argmax(self.projected.length[columns])]) for columns in self.traces.columns]
+        pairs = [(self.traces.amplitudes[j], max(float(self.projected.length[j]), 1e-300)) for j in longest]
+        return np.array([amplitude.size(length / seen) / amplitude.scale for amplitude, seen in pairs])
+
     @property
     def order(self) -> list[int]:
         """Candidates, the best score first."""
