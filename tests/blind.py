@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from blind_bound import at_best
+from blind_bound import informed, silent
 from blind_page import write_page
 
-from vegglue.baseline import Baseline, baseline
+from vegglue.aside import aside_of, without
+from vegglue.baseline import Baseline, baseline, for_prediction
 from vegglue.candidates import candidates_of, with_effect
 from vegglue.config import load_case
 from vegglue.cores import as_finished
@@ -37,7 +38,7 @@ from vegglue.linearise import Model, linearise, z_at
 from vegglue.loop import model_in, rivals_of
 from vegglue.reveal import marks
 from vegglue.schema import Case
-from vegglue.twin import Answer, Ground, candidate_of, ground_at, hiding, measured, true_place
+from vegglue.twin import Answer, Ground, VisibilityError, candidate_of, ground_at, hiding, measured, true_place
 
 ROOT = Path(__file__).parents[1]
 CONFIGS, RUNS = ROOT / "configs", ROOT / "runs" / "blind"
@@ -59,8 +60,8 @@ RATIO, USUAL_RATIO = "snr", 6.0
 NOISE = {"null-ar1": "ar1:0.5", "null-understated": "understated:1.5"}
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.
 OF_THE_GRID = ("smagorinsky",)
-# Places at which it is asked how small sets could be at all.
-BOUND_PLACES = (0, 5, 10)
+# Places for which it is computed what well-calibrated sets come to.
+INFORMED_PLACES = (0, 5, 10)
 # Every so many data sets, held-out errors are taken before and after, and the measurement that `next` proposes is made.
 LOOKED_INTO = 4
 
@@ -124,8 +125,8 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     began = time.process_time()
     try:
         station, answer = measured(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
-    except InputError as error:  # an effect that these data would not show at any plausible size
-        return record | {"left_out": str(error)}
+    except InputError as error:
+        return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)
     found = diagnose(model, ground.here.z, jobs=1)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
@@ -157,13 +158,16 @@ def _said(answer: Answer, found: Diagnosis) -> dict[str, Any]:
         "verdict": found.verdict, "set": found.set, "not_excluded": found.not_excluded,
         "steps": [asdict(step) for step in found.steps],
         "where": None if found.where is None else asdict(found.where), "flagged": len(found.flagged),
-        "correlation": found.correlation, "scale": found.scale, "p_misfit": found.p_misfit, "alike": alike,
+        "correlation": found.correlation, "scale": found.scale, "p_misfit": found.p_misfit,
+        "threshold": found.threshold, "alike": alike,
         "scores": {one.name: one.score for one in found.suspects[:8]},
     }  # fmt: skip
 
 
-def calibrated(model: Model, theta: dict[str, float]) -> Baseline:
-    return baseline(model, z_at(model.case, {name: np.array([theta[name]]) for name in model.names})[0])
+def calibrated(model: Model, found: Diagnosis, theta: dict[str, float]) -> Baseline:
+    """As `compare` and `next` do: without what the diagnosis set aside, to predict on its own grid."""
+    known = z_at(model.case, {name: np.array([theta[name]]) for name in model.names})[0]
+    return for_prediction(baseline(without(model, aside_of(found)), known))
 
 
 def with_accepted(model: Model, found: Diagnosis) -> Model:
@@ -177,8 +181,9 @@ def with_accepted(model: Model, found: Diagnosis) -> Model:
 
 def held_out(model: Model, found: Diagnosis) -> dict[str, Any]:
     """Errors of held-out sections without and with what was accepted [m/s], and by how much their squares fall."""
-    before = rung(calibrated(model, found.first_parameters))
-    after = rung(calibrated(with_accepted(model, found), {name: three[0] for name, three in found.parameters.items()}))
+    theta = {name: three[0] for name, three in found.parameters.items()}
+    before = rung(calibrated(model, found, found.first_parameters))
+    after = rung(calibrated(with_accepted(model, found), found, theta))
     errors = [one.sections[after.velocity] for one in (before, after)]
     known = np.isfinite(errors[0]) & np.isfinite(errors[1])
     return {
@@ -189,7 +194,7 @@ def held_out(model: Model, found: Diagnosis) -> dict[str, Any]:
 
 def measured_again(ground: Ground, model: Model, answer: Answer, found: Diagnosis, seed: int) -> dict[str, Any] | None:
     """The best next measurement, made and added: groups of the first step before and after; None if none is of use."""
-    base = calibrated(model, found.first_parameters)
+    base = calibrated(model, found, found.first_parameters)
     rivals = rivals_of(model.case, found, found.steps[0].rivals)
     best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
@@ -230,8 +235,8 @@ def main() -> None:
     given = parser.parse_args()
     for case in given.case:
         run(case, given.runs, given.jobs, given.share * CASES[case], given.only)
-    grounds = [ground_of_study(config_of("twin"), place) for place in BOUND_PLACES]
-    bounds = {level: at_best(grounds, 3.0, level) for level in (0.95, 0.9)}
+    looks = [silent(ground_of_study(config_of("twin"), place)) for place in INFORMED_PLACES]
+    bounds = {level: informed(looks, 3.0, level) for level in (0.95, 0.9)}
     write_page({case: list(records_in(given.runs / f"{case}.jsonl")) for case in CASES}, bounds, ROOT / "docs")
 
 

@@ -9,10 +9,11 @@ from blind_page import (
     caught,
     counts,
     covered,
+    one_too_many,
     pair_printed,
+    rightly_told_apart,
     set_size,
     told_apart,
-    told_apart_from_nothing,
     write_page,
     wrongly_named,
 )
@@ -49,9 +50,12 @@ def test_what_counts_as_what() -> None:
     assert counts(everything, ["snr3"], caught) == (0, 0)
     hiding = SILENT | {"not_excluded": [["sun"], ["eddies"]]}
     assert counts([*everything, hiding], ["snr6"], covered) == (3, 5), "not excluded where nothing stands out"
-    two_or_three = [hiding, hiding | {"not_excluded": [["sun"], ["moon"], ["eddies"]]}]
-    assert counts(two_or_three, ["snr6"], told_apart) == (2, 2)
-    assert counts(two_or_three, ["snr6"], told_apart_from_nothing) == (1, 2)
+    false = SILENT | {"not_excluded": [["sun"], ["moon"]]}
+    assert counts([hiding, false], ["snr6"], told_apart) == (2, 2)
+    assert counts([hiding, false], ["snr6"], rightly_told_apart) == (1, 2)
+    beside = record("snr6", "identified", "eddies", steps=[NAMED["steps"][0], WRONG["steps"][0]])
+    assert counts([*everything, beside], ["snr6"], one_too_many) == (2, 5)
+    assert counts([beside], ["snr6"], wrongly_named) == (0, 1)
     assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
 
 
@@ -76,8 +80,8 @@ def test_the_page(tmp_path: Path) -> None:
     write_page(studies, {0.95: (0.96, 0.381), 0.9: (0.93, 0.532)}, tmp_path)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert "Measured on 4 small twins" in page
-    assert "| Hidden effect in the 95 % set, ratio 6 | 2 | 4 | 50.0% |" in page
-    assert "| Hidden effect in the 95 % set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
+    assert "| Hidden effect in the set, ratio 6 | 2 | 4 | 50.0% |" in page
+    assert "| Hidden effect in the set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
     assert "three groups in 38% of such data" in page
     assert "`sun`" in page
     for name in ("alarms", "ratio", "sizes", "gains", "sets"):

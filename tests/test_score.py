@@ -90,29 +90,42 @@ def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
     slopes, prints = problem
     random, family, tries = np.random.default_rng(2), [np.array([j]) for j in range(5)] + [np.array([5, 6, 7])], 800
     projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    one_sided = np.arange(PRINTS) % 2 == 0
+    may_be = np.array([[True] * PRINTS, [j % 2 == 0 for j in range(PRINTS)]])
+    ways = [[(sign, j) for j in columns for sign in (0, 1) if may_be[sign, j]] for columns in family]
     said, held, sizes = 0.0, 0, []
     for _ in range(tries):
         true = int(random.integers(len(family)))
-        column = int(random.choice(family[true]))
-        sign = 1.0 if one_sided[column] else random.choice([-1.0, 1.0])
-        residual = sign * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
-        chance = score.chances(replace(projected, residual=residual), one_sided, family, 3.0)
-        kept = score.fewest(chance, 0.9)
-        said, held = said + chance[kept].sum(), held + (true in kept)
+        sign, column = ways[true][random.integers(len(ways[true]))]
+        residual = (1 - 2 * sign) * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
+        drawn = replace(projected, residual=residual)
+        chance = score.chances(drawn, family, may_be, 3.0)
+        kept = [j for group in score.likely(drawn, family, chance, 0.9) for j in group]
+        said, held = said + sum(chance[family[j]].sum() for j in kept), held + (true in kept)
         sizes.append(len(kept))
     assert held == pytest.approx(said, abs=4.0 * np.sqrt(0.09 * tries))
     assert said >= 0.9 * tries
     assert np.mean(sizes) < 3.0, "six would hold everything and say nothing"
 
 
-def test_without_a_score_all_are_as_likely(problem: tuple[np.ndarray, np.ndarray]) -> None:
+def test_without_a_score_all_that_may_be_are_as_likely(problem: tuple[np.ndarray, np.ndarray]) -> None:
     slopes, prints = problem
     projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    family = [np.arange(3), np.arange(3, PRINTS)]
-    assert score.chances(projected, np.zeros(PRINTS, bool), family, 3.0) == pytest.approx([0.5, 0.5])
-    assert score.fewest(np.array([0.2, 0.5, 0.3]), 0.6) == [1, 2]
-    assert score.fewest(score.chances(projected, np.zeros(PRINTS, bool), [], 3.0), 0.9) == []
+    family = [np.arange(3), np.arange(3, 6), np.arange(6, PRINTS)]
+    may_be = np.ones((2, PRINTS), bool)
+    may_be[:, 6:] = False
+    chance = score.chances(projected, family, may_be, 3.0)
+    assert [chance[columns].sum() for columns in family] == pytest.approx([0.5, 0.5, 0.0])
+    assert score.likely(projected, family, chance, 0.9) == [[0], [1]]
+    assert score.likely(projected, [], np.zeros(0), 0.9) == []
+
+
+def test_what_looks_alike_shares_its_chances(problem: tuple[np.ndarray, np.ndarray]) -> None:
+    """Two families with one trace hold 0.3 each and come before one with 0.4, in one group."""
+    slopes, prints = problem
+    projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints[:, [0, 1, 0]])
+    family = [np.array([j]) for j in range(3)]
+    assert score.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.55) == [[0, 2]]
+    assert score.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.9) == [[0, 2], [1]]
 
 
 def test_names_with_one_trace_form_a_group() -> None:

@@ -23,9 +23,9 @@ Groups = tuple[tuple[str, ...], ...]
 
 
 def said(
-    steps: list[Step], suspects: list[Suspect], place: Where | None, fit: Misfit, still: Groups = ()
+    steps: list[Step], suspects: list[Suspect], place: Where | None, fit: Misfit, still: Groups = (), alone: str = ""
 ) -> tuple[str, str, str]:
-    verdict, sentence, remarks = judged(noise_of(STATION), steps, suspects, place, fit, (), still)
+    verdict, sentence, remarks = judged(noise_of(STATION), steps, suspects, place, fit, (), still, alone)
     return verdict, sentence, " ".join(remarks)
 
 
@@ -43,6 +43,17 @@ def test_what_scores_below_the_alarm_is_not_excluded() -> None:
     assert "effect0" in remarks
     assert "and 3 more" in remarks
     assert "wind" not in remarks
+
+
+def test_an_alarm_that_nothing_came_of_is_no_all_clear() -> None:
+    verdict, sentence, _ = said([], [NONE], None, FITS, (), "wind stands out, but no flow with it fits")
+    assert verdict == "cannot-tell"
+    assert "wind stands out" in sentence
+
+
+def test_a_misfit_is_not_said_to_hide() -> None:
+    assert "effect0" in said([], [NONE], None, FITS, (("effect0",),))[2]
+    assert "effect0" not in said([], [NONE], None, MISSES, (("effect0",),))[2]
 
 
 @pytest.mark.parametrize(

@@ -109,14 +109,23 @@ def _where(seen: Look) -> Where:
     return Where(float(spots.x[best]), float(spots.y[best]), seen_in, strength, float(seen.places.scores[best]))
 
 
+def _unexplained(seen: Look, alarm: str) -> str:
+    """What stands out although nothing came of it, '' if nothing does."""
+    if alarm == "effect":
+        return f"{seen.traces.candidates[seen.order[0]].name} stands out, but no calibrated flow with it fits better"
+    return f"more than {FLAGGED} stations stand alone" if alarm == "station" else ""
+
+
 def _written(first: Look, last: Look, steps: Sequence[Step], suspects: Mapping[str, Suspect]) -> Diagnosis:
     """From the first look and the last one."""
     point, noise = last.base.fitted.point, last.noise
-    place = _where(last) if _alarm(last, steps) == "place" else None
+    alarm = _alarm(last, steps)
+    place = _where(last) if alarm == "place" else None
     misfit = Misfit(chi2(noise, point), noise.rows.size - point.z.size - len(last.flagged))
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.refitted, -(one.score**2))))
-    open_still = () if steps or place else hiding(last)
-    verdict, sentence, remarks = judged(noise, steps, ranked, place, misfit, last.flagged, open_still)
+    open_still = () if steps or alarm else hiding(last)
+    unexplained = "" if steps else _unexplained(last, alarm)
+    verdict, sentence, remarks = judged(noise, steps, ranked, place, misfit, last.flagged, open_still, unexplained)
     mapped = first if place is None else last  # a place is found in what the steps leave
     return Diagnosis(
         name=first.base.model.case.name,
@@ -145,7 +154,7 @@ def _before(seen: Look) -> dict[str, Any]:
     columns = [seen.best_column(j) for j in order]
     return {
         "chi2_first": chi2(base.noise, base.fitted.point),
-        "threshold": float(np.sqrt(np.quantile(seen.maxima, 1.0 - ALARM))),
+        "threshold": seen.threshold,
         "first_scores": {one.name: seen.best_score(j) for j, one in enumerate(candidates)},
         "first_parameters": {name: interval95(base.model, base.fitted, name)[0] for name in base.model.names},
         "zones": misfit_zones(base.model, base.noise, base.fitted.point),

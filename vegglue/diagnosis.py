@@ -27,8 +27,9 @@ class Suspect:
 
     amplitude, interval95: from its own refit when there was one, else to first order; unit of the amplitude. p_family:
     chance that errors alone make any effect look as strong. visibility: share of its trace that calibration cannot
-    mimic [-]. smallest_detectable: amplitude that would be seen 19 times of 20; mimicked_by: the parameter most alike;
-    off, scale: where the amplitude does nothing, and how far from there is plausible.
+    mimic [-]. smallest_detectable: distance of the amplitude from off that stands out 19 times of 20; testable: that
+    is less than twice a plausible one; mimicked_by: the parameter most alike; off, scale: where the amplitude does
+    nothing, and how far from there is plausible.
     """
 
     name: str

@@ -63,6 +63,11 @@ class Amplitude:
         """The value of that gain, kept within the support."""
         return float(np.clip(self.off + self.size(gain), self.low, self.high))
 
+    def may_be(self, gain: float, most: float) -> bool:
+        """Whether the value of a gain lies within the support, and within `most` times scale of off."""
+        value = self.off + self.size(gain)
+        return self.low <= value <= self.high and abs(value - self.off) <= most * self.scale
+
     @property
     def small(self) -> float:
         """A step from off into the support, small but large against rounding in its power."""

@@ -26,7 +26,7 @@ from vegglue.observations import read_observations
 from vegglue.prune import NEEDED
 from vegglue.schema import Case
 from vegglue.store import diagnosis_that_fits, read_diagnosis, read_posterior, stored_hash, write_diagnosis
-from vegglue.suspects import SEEN
+from vegglue.suspects import SURE
 from vegglue.text_files import write_text
 from vegglue.workings import amplitude_of, effect_of
 
@@ -261,7 +261,7 @@ def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
     """Length of the trace of a plausible amplitude before projection, in standard errors."""
     amplitude = candidate_named(case, found.station, suspect.name).effect.amplitude
     seen = amplitude.gain(amplitude.off + suspect.smallest_detectable)
-    return SEEN * amplitude.plausible / seen / max(suspect.visibility, 1e-6)
+    return (found.threshold + SURE) * amplitude.plausible / seen / max(suspect.visibility, 1e-6)
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:

@@ -10,7 +10,8 @@ from vegglue.twin import BAD_PROBE, Answer, Hidden
 
 @dataclass(frozen=True)
 class Mark:
-    """One hidden thing against a diagnosis. named: the verdict is this effect alone; inside: it is in the set.
+    """One hidden thing against a diagnosis. named: the verdict is this effect alone; inside: it is in the set; open:
+    nothing stands out, and it is among what is not excluded.
 
     amplitude: whether the 95 % interval holds the true one, None when it is not in the set; away: distance [m] of the
     place that is pointed at from the true one, NaN without either; found: what counts as success for its kind.
@@ -19,6 +20,7 @@ class Mark:
     hidden: Hidden
     named: bool
     inside: bool
+    open: bool
     amplitude: bool | None
     away: float
     found: bool
@@ -31,18 +33,19 @@ def marks(answer: Answer, diagnosis: Diagnosis) -> list[Mark]:
 def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
     if hidden.name == BAD_PROBE:
         there = hidden.station in diagnosis.flagged
-        return Mark(hidden, False, there, None, float("nan"), there)
+        return Mark(hidden, False, there, False, None, float("nan"), there)
     if not hidden.listed:
         away = _away(hidden, diagnosis)
         found = diagnosis.verdict == "none-of-these"
-        return Mark(hidden, False, False, None, away, found)
+        return Mark(hidden, False, False, False, None, away, found)
     inside = hidden.name in diagnosis.set
-    named = diagnosis.verdict == "identified" and hidden.name in [step.accepted for step in diagnosis.steps]
+    named = diagnosis.verdict == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
+    still = hidden.name in [name for group in diagnosis.not_excluded for name in group]
     amplitude = None
     if inside:
         low, high = next(one.interval95 for one in diagnosis.suspects if one.name == hidden.name)
         amplitude = bool(low <= hidden.amplitude <= high)
-    return Mark(hidden, named, inside, amplitude, float("nan"), inside)
+    return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
 
 
 def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
@@ -88,6 +91,8 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     if not mark.hidden.listed:
         told = f"The verdict was {diagnosis.verdict}"
         return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")
+    if mark.open:
+        return truth + f"The diagnosis said {diagnosis.verdict}, and lists it among what is not excluded."
     if not mark.inside:
         return truth + f"The diagnosis missed it; it said {diagnosis.verdict} {', '.join(diagnosis.set)}".rstrip() + "."
     alone = "It was named alone" if mark.named else f"It is in the set, one of {groups_of(diagnosis)} group(s) by step"

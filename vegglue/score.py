@@ -89,24 +89,34 @@ def rivals(projected: Projected, family: Sequence[np.ndarray], fitted: Array, se
     return found
 
 
-def chances(projected: Projected, one_sided: np.ndarray, family: Sequence[np.ndarray], length: float) -> Array:
-    """Chance of each family (k,) to be the one thing that is missing, its trace `length` standard errors long [-].
+def chances(projected: Projected, family: Sequence[np.ndarray], may_be: np.ndarray, length: float) -> Array:
+    """Chance of each fingerprint (c,) to be the one thing that is missing, its trace `length` standard errors long [-].
 
-        p_j ~ mean_i exp(length T_i - length^2 / 2), over its fingerprints i and the signs they may have
+        p_i ~ sum_s exp(s length T_i - length^2 / 2) / n_j,  s = +1, -1
 
-    All families are as likely before (Bayes).
+    may_be (2, c): whether it may have either sign at that length; n_j: how many fingerprints and signs of its family
+    may be. All families of which one may be are as likely before (Bayes).
     """
-    up = length * (projected.units.T @ projected.residual)
-    either = np.where(one_sided, up, np.logaddexp(up, -up) - np.log(2.0))
-    of_family = np.array([np.logaddexp.reduce(either[columns]) - np.log(len(columns)) for columns in family])
-    weight = np.exp(of_family - of_family.max(initial=-np.inf))
-    return np.asarray(weight / weight.sum())
+    score = length * (projected.units.T @ projected.residual)
+    weight = np.where(may_be, np.exp(np.stack([score, -score]) - np.abs(score).max(initial=0.0)), 0.0).sum(axis=0)
+    ways = may_be.sum(axis=0)
+    for columns in family:
+        weight[columns] /= max(int(ways[columns].sum()), 1)
+    return np.asarray(weight / max(float(weight.sum()), 1e-300))
 
 
-def fewest(chance: Array, level: float) -> list[int]:
-    """Places of the fewest entries that together hold a chance of `level`, the likeliest first."""
-    order = np.argsort(-chance)
-    return [int(j) for j in order[: np.searchsorted(np.cumsum(chance[order]), level) + 1]]
+def likely(projected: Projected, family: Sequence[np.ndarray], chance: Array, level: float) -> list[list[int]]:
+    """The fewest groups of families that hold a chance of `level` together, likelier groups and families first.
+
+    chance (c,): of each fingerprint; a family is grouped by its likeliest.
+    """
+    of_family = np.array([chance[columns].sum() for columns in family])
+    possible = [int(j) for j in np.argsort(-of_family) if of_family[j] > 0]
+    units = projected.units[:, [int(family[j][np.argmax(chance[family[j]])]) for j in possible]]
+    found = [[int(j) for j in group] for group in groups([str(j) for j in possible], units.T @ units)]
+    found.sort(key=lambda group: -of_family[group].sum())
+    held = np.cumsum([of_family[group].sum() for group in found])
+    return found[: int(np.searchsorted(held, level)) + 1]
 
 
 def cosines(projected: Projected) -> Array:

@@ -12,8 +12,10 @@ HIDING = 3.0
 HELD = 0.9
 # Standard deviations of an effect's prior beyond which its size is not believed.
 BEYOND_BELIEF = 3.0
-# Amplitude seen in 19 of 20 tries at the 5 % level, over its standard error.
-SEEN = 3.5
+# By how many standard errors a trace must be longer than the score of the alarm, to be seen 19 times of 20.
+SURE = 1.645
+# Standard deviations of its prior within which an effect must be seen to be testable.
+TESTABLE = 2.0
 
 
 def suspects_of(seen: Look) -> dict[str, Suspect]:
@@ -25,7 +27,7 @@ def _suspect(seen: Look, candidate: int) -> Suspect:
     one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
     amplitude, length = one.effect.amplitude, max(float(seen.projected.length[column]), 1e-300)
     gain = float(seen.scores[column]) / length
-    smallest = amplitude.size(SEEN / length)
+    smallest = amplitude.size((seen.threshold + SURE) / length)
     mimic, likeness = _mimic(seen, column)
     return Suspect(
         name=one.name,
@@ -37,7 +39,7 @@ def _suspect(seen: Look, candidate: int) -> Suspect:
         p_family=seen.family_p(candidate),
         visibility=float(seen.projected.visible[column]),
         smallest_detectable=smallest,
-        testable=smallest < 2.0 * amplitude.scale,
+        testable=smallest < TESTABLE * amplitude.scale,
         refitted=False,
         objective=seen.base.fitted.objective - float(seen.scores[column] ** 2),
         mimicked_by=mimic,
@@ -53,13 +55,9 @@ def hiding(seen: Look) -> tuple[tuple[str, ...], ...]:
 
     One is taken to be there, as long as hides more often than not, and at a size that may be believed.
     """
-    believed = np.flatnonzero(seen.stretch(HIDING) < BEYOND_BELIEF)
-    family = [seen.traces.columns[j] for j in believed]
-    chance = score.chances(seen.projected, seen.traces.one_sided, family, HIDING)
-    kept = [int(believed[j]) for j in score.fewest(chance, HELD)]
-    columns = [seen.best_column(j) for j in kept]
-    cosine = score.cosines(seen.projected)[np.ix_(columns, columns)]
-    return tuple(tuple(group) for group in score.groups([seen.traces.candidates[j].name for j in kept], cosine))
+    family, names = seen.traces.columns, [one.name for one in seen.traces.candidates]
+    chance = score.chances(seen.projected, family, seen.may_be(HIDING, BEYOND_BELIEF), HIDING)
+    return tuple(tuple(names[j] for j in group) for group in score.likely(seen.projected, family, chance, HELD))
 
 
 def _mimic(seen: Look, column: int) -> tuple[str, float]:

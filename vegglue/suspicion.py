@@ -8,6 +8,7 @@ import scipy.stats
 from vegglue import score
 from vegglue.baseline import Baseline
 from vegglue.candidates import start_of
+from vegglue.diagnosis import ALARM
 from vegglue.effect import Array
 from vegglue.linearise import z_of
 from vegglue.noise import Noise, drawn, estimated
@@ -81,13 +82,14 @@ class Look:
     def family_p(self, candidate: int) -> float:
         return score.family_p(self.best_score(candidate), self.maxima)
 
-    def stretch(self, length: float) -> Array:
-        """Size (c,) at which the trace of each candidate is `length` standard errors long, in standard deviations of
-        its prior [-], by the shape that shows most.
-        """
-        longest = [int(columns[np.argmax(self.projected.length[columns])]) for columns in self.traces.columns]
-        pairs = [(self.traces.amplitudes[j], max(float(self.projected.length[j]), 1e-300)) for j in longest]
-        return np.array([amplitude.size(length / seen) / amplitude.scale for amplitude, seen in pairs])
+    @property
+    def threshold(self) -> float:
+        """Score that errors alone reach once in 1 / ALARM."""
+        return float(np.sqrt(np.quantile(self.maxima, 1.0 - ALARM)))
+
+    def may_be(self, length: float, most: float) -> np.ndarray:
+        """Whether traces may be `length` standard errors long, with either sign, (2, c): see `Amplitude.may_be`."""
+        return self.traces.may_be(length / np.maximum(self.projected.length, 1e-300), most)
 
     @property
     def order(self) -> list[int]:

@@ -33,6 +33,11 @@ class Traces:
         """Which columns (c,) are of effects that can only grow from off."""
         return np.array([amplitude.low >= amplitude.off for amplitude in self.amplitudes], bool)
 
+    def may_be(self, gains: Array, most: float) -> np.ndarray:
+        """Whether the effect of each column may have a gain (c,), and its opposite, (2, c): see `Amplitude.may_be`."""
+        pairs = list(zip(self.amplitudes, gains, strict=True))
+        return np.array([[amplitude.may_be(sign * gain, most) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
+
 
 def traces_of(base: Baseline) -> Traces:
     """Those of the quick model: they only have to point the right way. Spots are sized by the model itself."""

@@ -44,6 +44,10 @@ BAD = 10.0
 UNLISTED, BAD_PROBE, NOTHING, ANY = "unlisted:", "bad_probe", "nothing", "?"
 
 
+class VisibilityError(InputError):
+    """At no plausible size would an effect be as visible as asked."""
+
+
 @dataclass(frozen=True)
 class Hidden:
     """One thing that is hidden. signal: its snr on the model's grid; station: row of a bad probe, else -1."""
@@ -187,7 +191,7 @@ def _chosen(
         found = _sized(ground, errors, candidate, Hidden(label, 0.0, shapes, 0.0), snr, random)
         if found is not None:
             return candidate, found
-    raise InputError(
+    raise VisibilityError(
         f"--hide {name}: at no plausible size would it be as visible as --snr {snr:g} in these data; ask for less, or "
         f"give its size, --hide {name}=SIZE."
     )

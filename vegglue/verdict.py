@@ -49,9 +49,11 @@ def judged(
     fit: Misfit,
     flagged: Sequence[int],
     not_excluded: Sequence[Sequence[str]],
+    unexplained: str = "",
 ) -> tuple[Verdict, str, list[str]]:
-    """The verdict, its sentence, and what else should be known."""
-    remarks = [*_stretched(steps, suspects), *_open(not_excluded), *_remarks(noise, suspects, flagged)]
+    """The verdict, its sentence, and what else should be known. unexplained: what stands out and nothing came of."""
+    still = _open(not_excluded) if fit.p >= POOR else []
+    remarks = [*_stretched(steps, suspects), *still, *_remarks(noise, suspects, flagged)]
     if place is not None:
         before = f", after {_names(steps)}" if steps else ""
         return (
@@ -60,6 +62,8 @@ def judged(
             f"something holds the flow back or lets it pass that the model does not have ({fit} without it).",
             remarks,
         )
+    if unexplained:
+        return "cannot-tell", f"These data cannot tell: {unexplained} ({fit}).", remarks
     if not steps:
         return _without_steps(suspects, fit, remarks)
     if len(steps[0].groups) > MOST_GROUPS:
@@ -84,13 +88,13 @@ def _without_steps(suspects: Sequence[Suspect], fit: Misfit, remarks: list[str])
         return (
             "cannot-tell",
             f"Nothing stands out ({fit}), but only {len(testable)} of {len(suspects)} effects would be seen in these "
-            "data if they were there.",
+            "data if they were there at twice a plausible size.",
             remarks,
         )
     return (
         "nothing-missing",
         f"Nothing is missing that these data could show: {fit}, and none of {len(suspects)} effects stands out "
-        f"({len(testable)} of them would be seen at a plausible size).",
+        f"({len(testable)} of them would be seen at twice a plausible size).",
         remarks,
     )
 
@@ -138,8 +142,8 @@ def _open(groups: Sequence[Sequence[str]]) -> list[str]:
     names = [name for group in groups for name in group]
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     said = (
-        "Not excluded: should one effect of three standard errors be there, nine times of ten it is one of these, the "
-        f"likeliest first: {', '.join(names[:SHOWN])}{more}."
+        "Should exactly one effect hide here, of about three standard errors, nine times of ten it is one of these, "
+        f"the likeliest first: {', '.join(names[:SHOWN])}{more}; what is smaller may be any."
     )
     return [said] if names else []
 
