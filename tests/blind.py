@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from blind_bound import informed, silent
+from blind_informed import informed, silent
 from blind_page import write_page
 
 from vegglue.aside import aside_of, without

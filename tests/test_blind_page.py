@@ -31,7 +31,7 @@ def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, 
     return {
         "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
         "verdict": verdict, "steps": steps, "set": list(rivals), "not_excluded": [], "alike": {}, "seconds": 3.0,
-        "gain": 1e-4 if rivals else None, "signal": 6.0, "held_out": [0.02, 0.01],
+        "gain": 1e-4 if rivals else None, "signal": 6.0, "flagged": 0, "threshold": 3.17, "held_out": [0.02, 0.01],
     } | changes  # fmt: skip
 
 
