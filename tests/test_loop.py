@@ -38,6 +38,7 @@ def field_folder(folder: Path, **changes: Any) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
     said = vegglue(tmp_path, "import", field_folder(tmp_path / "Mill Brook"), "--to", "mill.yaml").stdout
     case = load_case(tmp_path / "mill.yaml")

@@ -53,6 +53,7 @@ def test_a_tilted_lake_is_not_at_rest():
     assert residual(problem, state)[5:-5, ALONG] == pytest.approx(9.81 * 1e-4, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_disturbed_lake_comes_to_rest():
     """A hump of water between islands runs out over the outlet, and the lake lies still at the outlet's level.
 
