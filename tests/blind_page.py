@@ -132,7 +132,7 @@ def counts(records: Sequence[Record], groups: Sequence[str], met: Callable[[Reco
 
 
 def write_page(studies: Studies, bounds: dict[float, tuple[float, float]], folder: Path) -> None:
-    """blind.md with its tables, and blind-*.svg beside it. bounds: by level, see `blind_informed.at_best`."""
+    """blind.md with its tables, and blind-*.svg beside it. bounds: by level, see `blind_informed.informed`."""
     twin, campaign = ([one for one in studies[case] if "left_out" not in one] for case in ("twin", "campaign"))
     out = [record for case in ("twin", "campaign") for record in studies[case] if "left_out" in record]
     left_out = sorted({record["hide"][0] for record in out if not record.get("visible")})

@@ -82,9 +82,9 @@ class Where:
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything a diagnosis found. chi2, freedom: of the last model, whitened; flagged: rows of stations that no
-    effect explains and that stand alone; zones: misfit by experiment, section and zone; residual: (station,) of the
-    baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag everywhere, of the model in
-    which `where` was found, else of the first.
+    effect explains and that stand alone; zones: misfit by experiment, section and zone; prediction_first,
+    prediction: (station,) of the baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag
+    everywhere, of the model in which `where` was found, else of the first.
     not_excluded: where nothing stood out, groups of effects among which one that hides is, nine times of ten.
     threshold, first_scores: score that errors alone reach once in 1 / ALARM, and those of the effects at the baseline.
     """
