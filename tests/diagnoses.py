@@ -41,7 +41,7 @@ def a_diagnosis(**changes: Any) -> Diagnosis:
             a_suspect("eddies", refitted=True), a_suspect("mixing[D3]", refitted=True, shapes={"width": 0.1}),
             a_suspect("wind", testable=False, score=0.3, p_family=1.0), a_suspect("turning", score=-1.0, p_family=0.7),
         ),
-        steps=(Step("eddies", ("eddies", "mixing[D3]"), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0),),
+        steps=(Step("eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0),),
         not_excluded=(), where=Where(33.0, -0.6, ("low", "high"), 0.4, 12.0),
         chi2_first=2300.5, chi2=5.1, freedom=3, p_misfit=0.2,
         correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,), threshold=3.4,

@@ -167,7 +167,8 @@ def test_marks_of_every_kind() -> None:
     assert third.away == pytest.approx(1.0)
     assert not third.found, "the verdict was one-of"
     assert fourth.found, "row 1 is flagged"
-    alone = a_diagnosis(verdict="identified", steps=(Step("eddies", ("eddies",), (("eddies",),), 9.0, 1.0, 0.0),))
+    step = Step("eddies", ("eddies",), (1.0,), (("eddies",),), 9.0, 1.0, 0.0)
+    alone = a_diagnosis(verdict="identified", steps=(step,))
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].amplitude is False
@@ -210,7 +211,7 @@ def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert said_to(monkeypatch, capsys, "twin", CONFIG, "--hide", "meander", "--to", "other")[0] == 2
     monkeypatch.setattr("sys.argv", ["vegglue", "reveal", "play"])
     case = load_case(tmp_path / "play" / "play.yaml")
-    steps = (Step("gauge_datum", ("gauge_datum",), (("gauge_datum",),), 900.0, 90.0, 0.0),)
+    steps = (Step("gauge_datum", ("gauge_datum",), (1.0,), (("gauge_datum",),), 900.0, 90.0, 0.0),)
     suspect = a_suspect("gauge_datum", amplitude=0.1, interval95=(0.09, 0.11))
     (tmp_path / "runs" / "play").mkdir(parents=True)
     found = a_diagnosis(verdict="identified", steps=steps, suspects=(suspect,))

@@ -16,7 +16,8 @@ NONE = a_suspect("wind", score=0.4)
 
 
 def step(*rivals: str) -> Step:
-    return Step(rivals[0], rivals, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4)
+    chances = tuple(0.96 / len(rivals) for _ in rivals)
+    return Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4)
 
 
 Groups = tuple[tuple[str, ...], ...]

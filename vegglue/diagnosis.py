@@ -58,14 +58,24 @@ class Suspect:
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the search: what was accepted, its rivals that are not rejected, chi2 before and after."""
+    """One round of the search: what was accepted, what it may be instead, chi2 before and after.
+
+    rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
+    one of those refitted.
+    """
 
     accepted: str
     rivals: tuple[str, ...]
+    chances: tuple[float, ...]
     groups: tuple[tuple[str, ...], ...]
     chi2_before: float
     chi2_after: float
     p_family: float
+
+    @property
+    def chance(self) -> dict[str, float]:
+        """Of each rival by its name."""
+        return dict(zip(self.rivals, self.chances, strict=True))
 
 
 @dataclass(frozen=True)
@@ -123,7 +133,7 @@ class Diagnosis:
 
     @property
     def set(self) -> list[str]:
-        """Names of all effects not rejected, those of the first step first."""
+        """Names of all effects that may be missing, those of the first step first."""
         return list(dict.fromkeys(name for step in self.steps for name in step.rivals))
 
     @property
@@ -241,8 +251,8 @@ def _table_from(group: Mapping[str, Any], *others: str) -> pd.DataFrame:
 
 
 def _step_from(step: dict[str, Any]) -> Step:
-    groups_of_step = tuple(tuple(group) for group in step["groups"])
-    return Step(**step | {"rivals": tuple(step["rivals"]), "groups": groups_of_step})
+    lists = {name: tuple(step[name]) for name in ("rivals", "chances")}
+    return Step(**step | lists | {"groups": tuple(tuple(group) for group in step["groups"])})
 
 
 def _row(suspect: Suspect) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Suspects calibrated in earnest: the best of them, the rivals that the data do not reject, the model that follows."""
+"""Suspects calibrated in earnest: the best of them, the rivals that may be it instead, the model that follows."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,6 +22,9 @@ from vegglue.verdict import MOST_GROUPS
 REFITTED, REFIT_STEPS = 6, 8
 # Scores this much below the best one's (in squares, and as a share of it) are not refitted.
 BEHIND, BEHIND_SHARE = 15.0, 0.45
+# Share of the chances that the rivals kept hold together, and the part of the best one's chance below which a rival is
+# not kept: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
+HELD, HARDLY = 0.95, 0.05
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ def refits_of(seen: Look, jobs: int, say: Callable[[str], None]) -> list[Refit]:
 
 
 def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], None]) -> tuple[Step, Baseline] | None:
-    """The best refit as a step, with the rivals that the data do not reject, and the baseline it leads to.
+    """The best refit as a step, with the rivals that may be it instead, and the baseline it leads to.
 
     None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
     say nothing, or when no flow is found with it.
@@ -57,23 +60,30 @@ def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], 
     _, noise, point = seen.base.quick
     if not refits or objective(noise, point) - refits[0].fitted.objective < scipy.stats.chi2.ppf(0.95, 1):
         return None
-    best, rivals = refits[0], _not_rejected(seen, refits)
-    groups = _groups(seen, rivals)
+    best, chance, groups = refits[0], *_rivals(seen, refits)
     if later and len(groups) > MOST_GROUPS:
         return None
     say(f"calibrating with {best.candidate.name}")
     further = _onward(seen, best)
     if further is None:
         return None
-    before, names = chi2(seen.noise, seen.base.fitted.point), tuple(one.candidate.name for one in rivals)
-    p_family = float(np.exp(seen.effects.log_p()))
-    return Step(best.candidate.name, names, groups, before, further.fitted.chi2, p_family), further
+    before, p_family = chi2(seen.noise, seen.base.fitted.point), float(np.exp(seen.effects.log_p()))
+    rivals, chances = tuple(chance), tuple(chance.values())
+    return Step(best.candidate.name, rivals, chances, groups, before, further.fitted.chi2, p_family), further
 
 
-def _groups(seen: Look, rivals: list[Refit]) -> tuple[tuple[str, ...], ...]:
-    columns = [one.column for one in rivals]
-    cosine = score.cosines(seen.projected)[np.ix_(columns, columns)]
-    return tuple(tuple(group) for group in score.groups([one.candidate.name for one in rivals], cosine))
+def _rivals(seen: Look, refits: list[Refit]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """The chance of each refit in the fewest groups that hold HELD of it, the likeliest first, and these groups."""
+    _, noise, point = seen.base.quick
+    misfit = np.array([one.fitted.objective for one in refits])
+    chance = score.chances_of_rivals(misfit, objective(noise, point) - misfit)
+    columns = [one.column for one in refits]
+    of_columns = np.zeros(seen.scores.size)
+    of_columns[columns] = np.where(chance < HARDLY * chance.max(), 0.0, chance)
+    kept = score.likely(seen.projected, [np.array([column]) for column in columns], of_columns, HELD)
+    groups = tuple(tuple(refits[j].candidate.name for j in group) for group in kept)
+    found = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
+    return {refits[j].candidate.name: float(chance[j]) for j in found}, groups
 
 
 def _onward(seen: Look, best: Refit) -> Baseline | None:
@@ -116,13 +126,3 @@ def _refit(seen: Look, candidate: int) -> Refit | None:
     amplitude, low, high = interval95(model, fitted, one.parameter)
     return Refit(one, column, fitted, amplitude, (low, high))
 
-
-def _not_rejected(seen: Look, refits: list[Refit]) -> list[Refit]:
-    """Every refit whose misfit lies within what chance allows were it the truth, the best first."""
-    family = [seen.traces.columns[seen.traces.candidates.index(one.candidate)] for one in refits]
-    gains = np.zeros(seen.scores.size)
-    for one in refits:
-        gains[one.column] = one.candidate.effect.amplitude.gain(one.amplitude)
-    slack = score.rivals(seen.projected, family, gains, seed=2)
-    best = refits[0].fitted.objective
-    return [one for one, most in zip(refits, slack, strict=True) if one.fitted.objective - best <= most]

@@ -66,27 +66,18 @@ def family_p(score: float, maxima: Array) -> float:
     return float((1 + np.sum(maxima >= score**2)) / (1 + maxima.size))
 
 
-def rivals(projected: Projected, family: Sequence[np.ndarray], fitted: Array, seed: int) -> Array:
-    """For each family j of fingerprints: the 95 % quantile of T_max^2 - T_j^2, had j with its fitted gain been true.
+def chances_of_rivals(misfit: Array, fall: Array) -> Array:
+    """Chance of each of a few calibrated rivals (k,) to be what is missing, were it one of them [-].
 
-    family: columns of each; fitted (c,): gain to simulate with, of the column that fits best. A rival whose observed
-    difference lies below is not rejected. The trace of j in nature is not quite the model's, whose cells and laws are
-    not nature's: in every direction beside its own it is uncertain by TRACE_ERROR of its length, as if errors were
-    (1 + (TRACE_ERROR |S_perp a|)^2)^(1/2) times as large there.
+        p_j ~ exp(-(Phi_j - min Phi) / 2 w_j),    w_j = 1 + TRACE_ERROR^2 (Phi_0 - Phi_j)
+
+    misfit (k,): Phi, the least objective with each; fall (k,): Phi_0 - Phi, by how much it fell, the square of the
+    length of what j explains in standard errors. All are as likely before and have one parameter more (Schwarz 1978,
+    doi:10.1214/aos/1176344136; not checked against it). The trace of j in nature is not quite the model's, whose cells
+    and laws are not nature's: where it parts from that of the best, errors are as if w_j^(1/2) times as large.
     """
-    random = np.random.default_rng(seed)
-    units, noise = projected.units, random.standard_normal((DRAWS // 4, projected.residual.size))
-    base = noise @ units
-    found = np.empty(len(family))
-    for j, columns in enumerate(family):
-        column = int(columns[np.argmax(np.abs(fitted[columns]) * projected.length[columns])])
-        length, cosine = abs(fitted[column]) * projected.length[column], units[:, column] @ units
-        wider = np.sqrt(1.0 + (TRACE_ERROR * length) ** 2)
-        beside = wider * base - (wider - 1.0) * np.outer(base[:, column], cosine)
-        squares = (beside + np.sign(fitted[column]) * length * cosine) ** 2
-        own = squares[:, columns].max(axis=1)
-        found[j] = np.quantile(squares.max(axis=1) - own, 0.95)
-    return found
+    weight = np.exp(-0.5 * (misfit - misfit.min()) / (1.0 + TRACE_ERROR**2 * np.maximum(fall, 0.0)))
+    return np.asarray(weight / weight.sum())
 
 
 def chances(projected: Projected, family: Sequence[np.ndarray], may_be: np.ndarray, length: float) -> Array:

@@ -27,7 +27,7 @@ from vegglue.posterior import Posterior, attributes, groups, posterior_from
 from vegglue.unfinished import Unfinished, is_reserved, put, reserve, stored, unfinished_fields
 
 ENSEMBLE_FORMAT, FIELDS_FORMAT, POSTERIOR_FORMAT = "vegglue ensemble 1", "vegglue fields 1", "vegglue posterior 1"
-DIAGNOSIS_FORMAT = "vegglue diagnosis 1"
+DIAGNOSIS_FORMAT = "vegglue diagnosis 2"
 
 Result = TypeVar("Result")
 

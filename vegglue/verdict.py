@@ -67,7 +67,7 @@ def judged(
     if not steps:
         return _without_steps(suspects, fit, remarks)
     if len(steps[0].groups) > MOST_GROUPS:
-        names = ", ".join(steps[0].rivals)
+        names = ", ".join(_likely(steps[0], steps[0].rivals))
         return "cannot-tell", f"Something is missing, but these data cannot tell which of {names} it is.", remarks
     if fit.p < POOR:
         remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {fit.p:.1g}).")
@@ -118,8 +118,14 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     if same:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
     if rest:
-        words += f", or else {' or '.join(rest)}"
+        own = sum(step.chance[name] for name in (step.accepted, *same))
+        words += f", with a chance of {own:.0%}, or else {' or '.join(_likely(step, rest))}"
     return words
+
+
+def _likely(step: Step, names: Sequence[str]) -> list[str]:
+    """Names with their chances."""
+    return [f"{name} ({step.chance[name]:.0%})" for name in names]
 
 
 def _remarks(noise: Noise, suspects: Sequence[Suspect], flagged: Sequence[int]) -> list[str]:
