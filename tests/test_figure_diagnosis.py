@@ -58,6 +58,8 @@ def test_words_tell_scores_before_and_after() -> None:
     assert rows["turning"].score == "−1.0 → −1.0"
     assert rows["eddies"].score == "45.2"  # refitted, not looked at again
     assert rows["eddies"].chance.startswith("&lt;")
+    assert rows["eddies"].share.startswith("70")
+    assert rows["wind"].share == ""
     assert told(a_diagnosis()).flagged[0].measured == "0.500"
 
 

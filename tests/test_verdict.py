@@ -65,6 +65,12 @@ def test_a_set_of_more_than_three_groups_tells_nothing(rivals: list[str], verdic
     assert said([step(*rivals)], [a_suspect(name) for name in rivals], None, FITS)[0] == verdict
 
 
+def test_rivals_are_told_with_their_chances() -> None:
+    both = Step("a", ("a", "b", "c"), (0.5, 0.3, 0.16), (("a", "b"), ("c",)), 200.0, 5.0, 1e-4)
+    sentence = said([both], [a_suspect(name) for name in "abc"], None, FITS)[1]
+    assert "the same trace in these data as b, with a chance of 80%, or else c (16%)" in sentence
+
+
 def test_an_implausible_size_is_remarked() -> None:
     usual, huge = a_suspect("a", amplitude=0.9, scale=0.5), a_suspect("a", amplitude=-0.34, scale=0.1)
     assert "plausible" not in said([step("a")], [usual], None, FITS)[2]

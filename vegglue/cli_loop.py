@@ -201,16 +201,17 @@ def _tell(found: Diagnosis) -> None:
     for remark in found.remarks:
         console.print(f"- {remark}")
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("effect", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"):
+    headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
+    for heading in headings:
         table.add_column(heading, justify="left" if heading == "effect" else "right")
     for one in found.suspects[:10]:
-        mark = "* " if one.name in found.set else "  "
+        share = f"{found.chances[one.name]:.0%}" if one.name in found.chances else ""
         low, high = one.interval95
-        chance = f"< {one.p_family:.1g}" if one.p_family < 5e-4 else f"{one.p_family:.2g}"
+        p_family = f"< {one.p_family:.1g}" if one.p_family < 5e-4 else f"{one.p_family:.2g}"
         unit = one.unit.removesuffix("-")
         table.add_row(
-            mark + one.name, f"{one.amplitude:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{one.score:+.1f}",
-            chance, f"{one.visibility:.2f}", f"{one.smallest_detectable:.2g}",
+            one.name, share, f"{one.amplitude:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{one.score:+.1f}",
+            p_family, f"{one.visibility:.2f}", f"{one.smallest_detectable:.2g}",
         )  # fmt: skip
     console.print(table)
     if found.flagged:

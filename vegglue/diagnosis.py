@@ -134,7 +134,16 @@ class Diagnosis:
     @property
     def set(self) -> list[str]:
         """Names of all effects that may be missing, those of the first step first."""
-        return list(dict.fromkeys(name for step in self.steps for name in step.rivals))
+        return list(self.chances)
+
+    @property
+    def chances(self) -> dict[str, float]:
+        """Chance of each effect of the set, in the first step that names it."""
+        found: dict[str, float] = {}
+        for step in self.steps:
+            for name, chance in step.chance.items():
+                found.setdefault(name, chance)
+        return found
 
     @property
     def groups(self) -> list[list[str]]:

@@ -9,7 +9,7 @@ from vegglue.diagnosis import Diagnosis, Suspect
 from vegglue.effect import Array
 from vegglue.likelihood import root_mean_square
 from vegglue.summary import KeyNumber
-from vegglue.typography import NARROW, as_given, fixed, interval, short, unit_html
+from vegglue.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
 
 # Effects in the table that is open; the others stand below it, folded.
 SHOWN = 8
@@ -24,6 +24,7 @@ class SuspectRow:
     name: str
     title: str
     standing: str
+    share: str
     amplitude: str
     interval: str
     chance: str
@@ -69,7 +70,7 @@ def told(diagnosis: Diagnosis) -> Told:
 
 
 def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:
-    """'accepted', 'rival' (not rejected beside an accepted one), 'rejected', 'no sign' or 'untestable'."""
+    """'accepted', 'rival' (may be it instead of an accepted one), 'rejected', 'no sign' or 'untestable'."""
     if suspect.name in [step.accepted for step in diagnosis.steps]:
         return "accepted"
     if suspect.name in diagnosis.set:
@@ -127,6 +128,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         name=html.escape(suspect.name),
         title=html.escape(suspect.title),
         standing=standing(diagnosis, suspect),
+        share=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
         amplitude=short(suspect.amplitude, 3) + unit,
         interval=interval(*suspect.interval95),
         chance=chance(suspect.p_family),
