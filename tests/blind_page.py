@@ -205,10 +205,10 @@ these.
 {table}
 
 A line is met when its interval reaches what is wanted; where data sets are few it says little. The set is what the
-verdict names, each rival kept that the data do not reject (95 %). Where nothing stands out it is nothing, or one of
-the effects that are listed as not excluded: the fewest groups that would hold one of three standard errors nine
-times of ten, so that of shorter ones fewer are among them. That length was chosen with ratio 3 in mind. Mean number
-of groups in a set, {sizes}; in those of ratio 3 where nothing stands out {still}. The score of the alarm is
+verdict names: the effects that hold 95 % of the chances. Where nothing stands out it is nothing, or one of the
+effects that are listed as not excluded: the fewest groups that would hold one of three standard errors nine times of
+ten, so that of shorter ones fewer are among them. That length was chosen with ratio 3 in mind. Mean number of groups
+in a set, {sizes}; in those of ratio 3 where nothing stands out {still}. The score of the alarm is
 {threshold} (mean; 4 % over all effects, 1 % over all places), and where nothing was hidden a station was set aside
 in {flagged} of the data sets. Left out at some true parameters, since the data would not show them at any plausible
 size: {left_out}; and {failed} data sets whose truth found no steady flow.

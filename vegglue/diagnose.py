@@ -1,7 +1,7 @@
-"""From misfit to missing effect: look, refit the suspects, keep every one that the data do not reject, look again.
+"""From misfit to missing effect: look, refit the suspects, keep those that hold 95 % of the chances, look again.
 
 The method is that of a score test against the bootstrap of its maximum (Rao 1948, doi:10.1017/S0305004100023987), with
-nonlinear refits of the best and a set of rivals by simulation from each rival's fit (Cox 1962).
+nonlinear refits of the best and a set of rivals by their chances.
 """
 
 from collections.abc import Callable, Mapping, Sequence
