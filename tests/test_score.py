@@ -78,7 +78,7 @@ def test_what_is_true_is_among_the_rivals(problem: tuple[np.ndarray, np.ndarray]
         true, length = int(random.integers(PRINTS)), random.uniform(3.0, 9.0)
         residual = length * projected.units[:, true] + random.standard_normal(ROWS + SLOPES)
         found = projected.units.T @ residual
-        chance = score.chances_of_rivals(-(found**2), found**2)
+        chance = score.chances_of_rivals(found**2)
         kept = [j for group in score.likely(projected, family, chance, 0.95) for j in group]
         said, held = said + chance[kept].sum(), held + (true in kept)
         sizes.append(len(kept))
@@ -89,9 +89,9 @@ def test_what_is_true_is_among_the_rivals(problem: tuple[np.ndarray, np.ndarray]
 
 def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
     """15 % of a trace of 40 standard errors are 6: a misfit 37 larger proves as little as 1 for a short one."""
-    assert score.chances_of_rivals(np.array([0.0, 37.0]), np.full(2, 1600.0))[1] == pytest.approx(0.378, abs=0.001)
-    assert score.chances_of_rivals(np.array([0.0, 1.0]), np.full(2, 1e-6))[1] == pytest.approx(0.378, abs=0.001)
-    assert score.chances_of_rivals(np.array([0.0, 37.0]), np.full(2, 9.0))[1] < 1e-5
+    assert score.chances_of_rivals(np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
+    assert score.chances_of_rivals(np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
+    assert score.chances_of_rivals(np.array([46.0, 9.0]))[1] < 1e-5
 
 
 def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:

@@ -12,6 +12,7 @@ from vegglue.baseline import Baseline, grid_difference
 from vegglue.candidates import Candidate, with_effect
 from vegglue.cores import in_threads
 from vegglue.diagnosis import Step, Suspect
+from vegglue.effect import Array
 from vegglue.fit import Fitted, chi2, fit, interval95, objective
 from vegglue.linearise import Model, linearise
 from vegglue.noise import with_grid_error
@@ -58,9 +59,10 @@ def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], 
     say nothing, or when no flow is found with it.
     """
     _, noise, point = seen.base.quick
-    if not refits or objective(noise, point) - refits[0].fitted.objective < scipy.stats.chi2.ppf(0.95, 1):
+    fall = [objective(noise, point) - one.fitted.objective for one in refits]
+    if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
         return None
-    best, chance, groups = refits[0], *_rivals(seen, refits)
+    best, chance, groups = refits[0], *_rivals(seen, refits, np.array(fall))
     if later and len(groups) > MOST_GROUPS:
         return None
     say(f"calibrating with {best.candidate.name}")
@@ -72,11 +74,12 @@ def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], 
     return Step(best.candidate.name, rivals, chances, groups, before, further.fitted.chi2, p_family), further
 
 
-def _rivals(seen: Look, refits: list[Refit]) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """The chance of each refit in the fewest groups that hold HELD of it, the likeliest first, and these groups."""
-    _, noise, point = seen.base.quick
-    misfit = np.array([one.fitted.objective for one in refits])
-    chance = score.chances_of_rivals(misfit, objective(noise, point) - misfit)
+def _rivals(seen: Look, refits: list[Refit], fall: Array) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """The chance of each refit in the fewest groups that hold HELD of it, the likeliest first, and these groups.
+
+    fall (k,): by how much each lowers the objective.
+    """
+    chance = score.chances_of_rivals(fall)
     columns = [one.column for one in refits]
     of_columns = np.zeros(seen.scores.size)
     of_columns[columns] = np.where(chance < HARDLY * chance.max(), 0.0, chance)

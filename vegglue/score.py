@@ -66,17 +66,17 @@ def family_p(score: float, maxima: Array) -> float:
     return float((1 + np.sum(maxima >= score**2)) / (1 + maxima.size))
 
 
-def chances_of_rivals(misfit: Array, fall: Array) -> Array:
+def chances_of_rivals(fall: Array) -> Array:
     """Chance of each of a few calibrated rivals (k,) to be what is missing, were it one of them [-].
 
-        p_j ~ exp(-(Phi_j - min Phi) / 2 w_j),    w_j = 1 + TRACE_ERROR^2 (Phi_0 - Phi_j)
+        p_j ~ exp(-(max F - F_j) / 2 w_j),    w_j = 1 + TRACE_ERROR^2 F_j
 
-    misfit (k,): Phi, the least objective with each; fall (k,): Phi_0 - Phi, by how much it fell, the square of the
-    length of what j explains in standard errors. All are as likely before and have one parameter more (Schwarz 1978,
-    doi:10.1214/aos/1176344136; not checked against it). The trace of j in nature is not quite the model's, whose cells
-    and laws are not nature's: where it parts from that of the best, errors are as if w_j^(1/2) times as large.
+    fall (k,): F, by how much j lowers the least objective: the square of what it explains, in standard errors. All are
+    as likely before and have one parameter more (Schwarz 1978, doi:10.1214/aos/1176344136; not checked against it).
+    The trace of j in nature is not quite the model's, whose cells and laws are not nature's: where it parts from that
+    of the best, errors are as if w_j^(1/2) times as large.
     """
-    weight = np.exp(-0.5 * (misfit - misfit.min()) / (1.0 + TRACE_ERROR**2 * np.maximum(fall, 0.0)))
+    weight = np.exp(-0.5 * (fall.max() - fall) / (1.0 + TRACE_ERROR**2 * np.maximum(fall, 0.0)))
     return np.asarray(weight / weight.sum())
 
 
