@@ -21,7 +21,7 @@ def a_suspect(name: str, **changes: Any) -> Suspect:
 
 
 def a_diagnosis(**changes: Any) -> Diagnosis:
-    """Two experiments, one section and a gauge each; an effect accepted, a rival, one rejected, one untestable."""
+    """Two experiments, one section and a gauge each; an effect accepted, a rival, one less likely, one untestable."""
     random = np.random.default_rng(3)
     station = pd.DataFrame({
         "experiment": ["low"] * 3 + ["high"] * 3, "kind": ["velocity", "velocity", "level"] * 2,

@@ -22,7 +22,9 @@ from scipy import stats
 
 def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, Any]:
     """The hidden effect is `eddies`; each rival is a group of its own."""
-    steps = [{"accepted": rivals[0], "rivals": list(rivals), "groups": [[name] for name in rivals]}] if rivals else []
+    chances = [0.6, 0.2, 0.15, 0.03][: len(rivals)]
+    step = {"rivals": list(rivals), "chances": chances, "groups": [[name] for name in rivals]}
+    steps = [{"accepted": rivals[0], **step}] if rivals else []
     inside = "eddies" in rivals
     mark = {
         "hidden": {"name": "eddies"}, "found": inside, "inside": inside, "named": rivals == ("eddies",),
@@ -82,6 +84,7 @@ def test_the_page(tmp_path: Path) -> None:
     assert "Measured on 4 small twins" in page
     assert "| Hidden effect in the set, ratio 6 | 2 | 4 | 50.0% |" in page
     assert "| Hidden effect in the set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
+    assert "| 50% to 75% | 60% | 3 | 1 | 33% |" in page, "three names told at 60 %, one of them true"
     assert "three groups in 38% of such data" in page
     assert "`sun`" in page
     for name in ("alarms", "ratio", "sizes", "gains", "sets"):

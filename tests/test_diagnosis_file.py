@@ -3,6 +3,7 @@
 from dataclasses import fields
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -47,6 +48,14 @@ def test_only_a_diagnosis_of_the_same_config_fits(tmp_path: Path) -> None:
     assert fitting is not None
     assert fitting.set == a_diagnosis().set
     assert diagnosis_that_fits(path, "e" * 64) is None
+
+
+def test_a_diagnosis_of_another_format_is_made_anew(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.h5"
+    write_diagnosis(path, a_diagnosis(), "", HASH)
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = "vegglue diagnosis 1"
+    assert diagnosis_that_fits(path, HASH) is None
 
 
 @pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING])

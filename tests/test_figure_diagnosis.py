@@ -10,7 +10,7 @@ from diagnoses import NOTHING, a_diagnosis
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 
-from vegglue.diagnosis import Diagnosis
+from vegglue.diagnosis import Diagnosis, Step
 from vegglue.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
 from vegglue.diagnosis_words import error_of, ranked, standing, told
 from vegglue.figure_ladder import draw_ladder, save_ladder_figure
@@ -41,7 +41,7 @@ def test_standings_follow_the_verdict() -> None:
     assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
     assert [one.name for one in ranked(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
     louder = replace(found, first_scores=found.first_scores | {"turning": -9.0})
-    assert standing(louder, found.suspects[3]) == "rejected"
+    assert standing(louder, found.suspects[3]) == "less likely"
 
 
 def test_errors_leave_out_what_does_not_count() -> None:
@@ -57,10 +57,17 @@ def test_words_tell_scores_before_and_after() -> None:
     rows = {row.name: row for row in told(a_diagnosis()).suspects}
     assert rows["turning"].score == "−1.0 → −1.0"
     assert rows["eddies"].score == "45.2"  # refitted, not looked at again
-    assert rows["eddies"].chance.startswith("&lt;")
-    assert rows["eddies"].share.startswith("70")
-    assert rows["wind"].share == ""
+    assert rows["eddies"].p_family.startswith("&lt;")
+    assert rows["eddies"].chance.startswith("70")
+    assert rows["wind"].chance == ""
     assert told(a_diagnosis()).flagged[0].measured == "0.500"
+
+
+def test_what_a_later_step_accepts_has_its_chance() -> None:
+    second = Step("mixing[D3]", ("mixing[D3]",), (1.0,), (("mixing[D3]",),), 9.0, 1.0, 0.0)
+    found = replace(a_diagnosis(), steps=(*a_diagnosis().steps, second))
+    assert found.chances == {"eddies": 0.7, "mixing[D3]": 1.0}
+    assert found.set == ["eddies", "mixing[D3]"]
 
 
 def test_profiles_show_both_predictions_and_what_they_leave() -> None:

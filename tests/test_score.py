@@ -66,25 +66,25 @@ def test_family_wise_chances_are_uniform_under_the_null(problem: tuple[np.ndarra
     assert scipy.stats.kstest(chances, "uniform").pvalue > 1e-3
 
 
-def test_what_is_true_is_among_the_rivals(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    """One of eight effects, two of them almost alike, of any length: sets of 95 % hold it as often as they say."""
+def test_the_likeliest_rival_is_true_as_often_as_told(
+    problem: tuple[np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Eight effects that look alike, traces without error, lengths from 3 to 9: told 0.79, true 0.81.
+
+    With half or twice the exponent 0.62 and 0.89 are told.
+    """
+    monkeypatch.setattr(score, "TRACE_ERROR", 0.0)
     slopes, prints = problem
-    random, tries = np.random.default_rng(12), 600
-    prints[:, 1] = prints[:, 0] + 0.3 * prints[:, 1]
+    random, tries = np.random.default_rng(12), 2000
+    prints = prints[:, :1] + 0.6 * prints
     projected = score.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    family = [np.array([j]) for j in range(PRINTS)]
-    said, held, sizes = 0.0, 0, []
+    told, right = 0.0, 0
     for _ in range(tries):
         true, length = int(random.integers(PRINTS)), random.uniform(3.0, 9.0)
         residual = length * projected.units[:, true] + random.standard_normal(ROWS + SLOPES)
-        found = projected.units.T @ residual
-        chance = score.chances_of_rivals(found**2)
-        kept = [j for group in score.likely(projected, family, chance, 0.95) for j in group]
-        said, held = said + chance[kept].sum(), held + (true in kept)
-        sizes.append(len(kept))
-    assert said >= 0.95 * tries
-    assert held >= said - 4.0 * np.sqrt(0.05 * tries)
-    assert np.mean(sizes) < 3.0, "eight would hold everything and say nothing"
+        chance = score.chances_of_rivals((projected.units.T @ residual) ** 2)
+        told, right = told + chance.max(), right + (int(np.argmax(chance)) == true)
+    assert told == pytest.approx(right, abs=0.03 * tries)
 
 
 def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
@@ -92,6 +92,14 @@ def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
     assert score.chances_of_rivals(np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert score.chances_of_rivals(np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert score.chances_of_rivals(np.array([46.0, 9.0]))[1] < 1e-5
+
+
+def test_the_fewest_groups_hold_what_is_asked() -> None:
+    chance = np.array([0.5, 0.04, 0.3, 0.16])
+    assert score.fewest([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]
+    assert score.fewest([[3], [2], [0, 1]], chance, 0.6) == [[0, 1], [2]]
+    assert score.fewest([[0], [1], [2], [3]], chance, 0.95) == [[0], [2], [3]]
+    assert score.fewest([[0], [1], [2], [3]], chance, 0.97) == [[0], [2], [3], [1]]
 
 
 def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:

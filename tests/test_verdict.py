@@ -68,7 +68,7 @@ def test_a_set_of_more_than_three_groups_tells_nothing(rivals: list[str], verdic
 def test_rivals_are_told_with_their_chances() -> None:
     both = Step("a", ("a", "b", "c"), (0.5, 0.3, 0.16), (("a", "b"), ("c",)), 200.0, 5.0, 1e-4)
     sentence = said([both], [a_suspect(name) for name in "abc"], None, FITS)[1]
-    assert "the same trace in these data as b, with a chance of 80%, or else c (16%)" in sentence
+    assert "trace in these data as b, together with a chance of 80% among those calibrated, or else c (16%)" in sentence
 
 
 def test_an_implausible_size_is_remarked() -> None:

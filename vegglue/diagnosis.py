@@ -61,7 +61,7 @@ class Step:
     """One round of the search: what was accepted, what it may be instead, chi2 before and after.
 
     rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
-    one of those refitted.
+    one of those that were refitted.
     """
 
     accepted: str
@@ -138,12 +138,10 @@ class Diagnosis:
 
     @property
     def chances(self) -> dict[str, float]:
-        """Chance of each effect of the set, in the first step that names it."""
-        found: dict[str, float] = {}
-        for step in self.steps:
-            for name, chance in step.chance.items():
-                found.setdefault(name, chance)
-        return found
+        """Chance of each effect of the set, in the step that accepted it or the first that names it."""
+        own = {step.accepted: step.chance[step.accepted] for step in self.steps}
+        first = {name: chance for step in reversed(self.steps) for name, chance in step.chance.items()}
+        return {name: (first | own)[name] for step in self.steps for name in step.rivals}
 
     @property
     def groups(self) -> list[list[str]]:

@@ -24,10 +24,10 @@ class SuspectRow:
     name: str
     title: str
     standing: str
-    share: str
+    chance: str
     amplitude: str
     interval: str
-    chance: str
+    p_family: str
     score: str
     visibility: str
     detectable: str
@@ -70,14 +70,14 @@ def told(diagnosis: Diagnosis) -> Told:
 
 
 def standing(diagnosis: Diagnosis, suspect: Suspect) -> str:
-    """'accepted', 'rival' (may be it instead of an accepted one), 'rejected', 'no sign' or 'untestable'."""
+    """'accepted', 'rival' (may be it instead of an accepted one), 'less likely', 'no sign' or 'untestable'."""
     if suspect.name in [step.accepted for step in diagnosis.steps]:
         return "accepted"
     if suspect.name in diagnosis.set:
         return "rival"
     if not suspect.testable:
         return "untestable"
-    return "rejected" if abs(first_score(diagnosis, suspect)) > diagnosis.threshold else "no sign"
+    return "less likely" if abs(first_score(diagnosis, suspect)) > diagnosis.threshold else "no sign"
 
 
 def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
@@ -92,7 +92,7 @@ def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
 
 def ranked(diagnosis: Diagnosis) -> list[Suspect]:
     """Accepted, then rivals, then the others, each by its first score; those nobody could see last."""
-    order = ("accepted", "rival", "rejected", "no sign", "untestable")
+    order = ("accepted", "rival", "less likely", "no sign", "untestable")
     return sorted(
         diagnosis.suspects,
         key=lambda one: (order.index(standing(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
@@ -128,10 +128,10 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         name=html.escape(suspect.name),
         title=html.escape(suspect.title),
         standing=standing(diagnosis, suspect),
-        share=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
+        chance=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
         amplitude=short(suspect.amplitude, 3) + unit,
         interval=interval(*suspect.interval95),
-        chance=chance(suspect.p_family),
+        p_family=p_value(suspect.p_family),
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(suspect.visibility, 2),
         detectable=short(suspect.smallest_detectable, 2) + unit,
@@ -139,7 +139,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     )
 
 
-def chance(p: float) -> str:
+def p_value(p: float) -> str:
     """A p-value, never more precise than a bootstrap of some thousands is."""
     return f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
 

@@ -23,7 +23,7 @@ from vegglue.typography import fixed
 MARKS: dict[str, tuple[str, str, str]] = {
     "accepted": ("o", "measured", "measured"),
     "rival": ("D", "measured", "measured"),
-    "rejected": ("X", "ink", "ink"),
+    "less likely": ("X", "ink", "ink"),
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
 }

@@ -25,7 +25,7 @@ from vegglue.linearise import Model, fingerprint, model_of, theta_at, z_at
 from vegglue.observations import read_observations
 from vegglue.prune import NEEDED
 from vegglue.schema import Case
-from vegglue.store import diagnosis_that_fits, read_diagnosis, read_posterior, stored_hash, write_diagnosis
+from vegglue.store import diagnosis_that_fits, read_posterior, stored_hash, write_diagnosis
 from vegglue.suspects import SURE
 from vegglue.text_files import write_text
 from vegglue.workings import amplitude_of, effect_of
@@ -94,8 +94,9 @@ def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None
 def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
     """The diagnosis of a case: the one in its folder when it fits, else a new one, which is kept there."""
     path, wanted = folder / "diagnosis.h5", case_hash(case)
-    if stored_hash(path) == wanted:
-        return read_diagnosis(path, wanted)
+    kept = diagnosis_that_fits(path, wanted)
+    if kept is not None:
+        return kept
     found = diagnose(model_in(case), known_place(case, folder), jobs, say)
     write_diagnosis(path, found, resolved_yaml(case), wanted)
     save_diagnosis_figure(found, case, folder / "diagnosis.png")

@@ -23,9 +23,9 @@ from vegglue.verdict import MOST_GROUPS
 REFITTED, REFIT_STEPS = 6, 8
 # Scores this much below the best one's (in squares, and as a share of it) are not refitted.
 BEHIND, BEHIND_SHARE = 15.0, 0.45
-# Share of the chances that the rivals kept hold together, and the part of the best one's chance below which a rival is
-# not kept: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
-HELD, HARDLY = 0.95, 0.05
+# Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
+# others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
+IN_SET, HARDLY = 0.95, 0.05
 
 
 @dataclass(frozen=True)
@@ -75,18 +75,18 @@ def accepted(seen: Look, refits: list[Refit], later: bool, say: Callable[[str], 
 
 
 def _rivals(seen: Look, refits: list[Refit], fall: Array) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """The chance of each refit in the fewest groups that hold HELD of it, the likeliest first, and these groups.
+    """The chance of each refit in the fewest groups that hold IN_SET of it, the likeliest first, and these groups.
 
     fall (k,): by how much each lowers the objective.
     """
+    columns, names = [one.column for one in refits], [one.candidate.name for one in refits]
     chance = score.chances_of_rivals(fall)
-    columns = [one.column for one in refits]
-    of_columns = np.zeros(seen.scores.size)
-    of_columns[columns] = np.where(chance < HARDLY * chance.max(), 0.0, chance)
-    kept = score.likely(seen.projected, [np.array([column]) for column in columns], of_columns, HELD)
-    groups = tuple(tuple(refits[j].candidate.name for j in group) for group in kept)
-    found = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
-    return {refits[j].candidate.name: float(chance[j]) for j in found}, groups
+    near = chance >= HARDLY * chance.max()
+    alike = np.where(near & near[:, None], score.cosines(seen.projected)[np.ix_(columns, columns)], 0.0)
+    linked = [[int(j) for j in group] for group in score.groups([str(j) for j in range(len(refits))], alike)]
+    kept = score.fewest(linked, chance, IN_SET)
+    likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
+    return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
 
 def _onward(seen: Look, best: Refit) -> Baseline | None:
@@ -128,4 +128,3 @@ def _refit(seen: Look, candidate: int) -> Refit | None:
     fitted = fit(model, noise, start, REFIT_STEPS)
     amplitude, low, high = interval95(model, fitted, one.parameter)
     return Refit(one, column, fitted, amplitude, (low, high))
-

@@ -71,10 +71,11 @@ def chances_of_rivals(fall: Array) -> Array:
 
         p_j ~ exp(-(max F - F_j) / 2 w_j),    w_j = 1 + TRACE_ERROR^2 F_j
 
-    fall (k,): F, by how much j lowers the least objective: the square of what it explains, in standard errors. All are
-    as likely before and have one parameter more (Schwarz 1978, doi:10.1214/aos/1176344136; not checked against it).
-    The trace of j in nature is not quite the model's, whose cells and laws are not nature's: where it parts from that
-    of the best, errors are as if w_j^(1/2) times as large.
+    fall (k,): F, by how much j lowers the least objective: about the square of what it explains, in standard errors.
+    All are as likely before; what separates them beside F, the settings tried and the widths of priors and posteriors,
+    is left out, as by Schwarz (1978, doi:10.1214/aos/1176344136; not checked against it). The trace of j in nature is
+    not quite the model's, whose cells and laws are not nature's: where it parts from that of the best, errors are as if
+    w_j^(1/2) times as large.
     """
     weight = np.exp(-0.5 * (fall.max() - fall) / (1.0 + TRACE_ERROR**2 * np.maximum(fall, 0.0)))
     return np.asarray(weight / weight.sum())
@@ -105,9 +106,14 @@ def likely(projected: Projected, family: Sequence[np.ndarray], chance: Array, le
     possible = [int(j) for j in np.argsort(-of_family) if of_family[j] > 0]
     units = projected.units[:, [int(family[j][np.argmax(chance[family[j]])]) for j in possible]]
     found = [[int(j) for j in group] for group in groups([str(j) for j in possible], units.T @ units)]
-    found.sort(key=lambda group: -of_family[group].sum())
-    held = np.cumsum([of_family[group].sum() for group in found])
-    return found[: int(np.searchsorted(held, level)) + 1]
+    return fewest(found, of_family, level)
+
+
+def fewest(found: Sequence[list[int]], chance: Array, level: float) -> list[list[int]]:
+    """The fewest groups that hold a chance of `level` together, likelier ones first; chance (k,): of each member."""
+    ranked = sorted(found, key=lambda group: -chance[group].sum())
+    held = np.cumsum([chance[group].sum() for group in ranked])
+    return ranked[: int(np.searchsorted(held, level)) + 1]
 
 
 def cosines(projected: Projected) -> Array:

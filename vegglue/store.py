@@ -145,15 +145,20 @@ def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
 
 
 def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
-    """The diagnosis of exactly this config, None when there is none or only one of another state of it."""
-    return read_diagnosis(path) if stored_hash(path) == config_hash else None
+    """The diagnosis of exactly this config, None when there is none or only one of another state or another format."""
+    fits = stored_hash(path) == config_hash and _stored(path, "format") == DIAGNOSIS_FORMAT
+    return read_diagnosis(path) if fits else None
 
 
 def stored_hash(path: Path) -> str | None:
     """Config hash a result file was made from, or None when there is no readable file."""
+    return _stored(path, "config_hash")
+
+
+def _stored(path: Path, attribute: str) -> str | None:
     try:
         with h5py.File(path, "r") as file:
-            return str(file.attrs["config_hash"])
+            return str(file.attrs[attribute])
     except (OSError, KeyError):
         return None
 

@@ -17,6 +17,8 @@ from vegglue.noise import Noise
 MOST_GROUPS = 3
 # Chance of the last misfit under errors alone, below which something is still missing.
 POOR = 1e-3
+# Chance of what is named, below which it is told.
+SURE = 0.995
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
 STRETCHED = 3.0
 # Names that a remark holds at most.
@@ -68,7 +70,8 @@ def judged(
         return _without_steps(suspects, fit, remarks)
     if len(steps[0].groups) > MOST_GROUPS:
         names = ", ".join(_likely(steps[0], steps[0].rivals))
-        return "cannot-tell", f"Something is missing, but these data cannot tell which of {names} it is.", remarks
+        which = f"which of {names} it is (chances among those calibrated)"
+        return "cannot-tell", f"Something is missing, but these data cannot tell {which}.", remarks
     if fit.p < POOR:
         remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {fit.p:.1g}).")
     sentences = " and ".join(_step_words(step, suspects) for step in steps)
@@ -109,18 +112,15 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     low, high = best.interval95
     unit = "" if best.unit == "-" else f" {best.unit}"
     words = f"{step.accepted} of {best.amplitude:.3g}{unit} ({low:.3g} to {high:.3g}; {best.title.lower()})"
-    others = [name for name in step.rivals if name != step.accepted]
-    if not others:
-        return words
-    alike = next((group for group in step.groups if step.accepted in group and len(group) > 1), ())
-    same = [name for name in others if name in alike]
-    rest = [name for name in others if name not in alike]
+    alike = next(group for group in step.groups if step.accepted in group)
+    same = [name for name in alike if name != step.accepted]
+    rest = [name for name in step.rivals if name not in alike]
+    own = sum(step.chance[name] for name in alike)
     if same:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
-    if rest:
-        own = sum(step.chance[name] for name in (step.accepted, *same))
-        words += f", with a chance of {own:.0%}, or else {' or '.join(_likely(step, rest))}"
-    return words
+    if rest or own < SURE:
+        words += f", {'together ' if same else ''}with a chance of {own:.0%} among those calibrated"
+    return words + (f", or else {' or '.join(_likely(step, rest))}" if rest else "")
 
 
 def _likely(step: Step, names: Sequence[str]) -> list[str]:
