@@ -74,7 +74,7 @@ def judged(
         return "cannot-tell", f"Something is missing, but these data cannot tell {which}.", remarks
     if fit.p < POOR:
         remarks.append(f"The misfit that is left is still larger than the errors allow ({fit}, p = {fit.p:.1g}).")
-    sentences = " and ".join(_step_words(step, suspects) for step in steps)
+    sentences = "; and ".join(_step_words(step, suspects) for step in steps)
     single = all(len(step.rivals) == 1 for step in steps)
     return ("identified" if single else "one-of"), f"Missing: {sentences}; {fit} with it.", remarks
 
