@@ -281,6 +281,14 @@ def test_parameter_at_a_bound_is_named(true_a: float, side: int, word: str) -> N
     assert any(f"a presses against the {word} bound" in sentence for sentence in describe(posterior))
 
 
+def test_parameter_settled_near_a_bound_is_no_hit() -> None:
+    """Three standard deviations off a bound, all of it within 2 % of the prior's range of that bound."""
+    design = SIGMA * np.diag(1 / np.array([0.003, 0.4, 0.4]))
+    posterior = infer(stations(design @ [0.009, 0.5, 0.0], SIGMA), design, members=8192, sigma="known")
+    assert posterior.bound_mass["a"][0] > 0.95
+    assert not posterior.bound_hit["a"].any()
+
+
 def test_few_effective_members_claim_no_posterior(toy: Posterior) -> None:
     few = infer(stations(measured(), SIGMA), members=512, sigma="known")
     assert few.effective_size < 100 < toy.effective_size

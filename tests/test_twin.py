@@ -193,6 +193,8 @@ def test_the_folder_of_a_twin(ground: Ground, tmp_path: Path) -> None:
     station, answer = measured(ground, ["viscosity"], 6.0, "white", 1)
     target = write_twin(ground.model.case, tmp_path / "Riddle 1", station, sealed(answer))
     assert config_in(tmp_path / "Riddle 1") == target
+    target.with_name("riddle-1+viscosity.yaml").touch()
+    assert config_in(tmp_path / "Riddle 1") == target, "beside a child that `run` has written"
     model = model_in(load_case(target))
     assert model.case.name == "riddle-1"
     assert model.station["value"].to_numpy() == pytest.approx(station["value"].to_numpy(), abs=6e-6)

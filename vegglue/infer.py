@@ -19,6 +19,7 @@ from vegglue.observations import Observations
 from vegglue.posterior import (
     CHAINS,
     DRAWS,
+    ENDS,
     IDENTIFIED_BELOW,
     LEVELS,
     NEAR_BOUND,
@@ -112,7 +113,8 @@ def marginals(theta: dict[str, Floats], case: Case, weights: Floats) -> dict[str
     prior_quantiles = {name: quantile(priors[name], LEVELS) for name in theta}
     prior_range = {name: _range(_seen(prior_quantiles[name], priors[name])) for name in theta}
     ratio = {name: _range(weighted_quantile(seen[name], weights, LEVELS)) / prior_range[name] for name in theta}
-    mass = {name: _mass_near_bounds(seen[name], weights, priors[name]) for name in theta}
+    ends = {name: _seen(quantile(priors[name], (0.0, 1.0)), priors[name]) for name in theta}
+    mass = {name: _mass_near_bounds(seen[name], weights, ends[name]) for name in theta}
     return {
         "parameters": tuple(theta),
         "unit": {name: priors[name].unit for name in theta},
@@ -128,7 +130,10 @@ def marginals(theta: dict[str, Floats], case: Case, weights: Floats) -> dict[str
         "identified": {name: ratio[name] < IDENTIFIED_BELOW for name in theta},
         "bounds": {name: quantile(priors[name], (0.0, 1.0)) for name in theta},
         "bound_mass": mass,
-        "bound_hit": {name: mass[name] > _pressing_mass(effective_size(weights)) for name in theta},
+        "bound_hit": {
+            name: (mass[name] > _pressing_mass(effective_size(weights))) & _ended(seen[name], weights, ends[name])
+            for name in theta
+        },
     }
 
 
@@ -161,13 +166,20 @@ def _sd(values: Floats, weights: Floats) -> float:
     return float(np.sqrt(weighted_covariance(values[:, None], weights)[0, 0]))
 
 
-def _mass_near_bounds(seen: Floats, weights: Floats, prior: Parameter) -> Floats:
+def _mass_near_bounds(seen: Floats, weights: Floats, ends: Floats) -> Floats:
     """Posterior mass within NEAR_BOUND of the prior's range of its low and high bound [-]; NaN without both bounds."""
-    low, high = _seen(quantile(prior, (0.0, 1.0)), prior)
+    low, high = ends
     near = NEAR_BOUND * (high - low)
     if not np.isfinite(near):
         return np.full(2, np.nan)
     return np.array([weights[seen < low + near].sum(), weights[seen > high - near].sum()])
+
+
+def _ended(seen: Floats, weights: Floats, ends: Floats) -> np.ndarray:
+    """Whether each bound, and not the data, ends the 95 % range: the range begins within ENDS of its length of it."""
+    quantiles = weighted_quantile(seen, weights, LEVELS)
+    apart = np.abs(quantiles[[0, -1]] - ends)
+    return np.asarray(apart <= ENDS * (quantiles[-1] - quantiles[0]))
 
 
 def _pressing_mass(effective: float) -> float:

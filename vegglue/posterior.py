@@ -14,6 +14,8 @@ LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # of all quantiles and bands: the 95 %
 IDENTIFIED_BELOW = 0.5  # 95 % range of the posterior over that of the prior
 NEAR_BOUND = 0.02  # of the range of the prior
 PRESSES_ABOVE = 0.05  # posterior mass near a bound, at least; a parameter left at its prior has 0.02
+# Of the 95 % range, how far from a bound that ends it: 0.014 for half a normal at it, 0.09 for one two deviations off.
+ENDS = 0.05
 CHAINS, DRAWS = 4, 500  # equal-weight draws for ArviZ
 OWN_UNIT = "that of the parameter, see `unit`"
 ByParameter = Annotated[dict[str, float], Stored(("parameter",), OWN_UNIT)]

@@ -42,8 +42,9 @@ def _stations(used: pd.DataFrame, kind: str) -> str:
 
 
 def config_in(folder: Path) -> Path:
-    """The config that `write_twin` left there. Errors: InputError when there is not exactly one."""
-    found = sorted(folder.glob("*.yaml"))
+    """The config that `write_twin` left there, beside its children maybe. Errors: InputError when it cannot be told."""
+    own = folder / f"{case_name(folder.resolve().name, 'twin')}.yaml"
+    found = [own] if own.is_file() else sorted(folder.glob("*.yaml"))
     if len(found) != 1:
         raise InputError(f"{folder}: expected one config, got {len(found)}; `vegglue twin --to {folder}` writes it.")
     return found[0]
