@@ -21,9 +21,9 @@ from vegglue.observations import read_observations
 from vegglue.simulate import chunk_size, simulate
 from vegglue.store import read_ensemble
 
-# So many that a run is still on its way when it is stopped, on a busy machine too.
-CHUNKS = 8
-CHUNK = chunk_size(2048)
+# So many that a run is still on its way when it is stopped, on a busy machine too: some second.
+CHUNKS = 16
+CHUNK = chunk_size(4096)
 ENSEMBLE = Path("runs/brook/ensemble.h5")
 PART = Path("runs/brook/ensemble.h5.part")
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
@@ -111,7 +111,16 @@ def test_the_numbers_do_not_depend_on_the_number_of_jobs(tmp_path: Path, uninter
     assert len(np.unique(ensemble.prediction[:, 0])) == CHUNKS * CHUNK
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What is started heeds Ctrl-C even where a shell in the background has the tests ignore it, and all they start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)
     with running(tmp_path, "simulate", config.name, "--jobs", 1) as process:
