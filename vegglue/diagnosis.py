@@ -141,7 +141,8 @@ class Diagnosis:
         """Chance of each effect of the set, in the step that accepted it or the first that names it."""
         own = {step.accepted: step.chance[step.accepted] for step in self.steps}
         first = {name: chance for step in reversed(self.steps) for name, chance in step.chance.items()}
-        return {name: (first | own)[name] for step in self.steps for name in step.rivals}
+        told = first | own
+        return {name: told[name] for step in self.steps for name in step.rivals}
 
     @property
     def groups(self) -> list[list[str]]:

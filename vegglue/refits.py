@@ -83,8 +83,7 @@ def _rivals(seen: Look, refits: list[Refit], fall: Array) -> tuple[dict[str, flo
     chance = score.chances_of_rivals(fall)
     near = chance >= HARDLY * chance.max()
     alike = np.where(near & near[:, None], score.cosines(seen.projected)[np.ix_(columns, columns)], 0.0)
-    linked = [[int(j) for j in group] for group in score.groups([str(j) for j in range(len(refits))], alike)]
-    kept = score.fewest(linked, chance, IN_SET)
+    kept = score.fewest(score.groups(range(len(refits)), alike), chance, IN_SET)
     likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 

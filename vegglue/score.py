@@ -6,10 +6,13 @@ prior stand below those of the data, so that a calibrated parameter is as free a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from vegglue.effect import Array
+
+Name = TypeVar("Name", str, int)
 
 DRAWS = 3000
 # Relative error of a trace: between cells of one size and of two thirds of it, those of mixing changed by 10 to 25 %.
@@ -105,8 +108,7 @@ def likely(projected: Projected, family: Sequence[np.ndarray], chance: Array, le
     of_family = np.array([chance[columns].sum() for columns in family])
     possible = [int(j) for j in np.argsort(-of_family) if of_family[j] > 0]
     units = projected.units[:, [int(family[j][np.argmax(chance[family[j]])]) for j in possible]]
-    found = [[int(j) for j in group] for group in groups([str(j) for j in possible], units.T @ units)]
-    return fewest(found, of_family, level)
+    return fewest(groups(possible, units.T @ units), of_family, level)
 
 
 def fewest(found: Sequence[list[int]], chance: Array, level: float) -> list[list[int]]:
@@ -121,8 +123,8 @@ def cosines(projected: Projected) -> Array:
     return np.asarray(projected.units.T @ projected.units)
 
 
-def groups(names: Sequence[str], cosine: Array) -> list[list[str]]:
-    """Names that the data cannot tell apart, linked where |cosine| > ALIKE."""
+def groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
+    """Names, or numbers, that the data cannot tell apart, linked where |cosine| > ALIKE."""
     left, found = list(range(len(names))), []
     while left:
         group, grown = [left.pop(0)], True
