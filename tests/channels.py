@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue import roughness
+from vegglue.effect import Acting, Ground
+from vegglue.effects import library
 from vegglue.flow import LEVEL, Array, Inflow, Plants, Problem, faces, take
 from vegglue.start import backwater
 from vegglue.steady import newton
@@ -61,6 +63,30 @@ def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple
     x, y = centres(length, cells[0]), centres(2.0 * half_width, cells[1]) - half_width
     bed = -0.001 * x[:, None] + np.maximum(np.abs(y) - 1.5, 0.0)[None] / 1.5
     return bed, np.repeat((np.abs(y) > 1.5).astype(np.int64)[None], cells[0], axis=0)
+
+
+def even_ground(bed: Array, banks: Array, cell: tuple[float, float]) -> Ground:
+    """What effects are told of the paper's section, y = 0 on its axis; nothing of plants."""
+    nx, ny = bed.shape
+    nothing = np.zeros((nx, ny, 1))
+    far = nothing + np.inf
+    return Ground(
+        x=centres(nx * cell[0], nx)[:, None, None], y=(centres(ny * cell[1], ny) - 0.5 * ny * cell[1])[None, :, None],
+        dx=cell[0], dy=cell[1], bed=bed[..., None], offset=nothing, half_width=nothing + 1.5, side_slope=nothing,
+        bank=banks[..., None].astype(float), planted=nothing, front=far, edge=far, wake=far, patch=nothing - 1.0,
+    )  # fmt: skip
+
+
+def mixed(problem: Problem, length: float, tolerance: float) -> tuple[Problem, Array]:
+    """With a mixing length, and its steady state, reached by shorter ones: from none at once Newton stops."""
+    state = solved(problem, tolerance)
+    for share in (0.4, 0.7, 1.0) if length else ():
+        mixing = Acting(library()["mixing_length"], {"length": np.array([share * length])})
+        problem = replace(problem, acting=(mixing,))
+        solution = newton(problem, state, tolerance)
+        assert solution.converged[0]
+        state = solution.state
+    return problem, state
 
 
 def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: object) -> Problem:

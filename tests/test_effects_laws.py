@@ -15,7 +15,7 @@ LINE = np.arange(-2.0, 3.0)
 
 def filled(kind, given, shape):
     """A noun with some fields given, 0 in all others, of one shape; numbers and parts of it as they are."""
-    kept = {name: given[name] for name in ("dx", "dy", "ground", "viscosity") if name in given}
+    kept = {name: given[name] for name in ("dx", "dy", "ground", "viscosity", "shear_depth") if name in given}
     names = [item.name for item in fields(kind) if item.name not in kept]
     return kept | {name: np.broadcast_to(np.asarray(given.get(name, 0.0), float), shape) for name in names}
 
@@ -29,6 +29,7 @@ def cells(u=0.0, v=0.0, on=None, **given):
     x, y = 0.5 * LINE[:, None, None], 0.25 * LINE[None, :, None]
     u, v = (value(x, y) if callable(value) else value for value in (u, v))
     settings = {"depth": 0.8, "rate": 0.1, "bed_rate": 0.05, "u": u, "v": v, "viscosity": np.array([0.01])}
+    settings["shear_depth"] = np.zeros((0, 0, 0))
     return Cells(**filled(Cells, settings | {"ground": on or ground()} | given, (5, 5, 1)))
 
 

@@ -1,6 +1,6 @@
 """Against flows that other codes computed. Their files lie in a folder `shared` beside the repository, else: skipped.
 
-open-a: an explicit finite-volume code, truth given. delft3d: Delft3D-FLOW 6.04 on the channel of the paper.
+open-a, open-e: an explicit finite-volume code, truth given. delft3d: Delft3D-FLOW 6.04 on the channel of the paper.
 """
 
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, make_problem, solved, trapezoid
+from channels import centres, even_ground, make_problem, mixed, solved, trapezoid
 
 from vegglue import roughness
 from vegglue.flow import LEVEL, Plants, faces
@@ -35,16 +35,12 @@ def patch_cells(x, y, patches):
     return *np.concatenate(found, axis=1), number
 
 
-def test_true_parameters_reproduce_the_holdout():
-    """Root mean square difference at 105 stations: measured 0.0063 m/s, floor 0.004, banks 0.007.
-
-    On cells as coarse as these the other code is 0.006 m/s (inside) and 0.016 (banks) from its own result.
-    """
-    folder = CASES / "open-a"
-    place, truth = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
-    truth, run = truth["truth"], place["holdout"]["hold"]
-    cells = (200, 24)
-    grid = Grid(centres(100.0, cells[0]), centres(9.0, cells[1]) - 4.5, *CELL)
+def with_the_truth(folder, finer, smaller):
+    """The fourth flow of a case with its true parameters, on the paper's cells or cells `finer` times smaller."""
+    place, answer = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
+    truth, run = answer["truth"], place["holdout"]["hold"]
+    cells, size = (200 * finer, 24 * finer), (CELL[0] / finer, CELL[1] / finer)
+    grid = Grid(centres(100.0, cells[0]), centres(9.0, cells[1]) - 4.5, *size)
     bed, banks = trapezoid(100.0, 4.5, cells)
     column, row, number = patch_cells(grid.x, grid.y, place["patches"])
     stems = np.array([patch["stems_per_m2"] for patch in place["patches"]])[number][:, None]
@@ -56,14 +52,47 @@ def test_true_parameters_reproduce_the_holdout():
         "plants": plants,
         "viscosity": np.array([truth["nu"]]),
         "film": 0.002,
+        "smaller_shear_depth": smaller,
+        "ground": even_ground(bed, banks, size),
     }
-    problem = make_problem(bed, CELL, run["discharge_m3_s"], run["downstream_level_m"], **changes)
+    problem = make_problem(bed, size, run["discharge_m3_s"], run["downstream_level_m"], **changes)
+    return grid, *mixed(problem, answer["settings"].get("mixk", 0.0), 1e-8)
+
+
+@pytest.mark.parametrize(
+    ("case", "finer", "smaller", "everywhere", "inside"),
+    [
+        ("open-a", 1, False, 0.009, 0.005),
+        ("open-e", 1, False, 0.009, 0.005),
+        pytest.param("open-a", 2, False, 0.005, 0.0035, marks=pytest.mark.slow),
+        pytest.param("open-e", 2, False, 0.012, 0.006, marks=pytest.mark.slow),
+        ("open-a", 1, True, 0.009, 0.005),
+        ("open-e", 1, True, 0.009, 0.005),
+        pytest.param("open-a", 2, True, 0.005, 0.003, marks=pytest.mark.slow),
+        pytest.param("open-e", 2, True, 0.005, 0.004, marks=pytest.mark.slow),
+    ],
+)
+def test_true_parameters_reproduce_the_holdout(case, finer, smaller, everywhere, inside):
+    """Root mean square difference [m/s] at 105 stations, and at those within 2 m of the axis, measured:
+
+        cells [m]        shear over the depth between    over the smaller one, as in the other code
+                         open-a         open-e           open-a         open-e
+        0.5 x 0.375      0.0063 0.0046  0.0060 0.0043    0.0061 0.0031  0.0071 0.0048
+        0.25 x 0.1875    0.0045 0.0032  0.0109 0.0053    0.0025 0.0024  0.0042 0.0035
+
+    The finer cells are those of the other code, which takes the depth at a face from the higher bed (hydrostatic
+    reconstruction, Audusse et al. 2004, doi:10.1137/S1064827503431090). Why open-e gets worse with the depth between:
+    `test_independent_cells`. On cells of the coarser size the other code is 0.006 (inside) and 0.016 m/s (banks) from
+    its own result, on cells of half the finer size 0.002 and 0.003 m/s (open-a).
+    """
+    folder = CASES / case
+    grid, problem, state = with_the_truth(folder, finer, smaller)
     station = pd.read_csv(folder / "holdout.csv").assign(kind="velocity")
-    read = read_sensors(problem, solved(problem, 1e-8), grid, station, ()).prediction[0]
-    difference, floor = (read - station["u"]).to_numpy(), (station["y"].abs() < 1.5).to_numpy()
-    print(f"open-a holdout: root mean square difference {rms(difference):.4f} m/s", end=" ")
-    print(f"(floor {rms(difference[floor]):.4f}, banks {rms(difference[~floor]):.4f})")
-    assert rms(difference) <= 0.009
+    read = read_sensors(problem, state, grid, station, ()).prediction[0]
+    difference, near = (read - station["u"]).to_numpy(), (station["y"].abs() <= 2.0).to_numpy()
+    print(f"{case}, dx {grid.dx} m, smaller: {smaller}: {rms(difference):.4f} m/s, near {rms(difference[near]):.4f}")
+    assert rms(difference) <= everywhere
+    assert rms(difference[near]) <= inside
 
 
 SEVEN = [{"x": (55.0 + 8.0 * n, 59.0 + 8.0 * n), "y": (6.0, 7.5) if n % 2 == 0 else (7.5, 9.0)} for n in range(7)]

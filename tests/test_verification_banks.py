@@ -5,18 +5,14 @@
 The reference solves this on 1,900 cells whose outermost ends at the waterline.
 """
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from channels import GRAVITY, centres, make_problem, solved, trapezoid
+from channels import GRAVITY, centres, even_ground, make_problem, mixed, trapezoid
 from scipy.linalg import solve_banded
 
 from vegglue import roughness
-from vegglue.effect import Acting, Ground
-from vegglue.effects import library
-from vegglue.flow import Array, Problem, faces
-from vegglue.steady import newton
+from vegglue.flow import Array, faces
 
 FLOOR, BANK, SLOPE, DEPTH = 0.03, 0.3, 0.001, 1.1
 LENGTH, COLUMNS = 1500.0, 60
@@ -46,13 +42,7 @@ def across(viscosity: float, length: float, cells: int = 1900) -> tuple[Array, f
 def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[Array, float]:
     """u [m/s] at the stations in the middle of a long reach, and the depth on its floor [m]."""
     bed, banks = trapezoid(LENGTH, 4.5, (COLUMNS, rows))
-    y, nothing = centres(9.0, rows) - 4.5, np.zeros((COLUMNS, rows, 1))
-    far = nothing + np.inf
-    ground = Ground(
-        x=centres(LENGTH, COLUMNS)[:, None, None], y=y[None, :, None], dx=LENGTH / COLUMNS, dy=9.0 / rows,
-        bed=bed[..., None], offset=nothing, half_width=nothing + 1.5, side_slope=nothing,
-        bank=banks[..., None].astype(float), planted=nothing, front=far, edge=far, wake=far, patch=nothing - 1.0,
-    )  # fmt: skip
+    y = centres(9.0, rows) - 4.5
     problem = make_problem(
         bed,
         (LENGTH / COLUMNS, 9.0 / rows),
@@ -63,22 +53,11 @@ def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[
         friction_class=banks,
         viscosity=np.array([viscosity]),
         film=0.01,
-        ground=ground,
+        ground=even_ground(bed, banks, (LENGTH / COLUMNS, 9.0 / rows)),
     )
-    found, i = faces(problem, _mixed(problem, length)), COLUMNS // 2
+    found, i = faces(*mixed(problem, length, 1e-6)), COLUMNS // 2
     u = np.interp(STATIONS, y, found.u[i, :, 0])
     return u, float(found.cell[i, rows // 2, 0])
-
-
-def _mixed(problem: Problem, length: float) -> Array:
-    """The steady state with a mixing length, reached by shorter ones: from none at once Newton does not get there."""
-    state = solved(problem, 1e-6)
-    for share in (0.4, 0.7, 1.0) if length else ():
-        mixing = Acting(library()["mixing_length"], {"length": np.array([share * length])})
-        solution = newton(replace(problem, acting=(mixing,)), state, 1e-6)
-        assert solution.converged[0]
-        state = solution.state
-    return state
 
 
 @pytest.mark.slow

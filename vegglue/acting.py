@@ -63,17 +63,23 @@ def stand_values(
 
 
 def closures(
-    acting: tuple[Acting, ...], ground: Ground, state: Array, depth: Array, rates: tuple[Array, Array], viscosity: Array
+    acting: tuple[Acting, ...],
+    ground: Ground,
+    state: Array,
+    depth: Array,
+    rates: tuple[Array, Array],
+    viscosity: Array,
+    smaller_shear_depth: bool,
 ) -> Closures:
     """All that the stages resistance, exchange and force hand on; rates: of friction, and the part of the bed."""
-    rate, bed_rate = rates
+    rate, _ = rates
     nx = state.shape[0]
     found: dict[str, Array] = {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         wide = slice(max(first - 1, 0), min(stop + 1, nx))
         inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(part(ground, wide, slice(None)), state, depth, rate, bed_rate, viscosity, wide)
+        cells = _cells(part(ground, wide, slice(None)), state, depth, rates, viscosity, smaller_shear_depth, wide)
         values = applied(acting, "resistance", cells, {"rate": cells.rate})
         cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
         values |= applied(acting, "exchange", cells, {"viscosity": viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
@@ -92,21 +98,28 @@ ZERO, NOTHING = np.zeros(1), np.zeros((0, 0, 0))
 
 
 def _cells(
-    ground: Ground, state: Array, depth: Array, rate: Array, bed_rate: Array, viscosity: Array, columns: slice
+    ground: Ground,
+    state: Array,
+    depth: Array,
+    rates: tuple[Array, Array],
+    viscosity: Array,
+    smaller_shear_depth: bool,
+    columns: slice,
 ) -> Cells:
-    here = state[columns]
+    here, deep, (rate, bed_rate) = state[columns], depth[columns], rates
     before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
     v = 0.5 * here[:, ACROSS]
     v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
     return Cells(
         ground=ground,
-        depth=depth[columns],
+        depth=deep,
         level=here[:, LEVEL],
         u=0.5 * (here[:, ALONG] + before),
         v=v,
         rate=rate[columns],
         bed_rate=bed_rate[columns],
         viscosity=viscosity,
+        shear_depth=np.minimum(deep[:, 1:], deep[:, :-1]) if smaller_shear_depth else NOTHING,
     )
 
 

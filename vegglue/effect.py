@@ -170,7 +170,8 @@ class Ground:
 @dataclass(frozen=True)
 class Cells:
     """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k [1/m], the
-    part of it that is the bed's, and viscosity [m2/s]; gradients [1/s].
+    part of it that is the bed's, and viscosity [m2/s]; gradients [1/s]. shear_depth: by which du/dy weighs what is on
+    either side, (nx, ny - 1, m) [m], or empty.
     """
 
     ground: Ground
@@ -181,6 +182,7 @@ class Cells:
     rate: Array
     bed_rate: Array
     viscosity: Array
+    shear_depth: Array
 
     @property
     def speed(self) -> Array:
@@ -198,6 +200,8 @@ class Cells:
 
     @property
     def u_y(self) -> Array:
+        if self.shear_depth.size:
+            return weighted_across(self.u, self.shear_depth, self.ground.dy)
         return across(self.u, self.ground.dy)
 
     @property
@@ -267,6 +271,16 @@ def across(values: Array, dy: float) -> Array:
     if values.shape[1] < 2:
         return np.zeros_like(values)
     return _slope(values.swapaxes(0, 1), dy).swapaxes(0, 1)
+
+
+def weighted_across(values: Array, weight: Array, dy: float) -> Array:
+    """d/dy, the mean of what is on either side by its weight (nx, ny - 1, m): beside land what is on the wet one."""
+    step, whole = np.zeros_like(values), np.zeros_like(values)
+    weighted = weight * np.diff(values, axis=1)
+    for total, side in ((step, weighted), (whole, weight)):
+        total[:, :-1] += side
+        total[:, 1:] += side
+    return step / (whole * dy)
 
 
 def _slope(values: Array, step: float) -> Array:

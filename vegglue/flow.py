@@ -78,6 +78,7 @@ class Problem:
     film: float = 0.01
     log_argument_minimum: float = 1.3
     phi_proportional: bool = False
+    smaller_shear_depth: bool = False
     lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     source: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     acting: tuple[Acting, ...] = ()
@@ -238,24 +239,20 @@ def storage(problem: Problem, level: Array) -> Array:
 def faces(problem: Problem, state: Array) -> Faces:
     """Depths, velocities and fluxes of a state (nx, 3, ny, m), boundaries included."""
     level = np.ascontiguousarray(state[:, LEVEL])
-    cell, face_x, face_y, corner = kernels.depths(
-        level, problem.bed, problem.lift, problem.reach, problem.outlet_level, problem.film
-    )
+    cell, face_x, face_y, corner = _depths(problem, level)
     u, v = kernels.velocities(state, 0, problem.shape[0], cell, *_side_fluxes(problem, cell))
     return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
 
 
+def _depths(problem: Problem, level: Array) -> tuple[Array, Array, Array, Array]:
+    bed, lift, reach = problem.bed, problem.lift, problem.reach
+    return kernels.depths(level, bed, lift, reach, problem.outlet_level, problem.film, problem.smaller_shear_depth)
+
+
 def bed_drag(problem: Problem, depth: Array) -> Array:
     """k [1/m] of the class laws at cell centres, see `roughness`; depth (nx, ny, m) [m]."""
-    return roughness.class_drag(
-        depth,
-        problem.reach,
-        problem.friction_class,
-        problem.law,
-        problem.coefficient,
-        problem.log_argument_minimum,
-        problem.film,
-    )
+    classes = problem.friction_class, problem.law, problem.coefficient
+    return roughness.class_drag(depth, problem.reach, *classes, problem.log_argument_minimum, problem.film)
 
 
 def drag(problem: Problem, depth: Array, plants: tuple[Array, Array] | None = None) -> Array:
@@ -295,7 +292,8 @@ def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, 
         return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
     of_bed = rate.copy()
     _plant(problem, rate, depth, plants)
-    found = closures(problem.acting, problem.ground, state, depth, (rate, of_bed), problem.viscosity)
+    rates, smaller = (rate, of_bed), problem.smaller_shear_depth
+    found = closures(problem.acting, problem.ground, state, depth, rates, problem.viscosity, smaller)
     return found.rate, found.viscosity, found.momentum
 
 
@@ -321,9 +319,7 @@ def eased(problem: Problem, state: Array, slope: Array) -> Array:
 def face_depths(problem: Problem, state: Array) -> Array:
     """Depths [m] of the faces that velocities of a state stand on, (nx, 3, ny, m); infinite where `carry` has none."""
     level = np.ascontiguousarray(state[:, LEVEL])
-    _, along, across, _ = kernels.depths(
-        level, problem.bed, problem.lift, problem.reach, problem.outlet_level, problem.film
-    )
+    _, along, across, _ = _depths(problem, level)
     found = np.full_like(state, np.inf)
     found[:-1, ALONG], found[:, ACROSS, 1:] = along[1:-1], across[:, 1:-1]
     return found
@@ -386,6 +382,7 @@ def _residual(
         problem.outlet,
         problem.outlet_level,
         problem.film,
+        problem.smaller_shear_depth,
         problem.dx,
         problem.dy,
     )
