@@ -1,7 +1,7 @@
 """GLUE against a linear model with Gaussian errors, whose posterior is known in closed form."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -301,6 +301,8 @@ def test_strong_correlation_is_named() -> None:
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
     assert posterior.correlation[0, 1] < -0.7
     assert any("a and b are correlated (-0" in sentence for sentence in describe(posterior))
+    few = replace(posterior, effective_size=2.0)
+    assert not any("are correlated (" in sentence for sentence in describe(few)), "any two members are"
 
 
 def chezy(phi: float, canopy_height: float, depth: float) -> float:

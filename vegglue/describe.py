@@ -96,6 +96,9 @@ def _bounds(posterior: Posterior, name: str) -> list[str]:
 
 
 def _correlations(posterior: Posterior) -> list[str]:
+    """None among few members, of which any two are perfectly correlated."""
+    if posterior.effective_size < CLAIMED_FROM:
+        return []
     names, matrix = posterior.parameters, posterior.correlation
     pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > STRONG_CORRELATION]
     return [

@@ -84,6 +84,8 @@ def _parameter(case: Case, posterior: Posterior, name: str) -> Finding:
 
 
 def _correlations(case: Case, posterior: Posterior) -> Iterator[Finding]:
+    if posterior.effective_size < CLAIMED_FROM:
+        return
     r, symbols = np.nan_to_num(posterior.correlation), [symbol(case, name) for name in posterior.parameters]
     tied = [
         f"{symbols[i]} and {symbols[j]} ({fixed(r[i, j], 2)})"

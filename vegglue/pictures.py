@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vegglue.describe import how_known
+from vegglue.describe import CLAIMED_FROM, how_known
 from vegglue.figure_posterior import (
     Reference,
     Unknown,
@@ -119,12 +119,14 @@ def _joints(run: Run) -> Iterator[Picture]:
             for upward in _references(run, names[j])
             if across.name == upward.name
         ]
-        both = f"{symbol(run.case, names[i])} and {symbol(run.case, names[j])}"
         tied = "rise together" if r > 0 else "trade off: one rises as the other falls"
-        strength = "hardly constrain each other" if abs(r) < 0.3 else tied
+        told = f" {tied if abs(r) >= 0.3 else 'hardly constrain each other'} (correlation {fixed(r, 2)})"
+        if run.posterior.effective_size < CLAIMED_FROM:
+            told = ": too few members to tell how they constrain each other"
         figure = draw_joint(_unknown(run, names[i]), _unknown(run, names[j]), run.posterior.weights, marks)
-        caption = f"{both} {strength} (correlation {fixed(r, 2)}). Area of a disc: weight of a member; grey: prior."
-        alt = f"Members in the plane of {names[i]} and {names[j]}, weighted by likelihood; correlation {fixed(r, 2)}."
+        both = f"{symbol(run.case, names[i])} and {symbol(run.case, names[j])}"
+        caption = f"{both}{told}. Area of a disc: weight of a member; grey: prior."
+        alt = f"Members in the plane of {names[i]} and {names[j]}, weighted by likelihood."
         yield picture(run, figure, f"joint-{names[i]}-{names[j]}", caption, alt)
 
 
