@@ -35,7 +35,7 @@ def patch_cells(x, y, patches):
     return *np.concatenate(found, axis=1), number
 
 
-def with_the_truth(folder, finer, smaller):
+def with_the_truth(folder, finer, smallest):
     """The fourth flow of a case with its true parameters, on the paper's cells or cells `finer` times smaller."""
     place, answer = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
     truth, run = answer["truth"], place["holdout"]["hold"]
@@ -52,45 +52,49 @@ def with_the_truth(folder, finer, smaller):
         "plants": plants,
         "viscosity": np.array([truth["nu"]]),
         "film": 0.002,
-        "smaller_shear_depth": smaller,
+        "smallest_shear_depth": smallest,
         "ground": even_ground(bed, banks, size),
     }
     problem = make_problem(bed, size, run["discharge_m3_s"], run["downstream_level_m"], **changes)
     return grid, *mixed(problem, answer["settings"].get("mixk", 0.0), 1e-8)
 
 
+MISSED = pytest.mark.xfail(strict=True, raises=AssertionError, reason="data of their own cells, see DECISIONS")
+HALVED = [pytest.mark.slow]
+
+
 @pytest.mark.parametrize(
-    ("case", "finer", "smaller", "everywhere", "inside"),
+    ("case", "finer", "smallest", "everywhere", "inside"),
     [
         ("open-a", 1, False, 0.009, 0.005),
         ("open-e", 1, False, 0.009, 0.005),
-        pytest.param("open-a", 2, False, 0.005, 0.0035, marks=pytest.mark.slow),
-        pytest.param("open-e", 2, False, 0.012, 0.006, marks=pytest.mark.slow),
+        pytest.param("open-a", 2, False, 0.005, 0.003, marks=[MISSED, *HALVED]),
+        pytest.param("open-e", 2, False, 0.005, 0.003, marks=[MISSED, *HALVED]),
         ("open-a", 1, True, 0.009, 0.005),
         ("open-e", 1, True, 0.009, 0.005),
-        pytest.param("open-a", 2, True, 0.005, 0.003, marks=pytest.mark.slow),
-        pytest.param("open-e", 2, True, 0.005, 0.004, marks=pytest.mark.slow),
+        pytest.param("open-a", 2, True, 0.005, 0.003, marks=HALVED),
+        pytest.param("open-e", 2, True, 0.005, 0.003, marks=[MISSED, *HALVED]),
     ],
 )
-def test_true_parameters_reproduce_the_holdout(case, finer, smaller, everywhere, inside):
+def test_true_parameters_reproduce_the_holdout(case, finer, smallest, everywhere, inside):
     """Root mean square difference [m/s] at 105 stations, and at those within 2 m of the axis, measured:
 
-        cells [m]        shear over the depth between    over the smaller one, as in the other code
-                         open-a         open-e           open-a         open-e
-        0.5 x 0.375      0.0063 0.0046  0.0060 0.0043    0.0061 0.0031  0.0071 0.0048
-        0.25 x 0.1875    0.0045 0.0032  0.0109 0.0053    0.0025 0.0024  0.0042 0.0035
+        cells [m]        shear over the depth of its point   over the smallest around it
+                         open-a         open-e               open-a         open-e
+        0.5 x 0.375      0.0063 0.0046  0.0060 0.0043        0.0061 0.0031  0.0071 0.0048
+        0.25 x 0.1875    0.0045 0.0032  0.0109 0.0053        0.0025 0.0024  0.0042 0.0035
 
-    The finer cells are those of the other code, which takes the depth at a face from the higher bed (hydrostatic
-    reconstruction, Audusse et al. 2004, doi:10.1137/S1064827503431090). Why open-e gets worse with the depth between:
-    `test_independent_cells`. On cells of the coarser size the other code is 0.006 (inside) and 0.016 m/s (banks) from
-    its own result, on cells of half the finer size 0.002 and 0.003 m/s (open-a).
+    The finer cells are those of the other code, which reconstructs depths at faces from the higher bed (Audusse et al.
+    2004, doi:10.1137/S1064827503431090); that it does so for shear, too, is inferred from how open-a is met. Why open-e
+    gets worse with the depth of the point: `test_independent_cells`. On cells of the coarser size the other code is
+    0.006 (inside) and 0.016 m/s (banks) from its own result, on cells of half the finer size 0.002 and 0.003 (open-a).
     """
     folder = CASES / case
-    grid, problem, state = with_the_truth(folder, finer, smaller)
+    grid, problem, state = with_the_truth(folder, finer, smallest)
     station = pd.read_csv(folder / "holdout.csv").assign(kind="velocity")
     read = read_sensors(problem, state, grid, station, ()).prediction[0]
     difference, near = (read - station["u"]).to_numpy(), (station["y"].abs() <= 2.0).to_numpy()
-    print(f"{case}, dx {grid.dx} m, smaller: {smaller}: {rms(difference):.4f} m/s, near {rms(difference[near]):.4f}")
+    print(f"{case}, dx {grid.dx} m, smallest: {smallest}: {rms(difference):.4f} m/s, near {rms(difference[near]):.4f}")
     assert rms(difference) <= everywhere
     assert rms(difference[near]) <= inside
 
@@ -99,8 +103,11 @@ SEVEN = [{"x": (55.0 + 8.0 * n, 59.0 + 8.0 * n), "y": (6.0, 7.5) if n % 2 == 0 e
 FIRST_ROW = 8
 
 
-def papers_channel(case):
-    """171 m of the paper's channel, 9 m of its width, with the resistance of one of Delft3D's two cases."""
+def papers_channel(case, switched):
+    """171 m of the paper's channel, 9 m of its width, with the resistance of one of Delft3D's two cases.
+
+    switched: with shear over the smallest depth, and their floor of the bank law.
+    """
     bed, classes = trapezoid(171.0, 4.5, (342, 24))
     column, row, _ = patch_cells(centres(171.0, 342), centres(15.0, 40)[FIRST_ROW : FIRST_ROW + 24], SEVEN)
     if case == "manning":
@@ -114,18 +121,22 @@ def papers_channel(case):
             "plants": Plants(column, row, 40.0 * one, 0.8 * one, 60.0 * one),
         }
     changes |= {"friction_class": classes, "viscosity": np.array([0.01]), "film": 0.002}
+    if switched:
+        changes |= {"smallest_shear_depth": True, "log_argument_minimum": 1.0129}
     return make_problem(bed, CELL, 2.66, 1.1 - 0.171, **changes)
 
 
+@pytest.mark.parametrize("switched", [False, True])
 @pytest.mark.parametrize("case", ["manning", "paper_laws"])
-def test_delft3d(case):
-    """u in the wet cells of six sections: within 0.015 m/s root mean square, measured 0.0096 and 0.0108.
+def test_delft3d(case, switched):
+    """u in the wet cells of six sections: within 0.015 m/s root mean square, measured 0.0096 and 0.0108; with what can
+    be switched to their conventions 0.0095 and 0.0112.
 
     What differs: roughness on cell faces there, one depth a cell, the smaller of two depths on a face, land where
     12 h < 1.0129 k_s, inflow, advection. TELEMAC-2D and Delft3D differ by 0.002 beside a patch and 0.006 m/s in it.
     """
     theirs = pd.read_csv(CASES / "delft3d" / f"{case}.csv")
-    problem = papers_channel(case)
+    problem = papers_channel(case, switched)
     state = solved(problem, 1e-8)
     now = faces(problem, state)
     u, level = 0.5 * (now.u[1:] + now.u[:-1])[..., 0], state[:, LEVEL, :, 0]

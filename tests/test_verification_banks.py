@@ -39,7 +39,7 @@ def across(viscosity: float, length: float, cells: int = 1900) -> tuple[Array, f
     return np.interp(STATIONS, y, u), float((u * h).sum() * width)
 
 
-def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[Array, float]:
+def developed(viscosity: float, length: float, flow: float, rows: int, smallest: bool) -> tuple[Array, float]:
     """u [m/s] at the stations in the middle of a long reach, and the depth on its floor [m]."""
     bed, banks = trapezoid(LENGTH, 4.5, (COLUMNS, rows))
     y = centres(9.0, rows) - 4.5
@@ -53,6 +53,7 @@ def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[
         friction_class=banks,
         viscosity=np.array([viscosity]),
         film=0.01,
+        smallest_shear_depth=smallest,
         ground=even_ground(bed, banks, (LENGTH / COLUMNS, 9.0 / rows)),
     )
     found, i = faces(*mixed(problem, length, 1e-6)), COLUMNS // 2
@@ -62,24 +63,32 @@ def developed(viscosity: float, length: float, flow: float, rows: int) -> tuple[
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("viscosity", "length", "coarse", "fine", "shallow"),
-    [(0.01, 0.0, 5e-3, 1e-3, 1e-3), (0.05, 0.0, 0.015, 5e-3, 4e-3), (0.01, 0.5, 0.03, 7e-3, 7e-3)],
+    ("viscosity", "length", "smallest", "coarse", "fine", "shallow"),
+    [
+        (0.01, 0.0, False, 5e-3, 1e-3, 1e-3),
+        (0.05, 0.0, False, 0.015, 5e-3, 4e-3),
+        (0.01, 0.5, False, 0.03, 7e-3, 7e-3),
+        (0.01, 0.0, True, 7e-3, 4e-3, 3e-3),
+        (0.05, 0.0, True, 0.04, 0.02, 0.02),
+        (0.01, 0.5, True, 0.07, 0.035, 0.04),
+    ],
 )
 def test_velocity_and_depth_where_banks_fall_dry(
-    viscosity: float, length: float, coarse: float, fine: float, shallow: float
+    viscosity: float, length: float, smallest: bool, coarse: float, fine: float, shallow: float
 ) -> None:
     """On rows of 0.375, 0.1875 and 0.094 m wrong by 0.003, 0.001 and 0.001 m/s, depths by 0.2 mm at most; with five
-    times that viscosity by 0.012, 0.007 and 0.004 m/s, 10, 6 and 3 mm; mixed over 0.5 m by 0.026, 0.018 and 0.006 m/s,
-    27, 20 and 6 mm, all too shallow: what is mixed well feels the shallow end of a cell more than its mean says.
+    times that viscosity by 0.012, 0.007 and 0.004 m/s, 10, 6 and 3 mm; mixed over 0.5 m by 0.026, 0.019 and 0.006 m/s,
+    27, 20 and 7 mm, all too shallow: what is mixed well feels the shallow end of a cell more than its mean says.
+    With shear over the smallest depth by 0.006, 0.005, 0.003 m/s; 0.036, 0.027, 0.017; 0.066, 0.060, 0.032.
     """
     exact, flow = across(viscosity, length)
     errors, depths = [], []
     for rows in (24, 48, 96):
-        u, depth = developed(viscosity, length, flow, rows)
+        u, depth = developed(viscosity, length, flow, rows, smallest)
         errors.append(float(np.sqrt(np.mean((u - exact) ** 2))))
         depths.append(depth - DEPTH)
     told = ", ".join(f"{e:.4f} m/s, {1e3 * d:.1f} mm" for e, d in zip(errors, depths, strict=True))
-    print(f"nu {viscosity}, l {length}: {told}")
+    print(f"nu {viscosity}, l {length}, smallest {smallest}: {told}")
     assert errors[0] > errors[1] > errors[2]
     assert errors[0] < coarse
     assert errors[2] < fine

@@ -69,7 +69,7 @@ def closures(
     depth: Array,
     rates: tuple[Array, Array],
     viscosity: Array,
-    smaller_shear_depth: bool,
+    smallest_shear_depth: bool,
 ) -> Closures:
     """All that the stages resistance, exchange and force hand on; rates: of friction, and the part of the bed."""
     rate, _ = rates
@@ -79,7 +79,7 @@ def closures(
         stop = min(first + STRIP, nx)
         wide = slice(max(first - 1, 0), min(stop + 1, nx))
         inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(part(ground, wide, slice(None)), state, depth, rates, viscosity, smaller_shear_depth, wide)
+        cells = _cells(part(ground, wide, slice(None)), state, depth, rates, viscosity, smallest_shear_depth, wide)
         values = applied(acting, "resistance", cells, {"rate": cells.rate})
         cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
         values |= applied(acting, "exchange", cells, {"viscosity": viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
@@ -103,7 +103,7 @@ def _cells(
     depth: Array,
     rates: tuple[Array, Array],
     viscosity: Array,
-    smaller_shear_depth: bool,
+    smallest_shear_depth: bool,
     columns: slice,
 ) -> Cells:
     here, deep, (rate, bed_rate) = state[columns], depth[columns], rates
@@ -119,7 +119,7 @@ def _cells(
         rate=rate[columns],
         bed_rate=bed_rate[columns],
         viscosity=viscosity,
-        shear_depth=np.minimum(deep[:, 1:], deep[:, :-1]) if smaller_shear_depth else NOTHING,
+        shear_depth=np.minimum(deep[:, 1:], deep[:, :-1]) if smallest_shear_depth else NOTHING,
     )
 
 

@@ -171,7 +171,7 @@ class Ground:
 class Cells:
     """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k [1/m], the
     part of it that is the bed's, and viscosity [m2/s]; gradients [1/s]. shear_depth: by which du/dy weighs what is on
-    either side, (nx, ny - 1, m) [m], or empty.
+    either side, (nx, ny - 1, m) [m], the smaller depth of the two cells, or empty.
     """
 
     ground: Ground

@@ -78,7 +78,7 @@ class Problem:
     film: float = 0.01
     log_argument_minimum: float = 1.3
     phi_proportional: bool = False
-    smaller_shear_depth: bool = False
+    smallest_shear_depth: bool = False
     lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     source: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     acting: tuple[Acting, ...] = ()
@@ -246,7 +246,7 @@ def faces(problem: Problem, state: Array) -> Faces:
 
 def _depths(problem: Problem, level: Array) -> tuple[Array, Array, Array, Array]:
     bed, lift, reach = problem.bed, problem.lift, problem.reach
-    return kernels.depths(level, bed, lift, reach, problem.outlet_level, problem.film, problem.smaller_shear_depth)
+    return kernels.depths(level, bed, lift, reach, problem.outlet_level, problem.film, problem.smallest_shear_depth)
 
 
 def bed_drag(problem: Problem, depth: Array) -> Array:
@@ -292,8 +292,8 @@ def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, 
         return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
     of_bed = rate.copy()
     _plant(problem, rate, depth, plants)
-    rates, smaller = (rate, of_bed), problem.smaller_shear_depth
-    found = closures(problem.acting, problem.ground, state, depth, rates, problem.viscosity, smaller)
+    rates, smallest = (rate, of_bed), problem.smallest_shear_depth
+    found = closures(problem.acting, problem.ground, state, depth, rates, problem.viscosity, smallest)
     return found.rate, found.viscosity, found.momentum
 
 
@@ -382,7 +382,7 @@ def _residual(
         problem.outlet,
         problem.outlet_level,
         problem.film,
-        problem.smaller_shear_depth,
+        problem.smallest_shear_depth,
         problem.dx,
         problem.dy,
     )

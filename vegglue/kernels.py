@@ -49,9 +49,9 @@ def _afloat(depth: float, half_per_film: float) -> float:
 
 
 @compiled
-def depths(level, bed, lift, reach, outlet_level, film, smaller):
+def depths(level, bed, lift, reach, outlet_level, film, smallest):
     """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed, at corners
-    that of the point itself, or the smallest of the cells around it.
+    that of the point itself, or the smallest of the four cells around it.
 
     reach (nx, ny): half the range of the bed within a cell [m]; lift (nx, ny, m): by how much members' beds lie higher
     [m], or empty.
@@ -77,7 +77,7 @@ def depths(level, bed, lift, reach, outlet_level, film, smaller):
                 cell[i, j, k] = wet_depth(here, reach[i, j], film)
                 face_x[i, j, k] = wet_depth(0.5 * (here + west), reach_x, film)
                 face_y[i, j, k] = wet_depth(0.5 * (here + south), reach_y, film)
-                at_point = min(here, west, south, diagonal) if smaller else 0.25 * (here + west + south + diagonal)
+                at_point = min(here, west, south, diagonal) if smallest else 0.25 * (here + west + south + diagonal)
                 corner[i, j, k] = _sheared(at_point, film)
         for k in range(m):
             face_y[i, ny, k] = cell[i, ny - 1, k]
@@ -318,7 +318,7 @@ def velocities(state, first, stop, cell, west, south, north):
 
 
 @compiled
-def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, smaller, dx, dy):
+def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, smallest, dx, dy):
     """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
     nx = state.shape[0]
     out = np.empty_like(state)
@@ -326,7 +326,7 @@ def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, 
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
-        cell, face_x, face_y, corner = depths(level, bed[a:b], lift[a:b], reach[a:b], outlet_level, film, smaller)
+        cell, face_x, face_y, corner = depths(level, bed[a:b], lift[a:b], reach[a:b], outlet_level, film, smallest)
         u, v = velocities(state, a, b, cell, west, south, north)
         wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
         lo, hi = first - a, stop - a

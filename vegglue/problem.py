@@ -42,7 +42,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         film=case.numerics.film_depth,
         log_argument_minimum=case.numerics.bank_argument_minimum,
         phi_proportional=case.numerics.emergent == "proportional",
-        smaller_shear_depth=case.numerics.shear_depth == "smaller",
+        smallest_shear_depth=case.numerics.shear_depth == "smallest",
         lift=lifted(acting, ground) if ground else np.zeros((0, 0, 0)),
         source=_source(boundary.lateral, ground) if ground else np.zeros((0, 0, 0)),
         acting=acting,

@@ -252,6 +252,5 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
         + (f", members with an efficiency of at least {infer.behavioural:g}" if infer.behavioural is not None else ""),
     )
     yield "plants taller than the water is deep", "φ as it is" if numerics.emergent == "constant" else "φ h / h_d"
-    sheared = "the depth between them" if numerics.shear_depth == "point" else "the smaller of their depths"
-    yield "rows shear over", sheared
+    yield "shear acts over", "its point's depth" if numerics.shear_depth is None else "the smallest depth around it"
     yield "least 12 h / k_s in the bank law", f"{numerics.bank_argument_minimum:g}"

@@ -264,8 +264,8 @@ class Numerics(Part):
     emergent: Literal["constant", "proportional"] = Field(
         default="constant", description="phi or phi h/h_d where h < h_d"
     )
-    shear_depth: Literal["point", "smaller"] = Field(
-        default="point", description="rows shear over the depth between them, or over the smaller of theirs"
+    shear_depth: Literal["smallest"] | None = Field(
+        default=None, description="shear over the smallest depth of the cells around a point; else over its own"
     )
     tolerance: Positive = Field(
         default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
