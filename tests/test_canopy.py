@@ -14,7 +14,7 @@ from vegglue.problem import build_problem
 from vegglue.schema import Case, Stand
 from vegglue.site import build_site
 
-G, KARMAN, BARE = 9.81, 0.4, 60.0
+G, KARMAN, BARE = 9.81, 0.41, 60.0
 
 
 def of_law(law, phi, height, depth, bare=BARE, proportional=False):

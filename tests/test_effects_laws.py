@@ -57,6 +57,7 @@ def shear(x, y):
 
 
 U = sqrt(0.6**2 + 1e-6)
+HELIX = sqrt(0.05 * 0.8) / 0.41
 LE = 1.0 - (1.0 - 0.9 * 64.0 ** (-1 / 3)) / (1.0 + 64.0**-1.5 * 8.0)
 
 # name: (what it gets, amplitude and shapes, what it hands on in the middle)
@@ -149,7 +150,7 @@ ROWS = {
         {"share": 1.0},
         {
             "xx": 0.0,
-            "xy": -(5 * 0.5 - 15.6 * 0.25 + 37.5 * 0.125) * 0.8 * 0.36
+            "xy": -(5 * HELIX - 15.6 * HELIX**2 + 37.5 * HELIX**3) * 0.8 * 0.36
             * (turn := 0.8 / 20.0 * 0.6**3 / (0.36 + 0.0025) ** 1.5) / sqrt(1.0 + 4.0 * turn**2),
         },
     ),
@@ -164,7 +165,7 @@ ROWS = {
     "device_gain": (reading(velocity=0.0), {"gain": 0.05}, {"value": 0.5}),
     "zero_offset": (reading(), {"offset": 0.01}, {"value": 0.51}),
     "station_shift": (reading(), {"shift": 0.1}, {"value": 0.54}),
-    "partial_depth": (reading(), {"excess": 0.2}, {"value": 0.5 * (1.0 + 0.2 * 0.2 / 0.4)}),
+    "partial_depth": (reading(), {"excess": 0.2}, {"value": 0.5 * (1.0 + 0.2 * 0.2 / 0.41)}),
     "among_plants": (reading(canopy_share=0.5), {"gain": 0.2}, {"value": 0.55}),
     "gauge_datum": (reading(velocity=0.0), {"shift": 0.02}, {"value": 0.52}),
     "gauge_head": (reading(velocity=0.0, u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),

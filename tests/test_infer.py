@@ -306,7 +306,7 @@ def test_strong_correlation_is_named() -> None:
 
 
 def chezy(phi: float, canopy_height: float, depth: float) -> float:
-    above = math.sqrt(9.81) / 0.4 * math.log(depth / canopy_height) if depth > canopy_height else 0.0
+    above = math.sqrt(9.81) / 0.41 * math.log(depth / canopy_height) if depth > canopy_height else 0.0
     return (1 / 60**2 + phi / (2 * 9.81)) ** -0.5 + above
 
 

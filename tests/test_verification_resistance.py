@@ -25,7 +25,7 @@ def keulegan(h, k_s, floor=1.3):
 
 def baptist(h, phi, height, bare, proportional=False):
     share = min(1.0, h / height) if proportional else 1.0
-    submerged = np.sqrt(9.81) / 0.4 * np.log(h / height) if h > height else 0.0
+    submerged = np.sqrt(9.81) / 0.41 * np.log(h / height) if h > height else 0.0
     return (1.0 / bare**2 + share * phi / (2.0 * 9.81)) ** -0.5 + submerged
 
 

@@ -23,7 +23,10 @@ fixed at plausible values.
 import math
 
 from vegglue.elementary import compiled
-from vegglue.kernels import GRAVITY, KARMAN
+from vegglue.kernels import GRAVITY
+
+# As in Delft3D, the engine of the paper, which does not print it.
+KARMAN = 0.41
 
 LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
 BAPTIST, HUTHOFF, KLOPSTRA, LUHAR_NEPF, STONE_SHEN, YANG_CHOI = range(6)

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from vegglue.canopy import KARMAN
 from vegglue.config import Case
 from vegglue.ensemble import Ensemble
 from vegglue.errors import InputError
-from vegglue.kernels import GRAVITY, KARMAN
+from vegglue.kernels import GRAVITY
 from vegglue.likelihood import Fit, fit_members, member_weights, root_mean_square, stations_by_kind
 from vegglue.observations import Observations
 from vegglue.posterior import (

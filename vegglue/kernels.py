@@ -12,7 +12,6 @@ import numpy as np
 from vegglue.elementary import compiled
 
 GRAVITY = 9.81
-KARMAN = 0.4
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest.
 REST_SPEED = 1e-3
 # Columns computed together, and those beside them they look at.

@@ -2,9 +2,8 @@
 
 import numpy as np
 
+from vegglue.canopy import KARMAN
 from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
-
-KARMAN = 0.4
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:

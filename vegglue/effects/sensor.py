@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from vegglue.canopy import KARMAN
 from vegglue.effect import Amplitude, Array, Effect, Reading
-
-GRAVITY = 9.81
-KARMAN = 0.4
+from vegglue.kernels import GRAVITY
 
 
 def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:
