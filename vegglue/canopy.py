@@ -25,7 +25,7 @@ import math
 from vegglue.elementary import compiled
 from vegglue.kernels import GRAVITY
 
-# As in Delft3D, the engine of the paper, which does not print it.
+# Of D-Flow FM, seen in its source, and what meets Delft3D, the engine of the paper, which does not print it.
 KARMAN = 0.41
 
 LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
