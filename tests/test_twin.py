@@ -187,7 +187,7 @@ def test_what_reveal_says() -> None:
     assert "right" in in_words(an_answer(), silent)[-1]
     assert "missed" in in_words(an_answer(effect), silent)[-1]
     wide = Hidden("mixing[D3]", 0.3, {"width": 0.6}, 6.0)
-    assert "another shape, width = 0.1 instead of 0.6: the two do not" in in_words(an_answer(wide), a_diagnosis())[-1]
+    assert "found with width = 0.1 instead of 0.6, on which sizes" in in_words(an_answer(wide), a_diagnosis())[-1]
     alike = Hidden("mixing[D3]", 0.3, {"width": 0.101}, 6.0)
     assert in_words(an_answer(alike), a_diagnosis())[-1].endswith("the true size.")
 

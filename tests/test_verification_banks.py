@@ -5,7 +5,6 @@
 The reference solves this on 1,900 cells whose outermost ends at the waterline.
 """
 
-
 import numpy as np
 import pytest
 from channels import GRAVITY, centres, even_ground, make_problem, mixed, trapezoid

@@ -28,6 +28,19 @@ class Closures:
     momentum: dict[str, Array]
 
 
+@dataclass(frozen=True)
+class Bare:
+    """What effects at cell centres start from: depth h [m], friction rate k [1/m] and the part of it that is the bed's,
+    (nx, ny, m), viscosity [m2/s]; whether shear acts over the smallest depth, see `Problem`.
+    """
+
+    depth: Array
+    rate: Array
+    bed_rate: Array
+    viscosity: Array
+    smallest_shear_depth: bool
+
+
 def stages_of(acting: tuple[Acting, ...]) -> set[str]:
     return {one.effect.stage for one in acting}
 
@@ -62,33 +75,24 @@ def stand_values(
     return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])
 
 
-def closures(
-    acting: tuple[Acting, ...],
-    ground: Ground,
-    state: Array,
-    depth: Array,
-    rates: tuple[Array, Array],
-    viscosity: Array,
-    smallest_shear_depth: bool,
-) -> Closures:
-    """All that the stages resistance, exchange and force hand on; rates: of friction, and the part of the bed."""
-    rate, _ = rates
+def closures(acting: tuple[Acting, ...], ground: Ground, state: Array, bare: Bare) -> Closures:
+    """All that the stages resistance, exchange and force hand on."""
     nx = state.shape[0]
-    found: dict[str, Array] = {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
+    found: dict[str, Array] = {"rate": np.empty_like(bare.rate), "viscosity": np.empty_like(bare.rate)}
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         wide = slice(max(first - 1, 0), min(stop + 1, nx))
         inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(part(ground, wide, slice(None)), state, depth, rates, viscosity, smallest_shear_depth, wide)
+        cells = _cells(part(ground, wide, slice(None)), state, bare, wide)
         values = applied(acting, "resistance", cells, {"rate": cells.rate})
         cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
-        values |= applied(acting, "exchange", cells, {"viscosity": viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
+        values |= applied(acting, "exchange", cells, {"viscosity": bare.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
         values |= applied(acting, "force", cells, {"x": ZERO, "y": ZERO})
         for name, value in values.items():
             if value is ZERO:
                 continue
             if name not in found:
-                found[name] = np.zeros_like(rate)
+                found[name] = np.zeros_like(bare.rate)
             found[name][first:stop] = np.broadcast_to(value, cells.depth.shape)[inner]
     momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
     return Closures(found["rate"], found["viscosity"], momentum)
@@ -97,29 +101,21 @@ def closures(
 ZERO, NOTHING = np.zeros(1), np.zeros((0, 0, 0))
 
 
-def _cells(
-    ground: Ground,
-    state: Array,
-    depth: Array,
-    rates: tuple[Array, Array],
-    viscosity: Array,
-    smallest_shear_depth: bool,
-    columns: slice,
-) -> Cells:
-    here, deep, (rate, bed_rate) = state[columns], depth[columns], rates
+def _cells(ground: Ground, state: Array, bare: Bare, columns: slice) -> Cells:
+    here, depth = state[columns], bare.depth[columns]
     before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
     v = 0.5 * here[:, ACROSS]
     v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
     return Cells(
         ground=ground,
-        depth=deep,
+        depth=depth,
         level=here[:, LEVEL],
         u=0.5 * (here[:, ALONG] + before),
         v=v,
-        rate=rate[columns],
-        bed_rate=bed_rate[columns],
-        viscosity=viscosity,
-        shear_depth=np.minimum(deep[:, 1:], deep[:, :-1]) if smallest_shear_depth else NOTHING,
+        rate=bare.rate[columns],
+        bed_rate=bare.bed_rate[columns],
+        viscosity=bare.viscosity,
+        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) if bare.smallest_shear_depth else NOTHING,
     )
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from vegglue.agreement import values
 from vegglue.fields import excess
+from vegglue.kernels import GRAVITY
 from vegglue.observations import Observations
 from vegglue.outline import corners, distance_to_outline
 from vegglue.prior import quantile
@@ -17,7 +18,6 @@ from vegglue.site import Site, cells_of_patch
 
 Array = NDArray[np.float64]
 Bounds = tuple[float, float]
-GRAVITY = 9.81
 FEW_MEMBERS = 100
 # Nearer to a patch edge than this share of a cell [-], a station is on it.
 ON_THE_EDGE = 0.02

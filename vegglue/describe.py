@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 
@@ -95,16 +96,20 @@ def _bounds(posterior: Posterior, name: str) -> list[str]:
     ]
 
 
-def _correlations(posterior: Posterior) -> list[str]:
-    """None among few members, of which any two are perfectly correlated."""
+def tied(posterior: Posterior) -> list[tuple[int, int]]:
+    """Pairs of parameters strongly correlated; none among few members, any two of which are correlated perfectly."""
     if posterior.effective_size < CLAIMED_FROM:
         return []
+    strong = np.abs(np.nan_to_num(posterior.correlation)) > STRONG_CORRELATION
+    return [(i, j) for i, j in combinations(range(len(posterior.parameters)), 2) if strong[i, j]]
+
+
+def _correlations(posterior: Posterior) -> list[str]:
     names, matrix = posterior.parameters, posterior.correlation
-    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > STRONG_CORRELATION]
     return [
-        f"{names[j]} and {names[i]} are correlated ({matrix[i, j]:+.2f}): the data tell their combination better than "
+        f"{names[i]} and {names[j]} are correlated ({matrix[i, j]:+.2f}): the data tell their combination better than "
         "either of them."
-        for i, j in pairs
+        for i, j in tied(posterior)
     ]
 
 

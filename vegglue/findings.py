@@ -3,11 +3,10 @@
 import html
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
-from vegglue.describe import CLAIMED_FROM, HEAVY_TAIL, STRONG_CORRELATION
+from vegglue.describe import CLAIMED_FROM, HEAVY_TAIL, tied
 from vegglue.describe_refined import UNBELIEVED, drawn, unseen
 from vegglue.describe_transfer import rejected, told
 from vegglue.ensemble import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, Ensemble
@@ -84,17 +83,11 @@ def _parameter(case: Case, posterior: Posterior, name: str) -> Finding:
 
 
 def _correlations(case: Case, posterior: Posterior) -> Iterator[Finding]:
-    if posterior.effective_size < CLAIMED_FROM:
-        return
-    r, symbols = np.nan_to_num(posterior.correlation), [symbol(case, name) for name in posterior.parameters]
-    tied = [
-        f"{symbols[i]} and {symbols[j]} ({fixed(r[i, j], 2)})"
-        for i, j in combinations(range(len(symbols)), 2)
-        if abs(r[i, j]) > STRONG_CORRELATION
-    ]
-    if tied:
+    symbols = [symbol(case, name) for name in posterior.parameters]
+    pairs = [f"{symbols[i]} and {symbols[j]} ({fixed(posterior.correlation[i, j], 2)})" for i, j in tied(posterior)]
+    if pairs:
         said = "The stations know combinations of parameters better than each alone. Correlated in the posterior are"
-        yield Finding("trade-off", f"{said} {', '.join(tied)}.")
+        yield Finding("trade-off", f"{said} {', '.join(pairs)}.")
 
 
 def _plants(case: Case, posterior: Posterior, cylinder: RigidCylinder | None) -> Iterator[Finding]:

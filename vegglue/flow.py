@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue import canopy, easing, kernels, roughness
-from vegglue.acting import closures, push, stages_of, stand_values
+from vegglue.acting import Bare, closures, push, stages_of, stand_values
 from vegglue.effect import Acting, Ground
 from vegglue.ground import rows
 
@@ -292,8 +292,8 @@ def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, 
         return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
     of_bed = rate.copy()
     _plant(problem, rate, depth, plants)
-    rates, smallest = (rate, of_bed), problem.smallest_shear_depth
-    found = closures(problem.acting, problem.ground, state, depth, rates, problem.viscosity, smallest)
+    bare = Bare(depth, rate, of_bed, problem.viscosity, problem.smallest_shear_depth)
+    found = closures(problem.acting, problem.ground, state, bare)
     return found.rate, found.viscosity, found.momentum
 
 

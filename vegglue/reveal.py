@@ -96,13 +96,13 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     if not mark.inside:
         return truth + f"The diagnosis missed it; it said {diagnosis.verdict} {', '.join(diagnosis.set)}".rstrip() + "."
     alone = "It was named alone" if mark.named else f"It is in the set, one of {groups_of(diagnosis)} group(s) by step"
-    interval = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size"
+    told = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size."
     others = _other_shapes(mark.hidden, diagnosis)
-    return f"{interval}, but that of another shape, {others}: the two do not compare." if others else f"{interval}."
+    return f"{told} It was found with {others}, on which sizes depend." if others else told
 
 
 def _other_shapes(hidden: Hidden, diagnosis: Diagnosis) -> str:
-    """Settings of shape the effect was found with, where they are not those of the truth: its size answers to them."""
+    """Settings of shape the effect was found with, where they differ from those of the truth by a twentieth or more."""
     found = next(one.shapes for one in diagnosis.suspects if one.name == hidden.name)
     others = [name for name, true in hidden.shapes.items() if not np.isclose(found.get(name, true), true, rtol=0.05)]
     return " and ".join(f"{name} = {found[name]:.3g} instead of {hidden.shapes[name]:.3g}" for name in others)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from vegglue.effect import Amplitude, Array, Cells, Effect, Ground, Shape, Stage
+from vegglue.kernels import GRAVITY
 
-GRAVITY = 9.81
 Act = Callable[..., Mapping[str, Array]]
 
 

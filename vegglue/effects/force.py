@@ -3,9 +3,9 @@
 import numpy as np
 
 from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+from vegglue.kernels import GRAVITY
 
 AIR_OVER_WATER = 1.2e-3
-GRAVITY = 9.81
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
