@@ -10,7 +10,7 @@ VEGGLUE := $(BIN)/vegglue
 PYTEST := $(BIN)/pytest tests -n auto --maxprocesses 4 --dist loadfile
 CASES := d0 d3a d3b d3b_paper
 DEMO_CASES := d0 d3a d3b
-SOURCES := $(wildcard vegglue/*.py vegglue/effects/*.py vegglue/*.j2)
+SOURCES := $(wildcard vegglue/*.py vegglue/*/*.py vegglue/*/*.j2)
 SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -59,13 +59,13 @@ check: $(READY)  # the fast part
 	$(PYTEST) -m 'not slow'
 
 bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
-	$(BIN)/python -m tests.bench
+	$(BIN)/python tests/studies/bench.py
 
 blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
-	nice $(BIN)/python tests/blind.py --jobs $(JOBS)
+	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)
 
 confluence: $(READY)  # the numbers of docs/confluence.md, from the published set in the folder DATA
-	$(BIN)/python -m tests.confluence "$(DATA)" --jobs $(JOBS)
+	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)
 
 clean:  # remove the environment and all runs
 	rm -rf $(VENV) build dist *.egg-info runs/*/

@@ -4,15 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegglue import roughness
-from vegglue.effect import Acting, Ground
-from vegglue.effects import library
-from vegglue.flow import LEVEL, Array, Inflow, Plants, Problem, faces, take
-from vegglue.start import backwater
-from vegglue.steady import newton
+from vegglue.arrays import Array
+from vegglue.effects.active_effect import ActiveEffect
+from vegglue.effects.library import library
+from vegglue.effects.surroundings import ChannelGeometry
+from vegglue.flow.backwater import backwater
+from vegglue.flow.equations import faces
+from vegglue.flow.problem import LEVEL, InflowSegment, Problem, VegetatedCells, take
+from vegglue.resistance import bed_laws
+from vegglue.solver.newton import newton
 
 GRAVITY = 9.81
-NO_PLANTS = Plants(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((0, 1)))
+NO_PLANTS = VegetatedCells(
+    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((0, 1))
+)
 
 
 def centres(length: float, cells: int) -> Array:
@@ -24,7 +29,7 @@ def make_problem(
     cell: tuple[float, float],
     discharge: float,
     level: float,
-    friction: tuple[int, float] = (roughness.CHEZY, 50.0),
+    friction: tuple[int, float] = (bed_laws.CHEZY, 50.0),
     **changes: object,
 ) -> Problem:
     """One friction class, inflow from the west by conveyance, outlet all along the east, a film of 0.1 mm."""
@@ -38,7 +43,7 @@ def make_problem(
         "coefficient": np.array([[friction[1]]]),
         "plants": NO_PLANTS,
         "viscosity": np.zeros(1),
-        "inflows": (Inflow("west", 0, ny, np.array([discharge])),),
+        "inflows": (InflowSegment("west", 0, ny, np.array([discharge])),),
         "outlet": np.ones(ny, bool),
         "outlet_level": np.array([level]),
         "film": 1e-4,
@@ -51,11 +56,11 @@ def sloping(length: float, cells: int, rows: int, slope: float) -> Array:
     return np.repeat(-slope * centres(length, cells)[:, None], rows, axis=1)
 
 
-def planted(shape: tuple[int, int], phi: float, canopy_height: float, bare_chezy: float) -> Plants:
+def planted(shape: tuple[int, int], phi: float, canopy_height: float, bare_chezy: float) -> VegetatedCells:
     """Plants in every cell."""
     column, row = (index.ravel() for index in np.indices(shape))
     fields = [np.full((column.size, 1), value) for value in (phi, canopy_height, bare_chezy)]
-    return Plants(column, row, *fields)
+    return VegetatedCells(column, row, *fields)
 
 
 def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple[Array, Array]:
@@ -65,12 +70,12 @@ def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple
     return bed, np.repeat((np.abs(y) > 1.5).astype(np.int64)[None], cells[0], axis=0)
 
 
-def even_ground(bed: Array, banks: Array, cell: tuple[float, float]) -> Ground:
+def even_ground(bed: Array, banks: Array, cell: tuple[float, float]) -> ChannelGeometry:
     """What effects are told of the paper's section, y = 0 on its axis; nothing of plants."""
     nx, ny = bed.shape
     nothing = np.zeros((nx, ny, 1))
     far = nothing + np.inf
-    return Ground(
+    return ChannelGeometry(
         x=centres(nx * cell[0], nx)[:, None, None], y=(centres(ny * cell[1], ny) - 0.5 * ny * cell[1])[None, :, None],
         dx=cell[0], dy=cell[1], bed=bed[..., None], offset=nothing, half_width=nothing + 1.5, side_slope=nothing,
         bank=banks[..., None].astype(float), planted=nothing, front=far, edge=far, wake=far, patch=nothing - 1.0,
@@ -81,7 +86,7 @@ def mixed(problem: Problem, length: float, tolerance: float) -> tuple[Problem, A
     """With a mixing length, and its steady state, reached by shorter ones: from none at once Newton stops."""
     state = solved(problem, tolerance)
     for share in (0.4, 0.7, 1.0) if length else ():
-        mixing = Acting(library()["mixing_length"], {"length": np.array([share * length])})
+        mixing = ActiveEffect(library()["mixing_length"], {"length": np.array([share * length])})
         problem = replace(problem, acting=(mixing,))
         solution = newton(problem, state, tolerance)
         assert solution.converged[0]
@@ -96,10 +101,10 @@ def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: obj
     column, row = np.nonzero(((x > 12.0) & (x < 16.0))[:, None] & ((y > 0.0) & (y < 1.5))[None])
     one = np.ones((column.size, 1))
     settings = {
-        "law": np.array([roughness.MANNING, roughness.KEULEGAN]),
+        "law": np.array([bed_laws.MANNING, bed_laws.KEULEGAN]),
         "coefficient": np.array([[0.06], [1.0]]),
         "friction_class": banks,
-        "plants": Plants(column, row, 4.0 * one, 0.7 * one, 60.0 * one),
+        "plants": VegetatedCells(column, row, 4.0 * one, 0.7 * one, 60.0 * one),
         "viscosity": np.array([0.01]),
         "film": film,
     }

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from vegglue.diagnosis import Diagnosis, Step, Suspect, Where
+from vegglue.results.diagnosis import Diagnosis, Step, Suspect, Where
 
 STATIONS = 6
 

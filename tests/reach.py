@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vegglue.cli import main
+from vegglue.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

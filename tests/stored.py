@@ -12,15 +12,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vegglue.ensemble import Header
-from vegglue.fields import Window
-from vegglue.store import EnsembleWriter, ensemble_writer, read_ensemble, read_fields
+from vegglue.results.ensemble import Header
+from vegglue.results.fields import FieldWindow
+from vegglue.storage.hdf5 import EnsembleWriter, ensemble_writer, read_ensemble, read_fields
 
 MEMBERS, CHUNKS = 12, 3
 ALL = set(range(CHUNKS))
 HASH = "f" * 64
 X, Y = np.array([0.5, 1.5]), np.array([0.25, 0.75, 1.25])
-WINDOW = Window((0.6, 1.4), slice(0, 2), X, Y)
+WINDOW = FieldWindow((0.6, 1.4), slice(0, 2), X, Y)
 
 
 def a_header(**changes: Any) -> Header:

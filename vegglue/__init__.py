@@ -1,3 +1,7 @@
 """vegglue: calibrate models of flow through plants, and learn which effect they miss."""
 
-__version__ = "0.1.0"
+from vegglue import version
+
+__version__ = version.VERSION
+
+__all__ = ["__version__"]

@@ -1,5 +1,5 @@
 """`python -m vegglue` is `vegglue`."""
 
-from vegglue.cli import main
+from vegglue.cli.main import main
 
 main()

@@ -1,29 +1,31 @@
 """Effects on what enters and leaves the reach."""
 
-from vegglue.effect import Amplitude, Array, Boundary, Effect
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.surroundings import BoundaryValues
 
 
-def discharge_error(boundary: Boundary, relative_error: Array) -> dict[str, Array]:
+def discharge_error(boundary: BoundaryValues, relative_error: Array) -> dict[str, Array]:
     """Q -> Q (1 + e)."""
     return {"discharge": boundary.discharge * (1.0 + relative_error)}
 
 
-def inflow_skew(boundary: Boundary, skew: Array) -> dict[str, Array]:
+def inflow_skew(boundary: BoundaryValues, skew: Array) -> dict[str, Array]:
     """q -> q (1 + a s), s = -1 .. 1 across each inflow."""
     return {"spread": boundary.spread * (1.0 + skew * boundary.place)}
 
 
-def inflow_core(boundary: Boundary, excess: Array) -> dict[str, Array]:
+def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
     """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow."""
     return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.place**2) / 2.0)}
 
 
-def lateral_inflow(boundary: Boundary, share: Array) -> dict[str, Array]:
+def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
     """q_lateral + r Q."""
     return {"lateral": boundary.lateral + share * boundary.discharge.sum(axis=0)}
 
 
-def outlet_level(boundary: Boundary, rise: Array) -> dict[str, Array]:
+def outlet_level(boundary: BoundaryValues, rise: Array) -> dict[str, Array]:
     """z_out -> z_out + d."""
     return {"level": boundary.level + rise}
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from vegglue.canopy import KARMAN
-from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.surroundings import Cells
+from vegglue.resistance.physical_constants import KARMAN
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
@@ -79,7 +81,6 @@ def helical_flow(cells: Cells, share: Array) -> dict[str, Array]:
 
 
 BAND = "width d of the layer"
-
 EFFECTS = (
     Effect(
         name="viscosity",

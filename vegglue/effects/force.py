@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
-from vegglue.kernels import GRAVITY
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.surroundings import Cells
+from vegglue.resistance.physical_constants import GRAVITY
 
 AIR_OVER_WATER = 1.2e-3
 

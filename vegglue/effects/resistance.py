@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.surroundings import Cells
 
 
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
@@ -40,7 +42,6 @@ def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
 
 
 REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0)
-
 EFFECTS = (
     Effect(
         name="depth_dependent_bank",

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from vegglue.canopy import KARMAN
-from vegglue.effect import Amplitude, Array, Effect, Reading
-from vegglue.kernels import GRAVITY
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.surroundings import Reading
+from vegglue.resistance.physical_constants import GRAVITY, KARMAN
 
 
 def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:
@@ -49,7 +50,6 @@ def gauge_head(reading: Reading, share: Array) -> dict[str, Array]:
 
 
 RELATIVE = Amplitude("gain", "-", "relative error b of the probes", 0.05, -0.5, 0.5)
-
 EFFECTS = (
     Effect(
         name="probe_gain",

@@ -2,48 +2,49 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Effect, Ground, Shape
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.surroundings import ChannelGeometry
 
 
-def floor_level(ground: Ground, rise: Array) -> dict[str, Array]:
+def floor_level(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz on the floor."""
     return {"bed": rise * (1.0 - ground.bank)}
 
 
-def bank_level(ground: Ground, rise: Array) -> dict[str, Array]:
+def bank_level(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz on the banks."""
     return {"bed": rise * ground.bank}
 
 
-def bed_slope(ground: Ground, slope: Array) -> dict[str, Array]:
+def bed_slope(ground: ChannelGeometry, slope: Array) -> dict[str, Array]:
     """z_b + s (x_end - x): the bed at the outlet stays."""
     return {"bed": slope * (ground.x[-1] - ground.x) * np.ones_like(ground.bed)}
 
 
-def cross_slope(ground: Ground, slope: Array) -> dict[str, Array]:
+def cross_slope(ground: ChannelGeometry, slope: Array) -> dict[str, Array]:
     """z_b + s (y - y_axis)."""
     return {"bed": slope * ground.offset * ground.half_width}
 
 
-def flank_scour(ground: Ground, depth: Array, width: Array) -> dict[str, Array]:
+def flank_scour(ground: ChannelGeometry, depth: Array, width: Array) -> dict[str, Array]:
     """z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them."""
     beside = np.where(np.isfinite(ground.edge), ground.edge, -1e3)
     return {"bed": np.where(beside > 0.0, -depth * np.exp(-(((beside - width) / width) ** 2)), 0.0)}
 
 
-def patch_deposit(ground: Ground, rise: Array) -> dict[str, Array]:
+def patch_deposit(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz where plants stand."""
     return {"bed": rise * ground.planted}
 
 
-def wake_deposit(ground: Ground, rise: Array, length: Array) -> dict[str, Array]:
+def wake_deposit(ground: ChannelGeometry, rise: Array, length: Array) -> dict[str, Array]:
     """z_b + dz exp(-s / L) behind a patch, s the distance from its end."""
     return {"bed": rise * np.exp(-ground.wake / length)}
 
 
 FOLLETT = "Follett and Nepf (2012), shape assumed"
 FOLLETT_DOI = "10.1016/j.geomorph.2012.08.006"
-
 EFFECTS = (
     Effect(
         name="floor_level_error",

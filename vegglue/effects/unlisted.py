@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from vegglue.effect import Amplitude, Array, Cells, Effect, Shape
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.surroundings import Cells
 
 
 def unlisted_object(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:

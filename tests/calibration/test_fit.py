@@ -1,0 +1,68 @@
+"""The search for the best place, on a model whose answer to one parameter dies out towards the bound of its prior."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.optimize
+import scipy.stats
+
+from vegglue.arrays import Array
+from vegglue.calibration.fit import MOST_STEPS, SETTLED, fit, objective
+from vegglue.calibration.noise import noise_of
+from vegglue.case.parameter_space import FURTHEST
+from vegglue.engine.linearised_model import Point
+
+MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
+                         "value": [1.1, 1.05, 0.3], "standard_error": 0.005, "used": True})  # fmt: skip
+NOISE = noise_of(MEASURED)
+
+
+def at(z: Array) -> Point:
+    """More is measured than the first parameter can give; the second is plain."""
+    slope = scipy.stats.norm.pdf(z[0])
+    prediction = np.array([scipy.stats.norm.cdf(z[0])] * 2 + [0.5 * z[1]])
+    return Point(z, prediction, np.array([[slope, 0.0], [slope, 0.0], [0.0, 0.5]]), {})
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Array]:
+    """The places that a search looked at."""
+    places: list[Array] = []
+
+    def linearise(model: Any, z: Array, near: Point) -> Point:
+        places.append(z)
+        return at(z)
+
+    monkeypatch.setattr("vegglue.calibration.fit.linearise", linearise)
+    return places
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (1.0, 0.0), (2.5, -1.0), (4.0, 1.0), (6.0, 3.0)])
+def test_a_search_ends_beside_a_bound(asked: list[Array], start: tuple[float, float]) -> None:
+    found = fit(None, NOISE, at(np.array(start)))  # type: ignore[arg-type]
+    best = scipy.optimize.minimize(lambda z: objective(NOISE, at(z)), found.point.z, method="Nelder-Mead")
+    assert found.settled
+    assert found.objective < best.fun + 2.0 * SETTLED
+    assert len(asked) < MOST_STEPS
+
+
+def test_a_search_ends_at_the_end_of_all_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ever more of a parameter would help, but further out it is no longer told from the bound of its prior."""
+
+    def endless(model: Any, z: Array, near: Point | None) -> Point:
+        slope = np.array([[1.0 if np.abs(z[0]) < FURTHEST else 0.5, 0.0]] * 2 + [[0.0, 0.5]])  # by central differences
+        return Point(z, np.array([*np.clip(z[[0, 0]], -FURTHEST, FURTHEST), 0.5 * z[1]]), slope, {})
+
+    monkeypatch.setattr("vegglue.calibration.fit.linearise", endless)
+    found = fit(None, noise_of(MEASURED.assign(value=[9.0, 9.0, 0.3])), endless(None, np.zeros(2), None))  # type: ignore[arg-type]
+    assert found.settled
+    assert found.point.z == pytest.approx([FURTHEST, 0.6], abs=0.01)
+
+
+def test_a_place_without_flow_is_stepped_back_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vegglue.calibration.fit.linearise", lambda model, z, near: at(z) if z[0] < 2.0 else None)
+    found = fit(None, NOISE, at(np.array([1.5, 0.0])))  # type: ignore[arg-type]
+    assert 1.9 < found.point.z[0] < 2.0
+    assert found.point.z[1] == pytest.approx(0.6, abs=0.02)

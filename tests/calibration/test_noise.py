@@ -1,0 +1,112 @@
+"""The noise of the data: its covariance, and its correlation told apart from missing physics."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.stats
+
+from vegglue.calibration.noise import (
+    covariance_of,
+    discounted,
+    drawn_errors,
+    estimated,
+    noise_of,
+    with_correlation,
+    with_grid_error,
+)
+from vegglue.errors import InputError
+
+SECTIONS, STATIONS, TRIES = 8, 20, 60
+
+
+def stations(error: float = 0.01) -> pd.DataFrame:
+    section, y = np.divmod(np.arange(SECTIONS * STATIONS), STATIONS)
+    return pd.DataFrame(
+        {"experiment": "e", "kind": "velocity", "section": section.astype(str), "x": 10.0 * section, "y": 0.3 * y,
+         "value": 0.5, "standard_error": error, "used": True}
+    )  # fmt: skip
+
+
+def correlated(rho: float, random: np.random.Generator, error: float = 0.01) -> np.ndarray:
+    noise = with_correlation(noise_of(stations(error)), rho, 1.0)
+    return noise.lower @ random.standard_normal(SECTIONS * STATIONS)
+
+
+def smooth() -> np.ndarray:
+    """What physics could do: cosines along each section, of their own in each."""
+    y = np.arange(STATIONS) / STATIONS
+    shapes = np.column_stack([np.cos(np.pi * k * y) for k in range(4)])
+    return np.kron(np.eye(SECTIONS), shapes)
+
+
+def test_neighbours_are_correlated_only_within_their_section() -> None:
+    noise = with_correlation(noise_of(stations()), 0.5, 2.0)
+    covariance = covariance_of(noise) / 0.01**2
+    assert covariance[0, :3] == pytest.approx([4.0, 2.0, 1.0])
+    assert covariance[STATIONS - 1, STATIONS] == 0.0
+
+
+def test_whitened_errors_are_independent_and_of_size_one() -> None:
+    noise = with_correlation(noise_of(stations()), 0.7, 1.0)
+    assert noise.whiten(noise.lower) == pytest.approx(np.eye(SECTIONS * STATIONS), abs=1e-9)
+
+
+def test_the_error_of_the_grid_makes_errors_larger() -> None:
+    difference = np.zeros(SECTIONS * STATIONS)
+    difference[3] = 0.05
+    before, after = noise_of(stations()), with_grid_error(noise_of(stations()), difference)
+    assert covariance_of(after)[3, 3] == pytest.approx(0.01**2 + (0.6 * 0.05) ** 2)
+    assert covariance_of(after)[4, 4] == covariance_of(before)[4, 4]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
+    random, physics = np.random.default_rng(4), smooth()
+    found = []
+    for _ in range(6):
+        missing = physics @ random.standard_normal(physics.shape[1]) * 0.03
+        left = correlated(rho, random) + missing
+        noise = estimated(noise_of(stations()), left, physics)
+        found.append(noise.correlation)
+        assert noise.scale < 1.3, "missing physics is not taken for noise"
+    assert np.mean(found) == pytest.approx(rho, abs=0.12)
+
+
+def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
+    random = np.random.default_rng(6)
+    left = correlated(0.0, random, error=0.02)
+    noise = estimated(noise_of(stations(0.01)), left, smooth())
+    assert noise.scale == pytest.approx(2.0, rel=0.2)
+
+
+def test_a_station_set_aside_counts_for_nothing() -> None:
+    noise = discounted(noise_of(stations()), np.array([5]))
+    left = np.zeros(SECTIONS * STATIONS)
+    left[5] = 1.0
+    assert np.abs(noise.whiten(left)).max() < 0.2
+
+
+def test_a_station_without_a_standard_error_is_named() -> None:
+    table = stations()
+    table.loc[7, "standard_error"] = np.nan
+    with pytest.raises(InputError, match=r"x = 0, y = 2\.1 m"):
+        noise_of(table)
+    assert noise_of(table, {"velocity": 0.02}).error[7] == 0.02
+
+
+@pytest.mark.slow
+def test_doubt_about_the_correlation_keeps_alarms_rare() -> None:
+    random, physics = np.random.default_rng(9), smooth()
+    traces = np.linalg.qr(np.kron(np.ones((SECTIONS, 1)), smooth()[:STATIONS, :4]))[0]
+    alarms = {"known": 0, "doubted": 0}
+    for _ in range(TRIES):
+        left = correlated(0.6, random)
+        noise = estimated(noise_of(stations()), left, physics)
+        white = noise.whiten(traces)
+        score = np.abs(noise.whiten(left) @ white / np.linalg.norm(white, axis=0)).max()
+        certain = with_correlation(noise, noise.correlation, noise.scale)
+        for name, one in (("known", certain), ("doubted", noise)):
+            errors = drawn_errors(one, 1000, random) @ white / np.linalg.norm(white, axis=0)
+            alarms[name] += int(score > np.quantile(np.abs(errors).max(axis=1), 0.95))
+    assert alarms["doubted"] < alarms["known"], "a correlation that is only estimated makes alarms of its own"
+    assert scipy.stats.binomtest(alarms["doubted"], TRIES, 0.05).pvalue > 1e-3

@@ -1,0 +1,318 @@
+"""A case file is understood, or refused with one sentence that says where, what was expected, what came, what to do."""
+
+import os
+from pathlib import Path
+
+import pytest
+import yaml
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
+from vegglue.errors import InputError
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+PAPER = ("d0", "d3a", "d3b", "d3b_paper")
+
+SMALL = """
+name: small
+grid: {x: [0, 40], y: [-4, 4], cell: [1.0, 0.5]}
+bed:
+  - trapezoid: {axis: 0.0, bottom_width: 3.0, bank_slope: 0.6667, bed_slope: 0.001, level: 0.0}
+friction:
+  classes:
+    bed: {law: manning, n: n_b}
+    bank: {law: keulegan, k_s: 1.0}
+  default: bed
+  zones:
+    - {class: bank, steeper_than: 0.2}
+plants:
+  stands:
+    reed: {phi: phi, canopy_height: 0.8, stems: 22}
+  patches:
+    - {name: p1, stand: reed, x: [10, 14], y: [0, 1.5], stems: 22}
+inflows:
+  upstream: {side: west}
+experiments:
+  low: {discharge: 2.66, level: 0.9}
+parameters:
+  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}
+  phi: {distribution: loguniform, low: 0.01, high: 100, unit: "-"}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def write(text: str, name: str = "small.yaml") -> Path:
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def changed(old: str, new: str) -> Path:
+    assert old in SMALL
+    return write(SMALL.replace(old, new, 1))
+
+
+def sentence(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        load_case(path)
+    return str(caught.value)
+
+
+def test_a_small_case_reads_with_its_defaults():
+    case = load_case(write(SMALL))
+    assert case.experiments["low"].discharge == {"upstream": 2.66}
+    assert case.friction.zones[0].friction_class == "bank"
+    assert case.friction.classes["bed"].n == "n_b"
+    assert case.plants.stands["reed"].bare_chezy == 60
+    assert case.numerics.bank_argument_minimum == 1.3
+    assert case.source == Path("small.yaml").resolve()
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_the_shipped_cases_have_the_papers_grid_patches_and_priors(name):
+    case = load_case(CONFIGS / f"{name}.yaml")
+    assert (case.grid.x, case.grid.y, case.grid.cell) == ((0, 571), (-2, 13), (0.5, 0.375))
+    assert [patch.stems for patch in case.plants.patches] == [22] * 4 + [7.3] * 3
+    assert [patch.x for patch in case.plants.patches] == [(400 + 8 * i, 404 + 8 * i) for i in range(7)]
+    assert [patch.y for patch in case.plants.patches] == [(4, 5.5), (5.5, 7)] * 3 + [(4, 5.5)]
+    assert {key: (p.low, p.high) for key, p in case.parameters.items()} == {
+        "n_b": (0.01, 0.15),
+        "k_s": (0.1, 5),
+        "phi": (0.01, 100),
+    }
+    assert case.simulate.members == 5000
+    (experiment,) = case.experiments.values()
+    assert (experiment.discharge, experiment.level) == ({"upstream": 2.66}, 0.529)
+    assert "synthetic" in case.title
+
+
+def test_the_shipped_cases_differ_in_canopy_height_only_where_the_paper_does():
+    height = {name: load_case(CONFIGS / f"{name}.yaml").plants.stands["willow"].canopy_height for name in PAPER}
+    assert height == {"d0": 0.8, "d3a": 0.8, "d3b": 1.06, "d3b_paper": 0.8}
+    assert load_case(CONFIGS / "d3b_paper.yaml").canopy_correction.to_height == 1.36
+
+
+REFUSED = [
+    ("bottom_width", "botom_width", "`bed[0].trapezoid.botom_width` is not a known key: did you mean `bottom_width`?"),
+    ("steeper_than: 0.2", "slope: 0.2", "`friction.zones[0].slope` is not a known key: known here are class"),
+    ("name: small\n", "", "`name` is missing (lower-case letters, digits, _ and -): add it"),
+    ("level: 0.9", "plants: true", "`experiments.low.level` is missing (water level at the outlet"),
+    ("name: small", "name: Small Case", "got 'Small Case'"),
+    (
+        "[1.0, 0.5]",
+        "[1.0, 0.3]",
+        "expected a whole number of at least 3 cells along y, where these make 26.6667",
+    ),
+    ("[1.0, 0.5]", "[1.0, 0]", "`grid.cell[1]` expected a number greater than 0, got 0"),
+    ("[1.0, 0.5]", "[1.0]", "`grid.cell"),
+    (
+        "x: [0, 40]",
+        "x: [40, 0]",
+        "`grid.x` (from upstream to downstream [m]) expected two numbers, the lower one first",
+    ),
+    ("bank_slope: 0.6667", "bank_slope: true", "(rise over run of the banks [-]) expected a valid number, got True"),
+    ("bank_slope: 0.6667", "bank_slope: '0.6'", "got '0.6'; write numbers without quotes"),
+    (
+        "level: 0.9",
+        "level: 0.9 m",
+        "`experiments.low.level` (water level at the outlet, in the datum of the bed [m]) expected",
+    ),
+    ("level: 0.9", "level: .nan", "expected a number or the name of an entry of `parameters`, got nan"),
+    ("discharge: 2.66", "discharge: -1", "`experiments.low.discharge.upstream` expected a number above 0, got -1"),
+    (
+        "discharge: 2.66",
+        "discharge: {west: 1}",
+        "names the inflow `west`, which is not declared: known here are upstream.",
+    ),
+    ("discharge: 2.66", "discharge: {}", "`experiments.low.discharge` says nothing about the inflow `upstream`"),
+    ("law: manning", "law: maning", "`friction.classes.bed.law`"),
+    ("k_s: 1.0", "n: 1.0", "`friction.classes.bank` expected the key `k_s`, which keulegan needs"),
+    ("k_s: 1.0", "k_s: 1.0, n: 0.1", "expected no key `n` together with keulegan"),
+    ("k_s: 1.0", "k_s: 0", "`friction.classes.bank.k_s` expected a number above 0, got 0"),
+    ("default: bed", "default: sand", "`friction.default` names the friction class `sand`, which is not declared"),
+    ("class: bank", "class: bnak", "names the friction class `bnak`, which is not declared: did you mean `bank`?"),
+    ("steeper_than: 0.2", "steeper_than: 0.2, x: [0, 3]", "`friction.zones[0]` expected one of `steeper_than`"),
+    ("stand: reed", "stand: willow", "`plants.patches[0].stand` names the stand `willow`"),
+    ("y: [0, 1.5], ", "", "`plants.patches[0]` expected either both `x` and `y`, or a `polygon`"),
+    ("n: n_b", "n: n_bed", "names the parameter `n_bed`, which is not declared: did you mean `n_b`?"),
+    ("n: n_b", "n: 0.03", "`parameters.n_b` is declared but used nowhere"),
+    (
+        "low: 0.01, high: 0.15",
+        "low: 0.15, high: 0.01",
+        "`parameters.n_b` expected a `low` below `high`, got distribution: uniform, low: 0.15, high: 0.01",
+    ),
+    ("low: 0.01, high: 0.15", "low: -0.1, high: 0.15", "`parameters.n_b` may fall to 0 or below"),
+    ("low: 0.01, high: 0.15", "low: 0.01", "expected the key `high`, which uniform needs"),
+    ("low: 0.01, high: 0.15", "low: 0.01, high: 0.15, sd: 1", "expected no key `sd` together with uniform"),
+    ("low: 0.01, high: 100", "low: 0, high: 100", "expected a `low` above 0 for a loguniform prior, got"),
+    ("{side: west}", "{side: east}", "`inflows.upstream.side`"),
+    (
+        "{side: west}",
+        "{side: west, range: [-9, 4]}",
+        "`inflows.upstream.range` expected a range within -4 to 4 m, got -9 to 4 m",
+    ),
+    (
+        "name: small",
+        "name: small\noutlet: {range: [0, 5]}",
+        "`outlet.range` expected a range within -4 to 4 m, got 0 to 5 m",
+    ),
+    (
+        "name: small",
+        "name: small\nsimulate: {members: 0}",
+        "`simulate.members` (size of the ensemble) expected a number greater than 0",
+    ),
+    ("name: small", "name: small\nsimulate: {members: 1.5}", "expected a valid integer, got 1.5"),
+    ("name: small", "name: small\ninfer: {behavioural: 0.3}", "`infer.behavioural` goes with an informal likelihood"),
+    ("name: small", "name: small\nsurvey: {file: no.csv}", "expected an existing file, got no.csv: put it there"),
+    ("name: small", "name: small\nname: smaller", "the key `name` stands twice"),
+    ("name: small", "name: small\n\tx: 1", "correct the YAML there or just before"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), REFUSED)
+def test_what_is_wrong_is_said_in_one_sentence(old, new, expected):
+    said = sentence(changed(old, new))
+    assert expected in said
+    assert said.startswith("small.yaml")
+    assert said.endswith((".", "?"))
+    assert "\n" not in said
+
+
+def test_numbers_of_yaml_1_2_are_numbers():
+    case = load_case(changed("name: small", "name: small\nnumerics: {tolerance: 1e-7, film_depth: 2E-3}"))
+    assert (case.numerics.tolerance, case.numerics.film_depth) == (1e-7, 2e-3)
+
+
+def test_a_misspelt_key_is_named_before_what_it_leaves_missing():
+    assert "`nmae` is not a known key: did you mean `name`?" in sentence(changed("name: small", "nmae: small"))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("- a\n- b\n", "expected keys and values"),
+        ("", "expected keys and values"),
+        ("a: [1", "line 1"),
+        ("a: \x00", "YAML"),
+    ],
+)
+def test_what_is_no_mapping_is_refused(text, expected):
+    assert expected in sentence(write(text))
+
+
+def test_missing_and_unreadable_files_are_named():
+    assert sentence(Path("none.yaml")).startswith("none.yaml cannot be read: No such file")
+    assert "named by `extends` in small.yaml" in sentence(write("extends: base.yaml\n"))
+    Path("latin.yaml").write_bytes("title: Gew\u00e4sser".encode("latin-1"))
+    assert "save it as UTF-8" in sentence(Path("latin.yaml"))
+
+
+def test_extends_merges_mappings_replaces_lists_and_forgets_nulls():
+    write(SMALL, "base/small.yaml")
+    child = """
+extends: base/small.yaml
+name: child
+numerics: {film_depth: 0.01}
+friction: {zones: null}
+plants: {stands: {reed: {canopy_height: 0.5, stems: null}}, patches: []}
+"""
+    case = load_case(write(child, "child.yaml"))
+    assert (case.name, case.friction.zones, case.plants.patches) == ("child", (), ())
+    assert case.plants.stands["reed"].canopy_height == 0.5
+    assert case.plants.stands["reed"].phi == "phi"
+    assert case.plants.stands["reed"].stems == 1.0
+
+
+def test_a_prior_or_law_given_anew_inherits_nothing():
+    write(SMALL, "base.yaml")
+    child = "extends: base.yaml\nparameters: {n_b: {distribution: normal, mean: 0.08, sd: 0.01, unit: '-'}}\n"
+    prior = load_case(write(child, "child.yaml")).parameters["n_b"]
+    assert (prior.low, prior.high, prior.mean) == (None, None, 0.08)
+
+
+def test_a_circle_of_extends_is_shown():
+    write("extends: b.yaml\n", "a.yaml")
+    write("extends: a.yaml\n", "b.yaml")
+    assert "a.yaml -> b.yaml -> a.yaml" in sentence(Path("a.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("child", "blamed"),
+    [
+        ("friction: {classes: {bed: {law: chezy, k_s: 1}}}", "child.yaml: `friction.classes.bed`"),
+        ("plants: {stands: null}", "base.yaml: `plants.patches[0].stand`"),
+    ],
+)
+def test_the_file_that_says_it_is_blamed(child, blamed):
+    write(SMALL, "base.yaml")
+    assert sentence(write(f"extends: base.yaml\n{child}\n", "child.yaml")).startswith(blamed)
+
+
+def test_files_are_found_beside_the_file_that_names_them():
+    write("x,y,z\n0,0,0\n", "data/bed.csv")
+    base = SMALL.replace("name: small", "name: small\nsurvey: {file: ../data/bed.csv}")
+    write(base, "base/small.yaml")
+    case = load_case(write("extends: ../../base/small.yaml\n", "far/away/child.yaml"))
+    assert case.survey.file == Path("data/bed.csv").resolve()
+
+
+def test_the_resolved_case_reads_as_the_same_case():
+    case = load_case(CONFIGS / "d3b_paper.yaml")
+    folder = Path(os.path.relpath(CONFIGS))
+    resolved = resolved_yaml(case)
+    assert "extends" not in resolved
+    assert str(Path.home()) not in resolved
+    tree = yaml.safe_load(resolved)
+    for part in (*tree["observations"], tree["survey"]):
+        part["file"] = str(folder / part["file"])
+    again = load_case(write(yaml.safe_dump(tree, sort_keys=False), "resolved.yaml"))
+    assert case_hash(again) == case_hash(case)
+
+
+def test_the_hash_follows_contents_and_not_places():
+    text = SMALL.replace("name: small", "name: small\nobservations: [{kind: level, file: levels.csv}]")
+    for folder in ("one", "two"):
+        write("experiment,x,y,level\nlow,1,0,0.9\n", f"{folder}/levels.csv")
+    one, two = (load_case(write(text, f"{folder}/small.yaml")) for folder in ("one", "two"))
+    assert case_hash(one) == case_hash(two)
+    before = case_hash(one)
+    write("experiment,x,y,level\nlow,1,0,0.8\n", "one/levels.csv")
+    assert case_hash(one) != before
+
+
+def test_results_of_other_equations_do_not_fit(monkeypatch):
+    case = load_case(write(SMALL))
+    before = case_hash(case), simulation_hash(case)
+    monkeypatch.setattr("vegglue.case.resolved_config.EQUATIONS", 1)
+    assert case_hash(case) != before[0]
+    assert simulation_hash(case) != before[1]
+
+
+def test_an_ensemble_outlives_another_likelihood_but_not_another_prior():
+    case = load_case(write(SMALL))
+    other = load_case(changed("name: small", "name: small\ninfer: {likelihood: nse, behavioural: 0.5}"))
+    assert simulation_hash(other) == simulation_hash(case)
+    assert case_hash(other) != case_hash(case)
+    assert simulation_hash(load_case(changed("high: 0.15", "high: 0.16"))) != simulation_hash(case)
+    # The order of the parameters decides which member gets which value.
+    first = "  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}\n"
+    swapped = write(SMALL.replace(first, "") + first)
+    assert simulation_hash(load_case(swapped)) != simulation_hash(case)
+
+
+def test_a_case_cannot_be_changed():
+    case = load_case(write(SMALL))
+    with pytest.raises(ValueError, match="frozen"):
+        case.name = "other"
+
+
+def test_several_inflows_each_need_their_discharge():
+    text = SMALL.replace("{side: west}", "{side: west}\n  side: {side: south, range: [10, 12], spread: uniform}")
+    assert "(one value, or one for each inflow [m3/s]) expected" in sentence(write(text))
+    both = load_case(write(text.replace("discharge: 2.66", "discharge: {upstream: 2, side: 0.5}")))
+    assert both.experiments["low"].discharge == {"upstream": 2.0, "side": 0.5}

@@ -1,0 +1,71 @@
+"""Priors: Sobol' points follow the distributions, and densities integrate to one over what quantiles cover."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from vegglue.case.prior import log_prior, quantile, sample_prior
+from vegglue.case.schema import Parameter
+
+PRIORS = {
+    "uniform": Parameter(distribution="uniform", low=0.01, high=0.15, unit="-"),
+    "loguniform": Parameter(distribution="loguniform", low=0.01, high=100, unit="-"),
+    "normal": Parameter(distribution="normal", mean=2.66, sd=0.1, unit="-"),
+    "bounded": Parameter(distribution="normal", mean=0.5, sd=1.0, low=0.0, high=2.0, unit="-"),
+    "lognormal": Parameter(distribution="lognormal", median=0.8, log_sd=0.3, unit="-"),
+}
+EXACT = [
+    ("uniform", 0.25, 0.045),
+    ("loguniform", 0.5, 1.0),
+    ("loguniform", 0.75, 10.0),
+    ("normal", 0.5, 2.66),
+    ("normal", 0.8413447460685429, 2.76),
+    ("lognormal", 0.5, 0.8),
+    ("lognormal", 0.8413447460685429, 0.8 * np.exp(0.3)),
+    ("bounded", 0.0, 0.0),
+    ("bounded", 1.0, 2.0),
+]
+
+
+@pytest.mark.parametrize(("name", "probability", "expected"), EXACT)
+def test_quantiles_are_the_closed_form(name, probability, expected):
+    assert quantile(PRIORS[name], probability) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", PRIORS)
+def test_density_is_the_derivative_of_the_distribution(name):
+    low, high = quantile(PRIORS[name], [0.1, 0.7])
+    share, _ = quad(lambda x: float(np.exp(log_prior({name: PRIORS[name]}, {name: x}))), low, high)
+    assert share == pytest.approx(0.6, rel=1e-7)
+
+
+def test_independent_priors_add_and_bounds_are_hard():
+    theta = {name: quantile(prior, [0.3, 0.6]) for name, prior in PRIORS.items()}
+    alone = [log_prior({name: prior}, theta) for name, prior in PRIORS.items()]
+    assert log_prior(PRIORS, theta) == pytest.approx(np.sum(alone, axis=0))
+    assert log_prior(PRIORS, theta | {"uniform": np.array([0.009, 0.02])})[0] == -np.inf
+
+
+def test_every_quarter_of_every_prior_gets_its_share_of_a_power_of_two():
+    sample = sample_prior(PRIORS, 256, seed=3)
+    for name, prior in PRIORS.items():
+        counts = np.histogram(sample[name], quantile(prior, [0.0, 0.25, 0.5, 0.75, 1.0]))[0]
+        assert counts.tolist() == [64] * 4, name
+
+
+def test_pairs_of_parameters_fill_every_sixteenth_of_their_plane():
+    sample = sample_prior({"a": PRIORS["uniform"], "b": PRIORS["uniform"]}, 256, seed=3)
+    counts = np.histogram2d(sample["a"], sample["b"], bins=4, range=[[0.01, 0.15]] * 2)[0]
+    assert np.all(counts == 16)
+
+
+def test_a_longer_sample_of_the_same_seed_begins_with_the_shorter():
+    short, long = sample_prior(PRIORS, 100, seed=7), sample_prior(PRIORS, 5000, seed=7)
+    assert short["loguniform"].shape == (100,)
+    assert np.array_equal(short["loguniform"], long["loguniform"][:100])
+    assert not np.array_equal(short["loguniform"], sample_prior(PRIORS, 100, seed=8)["loguniform"])
+
+
+def test_nothing_is_infinite_and_no_parameters_are_no_sample():
+    assert all(np.isfinite(values).all() for values in sample_prior(PRIORS, 4096, seed=0).values())
+    assert sample_prior({}, 16, seed=0) == {}

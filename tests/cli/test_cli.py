@@ -1,0 +1,212 @@
+"""The line end to end through the real command line, on the example of the README; and what it says to mistakes."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import case_hash, simulation_hash
+from vegglue.cli.main import app
+from vegglue.solver.batch import NEIGHBOURHOOD
+from vegglue.storage.hdf5 import read_ensemble, read_posterior, stored_hash
+
+pytestmark = pytest.mark.slow  # whole runs through the shell
+MEMBERS = 128
+STEPS = ("check", "simulate", "infer", "report")
+TRUE_N_B = 0.05  # of the README's measurements
+Finished = tuple[Path, dict[str, str]]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    """The folder of a user after all four steps, and what each said."""
+    folder = tmp_path_factory.mktemp("user")
+    config = write_reach(folder, ("members: 1024", f"members: {MEMBERS}"))
+    alone = {"simulate": ("--jobs", 1)}
+    return folder, {step: vegglue(folder, step, config.name, *alone.get(step, ())).stdout for step in STEPS}
+
+
+def test_every_step_says_what_it_made(finished: Finished) -> None:
+    folder, said = finished
+    run = folder / "runs/brook"
+    assert "540 cells, 15 of 15 stations in use" in said["check"]
+    assert f"{MEMBERS} of {MEMBERS} members" in said["simulate"]
+    assert f"{MEMBERS} members, 0 by marching, 0 failed, largest mass error" in said["simulate"]
+    assert "n_b: median 0.05" in said["infer"]
+    assert str(run / "report.html") in said["report"]
+    assert {file.name for file in run.iterdir()} == {
+        ".lock", "channel.png", "ensemble.h5", "posterior.h5", "report.html", "figures",
+    }  # fmt: skip
+    for picture in (run / "channel.png", *run.glob("figures/*.png")):
+        assert picture.read_bytes().startswith(b"\x89PNG"), picture
+
+
+def test_the_line_finds_what_the_measurements_were_made_with(finished: Finished) -> None:
+    run = finished[0] / "runs/brook"
+    ensemble, posterior = read_ensemble(run / "ensemble.h5"), read_posterior(run / "posterior.h5")
+    assert len(ensemble.status) == MEMBERS
+    assert ensemble.mass_error.max() < 1e-6
+    np.testing.assert_allclose(ensemble.section_flow, 2.0, rtol=1e-6)
+    assert posterior.median["n_b"] == pytest.approx(TRUE_N_B, abs=0.01)
+    assert 3 < posterior.median["phi"] < 20
+    assert posterior.rmse["velocity"] < 0.02
+
+
+def test_every_result_carries_the_case_it_was_made_from(finished: Finished, tmp_path: Path) -> None:
+    folder, _ = finished
+    case = load_case(folder / "brook.yaml")
+    ensemble = read_ensemble(folder / "runs/brook/ensemble.h5", simulation_hash(case))
+    assert ensemble.seed == case.simulate.seed
+    assert stored_hash(folder / "runs/brook/posterior.h5") == case_hash(case)
+    again = folder / "again.yaml"
+    again.write_text(ensemble.config, encoding="utf-8")
+    assert case_hash(load_case(again)) == case_hash(case)
+
+
+def test_what_is_up_to_date_is_not_made_again(finished: Finished) -> None:
+    folder, _ = finished
+    path = folder / "runs/brook/ensemble.h5"
+    before = path.stat().st_mtime_ns
+    assert vegglue(folder, "simulate", "brook.yaml").stdout == "runs/brook/ensemble.h5 is up to date.\n"
+    assert path.stat().st_mtime_ns == before
+
+
+class Fetched(HTMLParser):
+    """What a browser would fetch to show a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.places = re.findall(r"url\(['\"]?([^)'\"]*)|@import\s+(\S+)", text)
+        self.places = [place for pair in self.places for place in pair if place]
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        wanted = {"src", "srcset", "data", "poster"} | ({"href", "xlink:href"} if tag != "a" else set())
+        self.places += [value for name, value in attributes if name in wanted and value]
+
+
+def test_the_report_needs_no_network(finished: Finished) -> None:
+    places = Fetched((finished[0] / "runs/brook/report.html").read_text(encoding="utf-8")).places
+    assert places, "a page with figures refers to something"
+    assert [place[:60] for place in places if not place.startswith(("#", "data:"))] == []
+
+
+def test_the_snippet_of_the_readme_runs(
+    finished: Finished, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(finished[0])
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    names: dict[str, object] = {}
+    exec(compile(block("python"), "README.md", "exec"), names)
+    said = capsys.readouterr().out
+    assert re.search(r"n_b +0\.05", said)
+    assert float(re.findall(r"([\d.]+) m/s is expected", said)[0]) == pytest.approx(0.40, abs=0.03)
+    assert isinstance(names["weights"], xr.DataArray)
+    for file in ("members", "ensemble"):
+        names[file].close()  # type: ignore[attr-defined]
+
+
+def test_an_ensemble_without_measurements_can_be_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write_reach(tmp_path, COARSE, (yaml_part("observations"), ""))
+    monkeypatch.chdir(tmp_path)
+    several = 4 * NEIGHBOURHOOD + 1  # more than one chunk
+    assert said_to(monkeypatch, capsys, "simulate", config, "--members", several, "--jobs", 1) == (0, "")
+    ensemble = read_ensemble(tmp_path / "runs/brook/ensemble.h5")
+    assert ensemble.prediction.shape == (several, 0)
+    assert ensemble.mass_error.max() < 1e-6
+    code, error = said_to(monkeypatch, capsys, "infer", config, "--members", several)
+    assert (code, error.count("\n")) == (2, 1), error
+    assert "nothing can be inferred" in error
+
+
+def yaml_part(key: str) -> str:
+    """The lines of the README's case that belong to one key."""
+    found = re.search(rf"^{key}:.*\n(?:  .*\n)*", block("yaml"), re.MULTILINE)
+    assert found
+    return found[0]
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("canopy_height:", "canopy_hight:", "`plants.stands.willow.canopy_hight` is not a known key: did you mean"),
+        ("level: 0.95", "level: deep", "names the parameter `deep`, which is not declared"),
+        ("discharge: 2.0", "discharge: -2.0", "expected a number above 0, got -2"),
+        ("file: velocities.csv", "file: elsewhere.csv", "expected an existing file, got elsewhere.csv"),
+        ("title: A short", "title: [A short", "correct the YAML there or just before"),
+    ],
+)
+def test_a_mistake_in_the_config_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    step: str, old: str, new: str, expected: str,
+) -> None:  # fmt: skip
+    config = write_reach(tmp_path, (old, new))
+    monkeypatch.chdir(tmp_path)
+    code, error = said_to(monkeypatch, capsys, step, config.name)
+    assert (code, error.count("\n")) == (2, 1), error
+    assert expected in error
+    assert error.startswith("brook.yaml")
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"),
+    [("infer", "run `vegglue simulate CONFIG`"), ("report", "run `vegglue simulate CONFIG`")],
+)
+def test_a_step_out_of_turn_names_the_one_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], step: str, expected: str
+) -> None:
+    config = write_reach(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    code, error = said_to(monkeypatch, capsys, step, config)
+    assert (code, error.count("\n")) == (2, 1), error
+    assert expected in error
+
+
+@pytest.mark.parametrize("arguments", [("--members", 0), ("--members", -3), ("--members", "many"), ("--jobs", 0)])
+def test_an_impossible_option_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[object, ...]
+) -> None:
+    config = write_reach(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    code, error = said_to(monkeypatch, capsys, "simulate", config, *arguments)
+    assert code == 2
+    assert str(arguments[0]) in error
+
+
+def test_mistakes_show_no_traceback_in_a_process_of_their_own(tmp_path: Path) -> None:
+    done = vegglue(tmp_path, "check", "nowhere.yaml", succeed=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "nowhere.yaml cannot be read: No such file or directory; check the path.\n"
+
+
+def test_the_readme_names_commands_and_targets_that_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z]+):", makefile, re.MULTILINE))
+    named = set(re.findall(r"`make ([a-z ]+)`", README)) | set(re.findall(r"^make ([a-z]+)", README, re.MULTILINE))
+    assert {"demo", "test", "paper"} <= {word for words in named for word in words.split()} <= targets
+    commands = set(re.findall(r"^\| `vegglue ([a-z]+)", README, re.MULTILINE))
+    assert commands == {str(command.name or command.callback.__name__) for command in app.registered_commands}
+    members = re.search(r"^DEMO_MEMBERS \?= (\d+)$", makefile, re.MULTILINE)
+    assert members
+    demo = next(line for line in README.splitlines() if line.startswith("make demo"))
+    assert f"{int(members[1]):,} members" in demo
+    assert "`make paper`" in demo
+
+
+def test_every_key_of_the_readmes_table_is_one_of_a_case() -> None:
+    known = set(yaml.safe_load(block("yaml"))) | {"extends", "outlet", "infer", "numerics", "eddy_viscosity"}
+    known |= {"survey", "reference", "canopy_correction"}
+    rows = re.findall(r"^\| ((?:`[a-z_.: ]+`(?:, )?)+) \|", README, re.MULTILINE)
+    keys = {re.split(r"[.:]", key)[0] for row in rows for key in re.findall(r"`([^` ]+)[^`]*`", row)} - {"vegglue"}
+    assert keys - known == set()
+    assert len(keys) > 10

@@ -1,0 +1,73 @@
+"""The loop on data that another code made. They lie in a folder `shared` beside the repository, else: skipped.
+
+As a user has it: `vegglue import`, and nothing edited by hand.
+"""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.importers.field_folder import case_from_folder
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.workflow.loop import Grown, diagnosed, grow
+from vegglue.workflow.run_folder import folder_of
+
+CASES = Path(__file__).parents[3] / "shared" / "cases"
+EDDIES = {"viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures", "edge_mixing"}
+# Largest error of velocities that no calibration has seen, once the effect is added [m/s].
+WANTED = 0.010
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository"),
+]
+
+
+def imported(name: str, folder: Path) -> Case:
+    target = folder / f"{name}.yaml"
+    target.write_text(yaml.safe_dump(case_from_folder(CASES / name, target)), encoding="utf-8")
+    return load_case(target)
+
+
+def looked_into(case: Case, folder: Path) -> Diagnosis:
+    return diagnosed(case, folder_of(folder / "runs", case), -1, print)
+
+
+def extended(case: Case, folder: Path) -> Grown:
+    return grow(case, folder / "runs", -1, print)
+
+
+def test_where_nothing_is_hidden_nothing_is_found(tmp_path: Path) -> None:
+    found = looked_into(imported("open-a", tmp_path), tmp_path)
+    assert found.verdict == "nothing-missing", found.sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "hidden", "true"),
+    [
+        ("open-b", "secondary_current", 0.010),
+        ("open-c", "streamlining", -0.9),
+        ("open-d", "discharge_error[high]", 0.09),
+        ("open-e", "mixing_length", 0.5),
+    ],
+)
+def test_what_is_hidden_is_found_and_added(name: str, hidden: str, true: float, tmp_path: Path) -> None:
+    case = imported(name, tmp_path)
+    found = looked_into(case, tmp_path)
+    assert found.verdict in ("identified", "one-of"), found.sentence
+    assert len(found.steps) == 1, found.sentence
+    assert hidden in found.set, found.sentence
+    assert len(found.set) == 1 or set(found.set) <= EDDIES, found.sentence
+    low, high = next(one.interval95 for one in found.suspects if one.name == hidden)
+    assert low <= true <= high
+    before, after = extended(case, tmp_path).rungs
+    assert after.validation < min(before.validation, WANTED)
+
+
+def test_something_unlisted_is_none_of_these_and_has_a_place(tmp_path: Path) -> None:
+    found = looked_into(imported("open-f", tmp_path), tmp_path)
+    assert found.verdict == "none-of-these", found.sentence
+    assert found.where is not None
+    assert ((found.where.x - 33.0) ** 2 + (found.where.y + 0.6) ** 2) ** 0.5 < 1.5

@@ -1,0 +1,218 @@
+"""Figures of a diagnosis and of the ladder: what is drawn is what was found, and nothing missing breaks them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnoses import NOTHING, a_diagnosis
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+
+from vegglue.diagnosis.comparison import Rung, held_out, improvement
+from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
+from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones
+from vegglue.figures.style import COLOUR
+from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
+from vegglue.report.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
+from vegglue.results.diagnosis import Diagnosis, Step
+
+SUSPECTS = pd.DataFrame({
+    "name": list("abcde"), "status": list(MARKS), "first": [40.0, -30.0, 9.0, 1.0, 0.5],
+    "left": [np.nan, np.nan, 1.5, 0.2, np.nan], "visibility": [0.9, 0.5, 0.4, 0.3, 0.01],
+})  # fmt: skip
+
+
+def stations(**columns: object) -> pd.DataFrame:
+    found = a_diagnosis()
+    predictions = {"prediction_first": found.prediction_first, "prediction": found.prediction, "error": found.error}
+    return found.station.assign(**predictions | columns)
+
+
+def texts(axes: Axes) -> list[str]:
+    return [text.get_text() for text in axes.texts]
+
+
+def test_standings_follow_the_verdict() -> None:
+    found = a_diagnosis()
+    said = {one.name: standing_of(found, one) for one in found.suspects}
+    assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
+    assert [one.name for one in ranked(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
+    louder = replace(found, first_scores=found.first_scores | {"turning": -9.0})
+    assert standing_of(louder, found.suspects[3]) == "less likely"
+
+
+def test_errors_leave_out_what_does_not_count() -> None:
+    found = a_diagnosis()
+    value = found.station["value"].to_numpy(float)
+    off = np.array([0.03, 9.0, 9.0, 0.04, 0.0, 9.0])  # row 1 is flagged, 2 and 5 are levels
+    assert error_of(found, value - off) == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 3))
+    assert error_of(found, value - off, "level") == pytest.approx(9.0)
+    assert np.isnan(error_of(replace(found, station=found.station.assign(used=False)), value))
+
+
+def test_words_tell_scores_before_and_after() -> None:
+    rows = {row.name: row for row in diagnosis_in_words(a_diagnosis()).suspects}
+    assert rows["turning"].score == "−1.0 → −1.0"
+    assert rows["eddies"].score == "45.2"  # refitted, not looked at again
+    assert rows["eddies"].p_family.startswith("&lt;")
+    assert rows["eddies"].chance.startswith("70")
+    assert rows["wind"].chance == ""
+    assert diagnosis_in_words(a_diagnosis()).flagged[0].measured == "0.500"
+
+
+def test_what_a_later_step_accepts_has_its_chance() -> None:
+    second = Step("mixing[D3]", ("mixing[D3]",), (1.0,), (("mixing[D3]",),), 9.0, 1.0, 0.0)
+    found = replace(a_diagnosis(), steps=(*a_diagnosis().steps, second))
+    assert found.chances == {"eddies": 0.7, "mixing[D3]": 1.0}
+    assert found.set == ["eddies", "mixing[D3]"]
+
+
+def test_profiles_show_both_predictions_and_what_they_leave() -> None:
+    table = stations()
+    figure = draw_profiles(table, "eddies", [1])
+    upper, lower = figure.axes[:2]
+    row = table[(table["experiment"] == "low") & (table["section"] == "D3")]
+    drawn = {tuple(line.get_ydata()): line for line in upper.lines}
+    assert tuple(row["prediction"]) in drawn
+    assert drawn[tuple(row["prediction_first"])].is_dashed()
+    assert any(line.get_marker() == "x" and list(line.get_ydata()) == [0.5] for line in upper.lines)
+    after = (row["value"] - row["prediction"]) / row["error"]
+    assert any(np.allclose(line.get_ydata(), after) for line in lower.lines if len(line.get_ydata()) == len(after))
+
+
+def test_profiles_of_an_unchanged_model_show_it_once() -> None:
+    figure = draw_profiles(stations(), "")
+    assert not any(line.is_dashed() for line in figure.axes[0].lines)
+    assert "model" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_gauges_show_millimetres() -> None:
+    table = stations(value=1.2, prediction=1.195, prediction_first=1.19)
+    low = draw_gauges(table, "eddies").axes[0]
+    assert {round(float(line.get_ydata()[0]), 6) for line in low.lines if line.get_marker() == "o"} == {5.0, 10.0}
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
+    zones = a_diagnosis().zones.head(rows)
+    axes = draw_zones(zones).axes[0]
+    assert texts(axes)[:2] == ["2.3", "+5.0"]  # sqrt(11 / 2) and 0.02 / 0.004
+    faces = [to_hex(squares.get_facecolor()[0]) for squares in axes.collections if len(squares.get_facecolor())]
+    assert faces[0] == COLOUR["measured"]
+
+
+def test_places_mark_what_was_found() -> None:
+    found = a_diagnosis()
+    axes = draw_places(found.map_x, found.map_y, found.map_score, (33.0, -0.6), [], np.zeros((1, 2))).axes[0]
+    assert "x = 33.0, y = −0.6 m" in texts(axes)
+    assert any(line.get_marker() == "*" and list(line.get_xdata()) == [33.0] for line in axes.lines)
+
+
+@pytest.mark.parametrize("places", [1, 2])
+def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
+    found = a_diagnosis()
+    part = found.map_x[:places], found.map_y[:places], found.map_score[:places]
+    assert draw_places(*part, None, [], np.zeros((0, 2))).axes
+
+
+def test_suspects_differ_by_form_and_not_by_colour_alone() -> None:
+    scores, visible = draw_suspects(SUSPECTS, 3.4).axes
+    marks = {line.get_label(): line for line in scores.lines if line.get_label() in MARKS}
+    forms = {name: (line.get_marker(), line.get_markerfacecolor() == COLOUR["paper"]) for name, line in marks.items()}
+    assert set(forms) == set(MARKS)
+    assert len(set(forms.values())) == len(forms)
+    assert list(marks["rival"].get_xdata()) == [30.0]
+    assert [bar.get_width() for bar in visible.patches] == list(SUSPECTS["visibility"])
+    assert "e (untestable)" in [tick.get_text() for tick in scores.get_yticklabels()]
+    assert any(list(line.get_xdata()) == [3.4, 3.4] for line in scores.lines)
+
+
+def test_alike_effects_stand_together_in_a_frame() -> None:
+    cosine = np.array([[1, 0.1, 0.95], [0.1, 1, -0.2], [0.95, -0.2, 1]])
+    axes = draw_alike(["a", "b", "c"], cosine).axes[0]
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["a", "c", "b"]
+    frames = [patch for patch in axes.patches if to_hex(patch.get_edgecolor()) == COLOUR["measured"]]
+    assert [(frame.get_xy(), frame.get_width()) for frame in frames] == [((-0.5, -0.5), 2)]
+    hollow = [patch for patch in axes.patches if patch.get_facecolor()[3] == 0 and patch not in frames]
+    assert len(hollow) == 2  # b and c are opposed, seen from both
+
+
+def test_fingerprint_draws_each_experiment_across_each_section() -> None:
+    found = a_diagnosis()
+    trace = np.array([0.1, 0.2, 0.003, 0.3, 0.4, 0.004])
+    section, gauges = draw_fingerprint(trace, found.station, "m2/s").axes
+    lines = [list(line.get_ydata()) for line in section.lines if line.get_marker() == "."]
+    assert sorted(lines) == [[0.1, 0.2], [0.3, 0.4]]
+    assert section.get_ylabel() == "change of u [m/s per m2/s]"
+    assert gauges.get_ylabel() == "change of level [m per m2/s]"
+
+
+@pytest.mark.parametrize("kind", ["velocity", "level"])
+def test_fingerprint_of_one_kind_of_measurement_is_a_file(tmp_path: Path, kind: str) -> None:
+    station = a_diagnosis().station
+    station = station[station["kind"] == kind]
+    save_fingerprint_figure(np.zeros(len(station)), station, "-", tmp_path / "figures" / "trace.png")
+    assert (tmp_path / "figures" / "trace.png").read_bytes().startswith(b"\x89PNG")
+
+
+def alone(found: Diagnosis) -> Diagnosis:
+    """One experiment, one section, no gauges."""
+    kept = (found.station["experiment"] == "low") & (found.station["kind"] == "velocity")
+    rows = np.flatnonzero(kept)
+    arrays = {name: getattr(found, name)[rows] for name in ("prediction_first", "prediction", "error")}
+    return replace(found, station=found.station[kept].reset_index(drop=True), zones=found.zones.head(1), **arrays)
+
+
+@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, a_diagnosis(where=None, steps=()), alone(a_diagnosis())])
+def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
+    assert diagnosis.sentence.split()[0] in draw_diagnosis(diagnosis, []).get_suptitle()
+
+
+def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
+    case = pytest.importorskip("test_report").a_toy(tmp_path).case
+    save_diagnosis_figure(a_diagnosis(), case, tmp_path / "diagnosis.png")
+    assert (tmp_path / "diagnosis.png").read_bytes().startswith(b"\x89PNG")
+
+
+def a_rung(name: str, error: float, **changes: object) -> Rung:
+    pattern = np.array([1.0, -1.0, 1.0, -1.0]) * error
+    rung = Rung(
+        name=name, title=name, effects=(), parameters=2, rmse={"velocity": 0.8 * error, "level": 0.001}, chi2=4.0,
+        stations=4, noise_floor=0.01, sections=pattern, experiments=np.full(4, np.nan), log_score=1.0, inside50=0.5,
+        inside95=0.95, values={"n_b": (0.03, 0.02, 0.04), "k_s": (0.5, 0.01, 3.0)},
+        homogeneity={"n_b": 0.001 if error > 0.02 else 0.4}, validation=float("nan"), velocity=np.ones(4, bool),
+        place=("low D0", "low D3", "high D0", "high D3"),
+    )  # fmt: skip
+    return replace(rung, **changes)
+
+
+def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
+    before, after = a_rung("a", 0.05), a_rung("b", 0.012, effects=("eddies",))
+    before = replace(before, sections=before.sections * np.array([1.0, 1.1, 0.9, 1.2]))
+    figure = draw_ladder([before, after])
+    axes = figure.axes[0]
+    solid = next(line for line in axes.lines if line.get_linestyle() == "-" and line.get_marker() == "o")
+    assert list(solid.get_ydata()) == [held_out(before), held_out(after)]
+    bar = axes.collections[0].get_segments()[1]
+    assert (bar[1, 1] - bar[0, 1]) / 2 == pytest.approx(improvement(before, after)[1] / (2 * held_out(after)))
+    assert "+ eddies" in axes.get_xticklabels()[1].get_text()
+    assert {"held out by section", "in sample", "error of measuring"} <= set(texts(axes))
+    assert "not seen by any fit" not in texts(axes)
+
+
+def test_ladder_tells_parameters_that_move_from_those_that_stand_still() -> None:
+    figure = draw_ladder([a_rung("a", 0.05), a_rung("b", 0.012)])
+    n_b = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("n_b"))
+    faces = [line.get_markerfacecolor() for line in n_b.lines]
+    assert faces == [COLOUR["paper"], COLOUR["model"]]
+
+
+@pytest.mark.parametrize(
+    "rungs", [[a_rung("a", 0.05)], [a_rung("a", 0.05, values={}, homogeneity={}, sections=np.full(4, np.nan))]]
+)
+def test_ladder_of_one_rung_is_a_file(tmp_path: Path, rungs: list[Rung]) -> None:
+    save_ladder_figure(rungs, tmp_path / "runs" / "ladder.svg")
+    assert "<svg" in (tmp_path / "runs" / "ladder.svg").read_text(encoding="utf-8")

@@ -1,0 +1,38 @@
+"""Rows of thin water as chord steps need them: roots stay roots, deep water stays as it is."""
+
+import numpy as np
+from channels import river, solved
+
+from vegglue.flow import thin_water
+from vegglue.flow.equations import eased, faces, residual, slope_of_friction
+from vegglue.flow.problem import ACROSS, ALONG
+
+
+def test_easing_moves_no_root_and_leaves_deep_water():
+    """Eased rows vanish with the residual, and only with it; they are the residual's where water is not thin."""
+    problem = river()
+    state = solved(problem)
+    slope = slope_of_friction(problem, state)
+    assert np.abs(eased(problem, state, slope)).max() < 1e-8
+    moved = state + 1e-3 * np.random.default_rng(5).standard_normal(state.shape)
+    moved[:, ACROSS, 0] = 0.0
+    plain, other = residual(problem, moved), eased(problem, moved, slope)
+    deep = np.minimum(faces(problem, moved).cell[:-1], faces(problem, moved).cell[1:]) > thin_water.THIN * problem.film
+    assert (plain[:-1, ALONG] == other[:-1, ALONG])[deep].all()
+    changed = plain != other
+    assert changed[:, ALONG].any()
+    assert (np.sign(plain) == np.sign(other))[changed].all()
+
+
+def test_easing_is_exact_where_friction_is_all():
+    """In a film the root of k |U| u = -g dz/dx in one step, from ten times its speed."""
+    problem = river()
+    state = solved(problem)
+    film = faces(problem, state).cell[:-1] < 0.2 * problem.film
+    assert film.any()
+    slope = slope_of_friction(problem, state)
+    faster = state.copy()
+    faster[:-1, ALONG] = np.where(film, 10.0 * state[:-1, ALONG] + 1e-3, state[:-1, ALONG])
+    step = eased(problem, faster, slope)[:-1, ALONG][film] / slope[:-1, ALONG][film]
+    error = np.abs(faster[:-1, ALONG][film] - step - state[:-1, ALONG][film])
+    assert np.median(error) < 0.1 * np.median(np.abs(state[:-1, ALONG][film]))

@@ -1,0 +1,154 @@
+"""The importer of the published confluence set: what it makes of a small one, and the set itself where it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.cli.loop_commands import import_command
+from vegglue.diagnosis.diagnose import diagnose
+from vegglue.engine.linearised_model import linearise
+from vegglue.errors import InputError
+from vegglue.importers.confluence import case_from_confluence, discharge, flat_bed, holds_confluence
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow.run_folder import model_in, validation_of
+
+PUBLISHED = Path(__file__).parents[3] / "shared" / "real" / "confluence"
+SECTIONS = (-1.0, -0.4, 0.1, 0.8, 1.4)
+HEADING = "x_m,y_m,h_m,U_depthavg_ms,V_depthavg_ms,bed_extrapolated"
+# Of the small set: width [m], speed upstream and downstream [m/s], depth over the even bed [m].
+WIDTH, SLOW, FAST, DEPTH = 0.6, 0.4, 0.5, 0.1
+
+
+def bed_level(x: float, y: float) -> float:
+    """A bed that falls by 2 in 1000, with a hole 0.1 m deep at the junction."""
+    return -0.002 * x - 0.1 * float(np.exp(-((x - 0.2) ** 2 + (y - 0.1) ** 2) / 0.02))
+
+
+def small_set(folder: Path) -> Path:
+    """A set laid out as the published one: maps that stop short of the walls, verticals within the tributary."""
+    folder.mkdir()
+    places = [(x, y) for x in np.arange(-1.6, 2.01, 0.05) for y in [*np.arange(0.04, 0.6, 0.04), WIDTH]]
+    bed = [f"{x:.3f},{y:.3f},{bed_level(x, y):.5f}" for x, y in places]
+    level = [f"{x:.3f},{y:.3f},{DEPTH - 0.002 * x:.5f}" for x, y in places]
+    verticals = []
+    for x in SECTIONS:
+        for y in (0.02, 0.1, 0.2, 0.3, 0.4, 0.5):
+            u, v = SLOW if x <= 0 else FAST, "" if y == 0.3 else "0.01"
+            verticals.append(f"{x},{y},{DEPTH},{u},{v},{int(y < 0.04)}")
+    verticals += ["0.1,-0.1,0.2,0.2,0.2,1", "0.1,-0.05,0.2,0.1,0.1,1"]
+    write(folder / "bed.csv", ["x_m,y_m,z_bed_m", *bed])
+    write(folder / "water_level.csv", ["x_m,y_m,z_ws_m", *level])
+    write(folder / "depth_averaged.csv", [HEADING, *verticals])
+    return folder
+
+
+def write(path: Path, lines: list[str]) -> None:
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> Path:
+    target = tmp_path / "made" / "junction.yaml"
+    import_command(small_set(tmp_path / "set"), target)
+    return target
+
+
+def test_only_its_own_layout_is_recognised(tmp_path: Path) -> None:
+    assert holds_confluence(small_set(tmp_path / "set"))
+    assert not holds_confluence(tmp_path)
+
+
+def test_every_second_section_is_held_out(imported: Path) -> None:
+    case = load_case(imported)
+    seen = read_observations(case).table
+    unseen = validation_of(case)
+    assert unseen is not None
+    velocity = seen[seen["kind"] == "velocity"]
+    assert sorted(velocity["x"].unique()) == [-1.0, 0.1, 1.4]
+    assert sorted(unseen.station["x"].unique()) == [-0.4, 0.8]
+    assert set(velocity["value"]) == {SLOW, FAST}
+
+
+def test_verticals_off_the_map_or_in_the_tributary_are_no_measurements(imported: Path) -> None:
+    table = read_observations(load_case(imported)).table
+    assert table.loc[table["kind"] == "velocity", "y"].min() == 0.1
+
+
+def test_levels_are_block_means_with_an_error(imported: Path) -> None:
+    table = read_observations(load_case(imported)).table
+    level = table[table["kind"] == "level"]
+    assert 20 < len(level) < 60
+    assert level["value"].to_numpy() == pytest.approx(DEPTH - 0.002 * level["x"].to_numpy(), abs=1e-4)
+    assert (level["standard_error"] >= 0.001).all()
+
+
+def test_the_bed_reaches_the_walls(imported: Path) -> None:
+    site = build_site(load_case(imported))
+    wanted = np.array([[bed_level(x, min(max(y, 0.04), 0.6)) for y in site.grid.y] for x in site.grid.x])
+    assert site.bed == pytest.approx(wanted, abs=0.006)
+    assert site.bed.min() < -0.08
+
+
+def test_the_plane_has_no_hole(imported: Path) -> None:
+    case = load_case(imported.with_stem("junction-flat"))
+    bed, surveyed = build_site(case).bed, build_site(load_case(imported)).bed
+    assert np.ptp(bed, axis=1).max() == 0.0
+    assert bed.mean() == pytest.approx(surveyed.mean(), abs=0.002)
+    assert read_observations(case).table.equals(read_observations(load_case(imported)).table)
+
+
+def test_priors_of_discharge_come_from_the_sections(imported: Path) -> None:
+    parameters = load_case(imported).parameters
+    before, after = SLOW * DEPTH * WIDTH, FAST * DEPTH * WIDTH
+    assert parameters["discharge"].mean == pytest.approx(before, rel=1e-6)
+    assert parameters["side_discharge"].mean == pytest.approx(after - before, rel=1e-6)
+    assert parameters["side_discharge"].low > 0.0
+
+
+def test_the_angle_is_that_of_the_mouth(imported: Path) -> None:
+    side = load_case(imported).inflows["side"]
+    assert (side.side, side.range, side.angle) == ("south", (0.0, 0.15), 45.0)
+
+
+def test_water_flows_in_the_middle_of_the_priors(imported: Path) -> None:
+    for bed in ("junction", "junction-flat"):
+        model = model_in(load_case(imported.with_stem(bed)))
+        point = linearise(model, np.zeros(len(model.names)))
+        assert point is not None
+        assert point.prediction[(model.station["kind"] == "velocity").to_numpy()] == pytest.approx(0.45, abs=0.45)
+
+
+def test_discharge_reaches_the_walls() -> None:
+    assert discharge(np.array([0.2, 0.1]), np.array([3.0, 1.0]), 0.5) == pytest.approx(0.1 + 0.2 + 0.9)
+
+
+def test_a_missing_column_is_a_sentence(tmp_path: Path) -> None:
+    folder = small_set(tmp_path / "set")
+    text = (folder / "bed.csv").read_text(encoding="utf-8")
+    (folder / "bed.csv").write_text(text.replace("z_bed_m", "z"), encoding="utf-8")
+    with pytest.raises(InputError, match="without z_bed_m"):
+        case_from_confluence(folder, tmp_path / "made.yaml")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="no folder `shared/real/confluence` beside the repository")
+def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) -> None:
+    """And from either bed the diagnosis says that it knows no name for what is missing, near the junction."""
+    target = tmp_path / "confluence.yaml"
+    import_command(PUBLISHED, target)
+    left = {}
+    for bed in ("confluence", "confluence-flat"):
+        model = model_in(load_case(target.with_stem(bed)))
+        found = diagnose(model, jobs=1)
+        velocity = (found.station["kind"] == "velocity").to_numpy()
+        error = found.station["value"].to_numpy(float) - found.prediction_first
+        left[bed] = float(np.sqrt(np.mean(error[velocity] ** 2)))
+        assert found.verdict == "none-of-these", found.sentence
+        assert found.where is not None
+        assert abs(found.where.x) < 0.6
+        assert found.where.y < 0.3
+    assert left["confluence"] < 0.6 * left["confluence-flat"], left
+    assert flat_bed(PUBLISHED, target)["extends"] == "confluence.yaml"

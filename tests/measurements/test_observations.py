@@ -1,0 +1,235 @@
+"""The shipped synthetic record, and files with faults: what is read, flagged, refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.errors import InputError
+from vegglue.measurements.observations import STATION_COLUMNS, fitted_curve, read_observations
+
+ROOT = Path(__file__).parents[2]
+CASES = {name: load_case(ROOT / "configs" / f"{name}.yaml") for name in ("d0", "d3a", "d3b")}
+READ = {name: read_observations(case) for name, case in CASES.items()}
+KEY = {"d0": ("D0", "D0"), "d3a": ("D3a", "D3"), "d3b": ("D3b", "D3")}
+SHIPPED = [row for row in (ROOT / "data/kict/adv_points.csv").read_text().splitlines() if row.startswith("D3a")]
+POINTS = "case,device,x,y,z,u,u_std,duration_s\n"
+
+
+def changed(base, **update):
+    """The case with its first observation changed."""
+    observation = base.observations[0].model_copy(update=update)
+    return base.model_copy(update={"observations": (observation,)})
+
+
+def with_file(tmp_path, text, kind=None):
+    file = tmp_path / "measured.csv"
+    file.write_text(text)
+    if kind is None:
+        return changed(CASES["d3a"], file=file)
+    nothing = dict.fromkeys(("experiment", "section", "case", "average", "floor", "surface"))
+    return changed(CASES["d3a"], file=file, kind=kind, **nothing)
+
+
+@pytest.mark.parametrize(("name", "verticals", "used"), [("d0", 21, 21), ("d3a", 21, 20), ("d3b", 12, 12)])
+def test_every_vertical_is_a_station_and_only_the_dead_probe_is_not_used(name, verticals, used):
+    table = READ[name].table
+    assert tuple(table.columns) == STATION_COLUMNS
+    assert list(table.index) == list(range(verticals))
+    assert table["used"].sum() == used
+    assert (table["used"] == (table["reason"] == "")).all()
+    assert table["standard_error"].between(0.01, 0.05).all()
+
+
+def test_dead_probe_is_flagged_and_kept_with_all_its_points():
+    flagged = READ["d3a"].table[~READ["d3a"].table["used"]]
+    assert list(flagged["y"]) == [6.4]
+    assert "near zero at all 25 heights" in flagged["reason"].item()
+    assert abs(flagged["value"].item()) < 0.01
+    points = READ["d3a"].points
+    assert len(points) == len(SHIPPED)
+    assert set(points.loc[~points["used"], "y"]) == {6.4}
+
+
+def test_stations_are_in_the_coordinates_of_the_model():
+    assert set(READ["d3a"].table["x"]) == {402.0}
+    assert READ["d3a"].table["depth"].max() == pytest.approx(1.32)
+    bank = READ["d0"].table.set_index("y").loc[2.5, "depth"]
+    assert bank == pytest.approx(1.19 - 1.5 * 0.6667)
+
+
+def test_verticals_on_the_edge_of_a_patch_are_not_inside_it():
+    profiles = READ["d3a"].profiles
+    assert list(profiles.loc[profiles["plants"], "y"]) == [4.3, 4.6, 4.9, 5.2]
+    assert not READ["d0"].profiles["plants"].any()
+    experiment = CASES["d3a"].experiments["D3a"].model_copy(update={"plants": False})
+    bare = CASES["d3a"].model_copy(update={"experiments": {"D3a": experiment}})
+    assert not read_observations(bare).profiles["plants"].any()
+
+
+@pytest.mark.parametrize("rule", ["paper", "profile"])
+@pytest.mark.parametrize("name", list(KEY))
+def test_discharge_is_the_known_one_within_its_error(name, rule):
+    discharge = READ[name].discharge[KEY[name]][rule]
+    assert abs(discharge.value - 2.66) < 2.0 * discharge.standard_error
+    assert discharge.standard_error < 0.1
+    assert discharge.sampling < discharge.spacing
+
+
+def test_neighbours_tell_the_error_that_was_put_on_every_vertical():
+    """0.8 of the paper's sigma, which the points of a single vertical do not show."""
+    for name, sigma in {"d0": 0.039, "d3a": 0.024, "d3b": 0.030}.items():
+        error = READ[name].neighbour_error[KEY[name]]
+        assert error == pytest.approx(0.8 * sigma, rel=0.35)
+        used = READ[name].table.query("used")
+        assert np.sqrt((used["standard_error"] ** 2).mean()) == pytest.approx(error, rel=1e-6)
+        assert (READ[name].profiles["fitted_error"].max()) < error
+
+
+@pytest.mark.parametrize(("name", "height"), [("d3a", 0.8), ("d3b", 1.06)])
+def test_canopy_height_is_found(name, height):
+    canopy = READ[name].canopy_height[KEY[name]]
+    assert abs(canopy.value - height) < 2.0 * canopy.standard_error
+    assert canopy.standard_error < 0.05
+
+
+def test_rule_of_the_case_gives_the_value_and_its_error():
+    profiles = READ["d3a"].profiles
+    by_profile = read_observations(changed(CASES["d3a"], average="profile")).table
+    assert np.array_equal(by_profile["value"], profiles["fitted"])
+    assert np.array_equal(READ["d3a"].table["value"], profiles["linear"])
+    difference = profiles["linear"] - profiles["fitted"]
+    own = {"fitted": profiles["fitted_error"], "linear": np.hypot(profiles["linear_error"], difference / np.sqrt(3.0))}
+    for table, error in ((by_profile, own["fitted"]), (READ["d3a"].table, own["linear"])):
+        assert np.ptp(table["standard_error"] ** 2 - error**2) == pytest.approx(0.0, abs=1e-12)
+    given = read_observations(changed(CASES["d3a"], standard_error=0.024)).table
+    assert set(given["standard_error"]) == {0.024}
+
+
+def test_fitted_curve_passes_through_the_points():
+    row = READ["d3a"].profiles.set_index("y").loc[4.6]
+    points = READ["d3a"].points.query("y == 4.6")
+    miss = fitted_curve(row).velocity(points["height"].to_numpy()) - points["u"]
+    assert miss.std() < 0.04
+    assert fitted_curve(READ["d3a"].profiles.set_index("y").loc[6.4]) is None
+
+
+def test_points_outside_the_water_are_kept_with_the_reason():
+    points = read_observations(changed(CASES["d3a"], surface=-3.0)).points
+    outside = points[points["reason"] == "above the water surface"]
+    assert (outside["z"] > -3.0).all()
+    assert not outside["used"].any()
+    assert len(points) == len(SHIPPED)
+
+
+def test_wrong_datum_is_refused():
+    with pytest.raises(InputError, match="check `floor`, `surface` and `offset`"):
+        read_observations(changed(CASES["d3a"], floor=0.0, surface=1.3))
+
+
+def test_files_without_turbulence_and_duration_still_get_errors(tmp_path):
+    rows = [f"D3a,p,102,{y},{z},{0.3 + 0.1 * np.log(z + 4.2):.4f}" for y in (4.6, 5.8) for z in (-4, -3.7, -3.3, -3)]
+    table = read_observations(with_file(tmp_path, "case,device,x,y,z,u\n" + "\n".join(rows) + "\n")).table
+    assert table["standard_error"].between(0.001, 0.2).all()
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("D3a,p,102,4.0,-3.5,fast,0.1,100", r"measured\.csv, row 3: expected a number in column u, got 'fast'"),
+        ("D3a,p,102,4.0,-3.5,,0.1,100", r"row 3: expected a number in column u, got ''"),
+        ("D3a,p,102,4.0,-3.5,NaN,0.1,100", r"row 3: expected a number in column u, got 'NaN'"),
+        ("D3a,p,102,4.0,-3.5,inf,0.1,100", r"row 3: expected a number in column u, got 'inf'"),
+        ("D3a,p,102,4.0,-3.6,0.4,0.1,100", r"row 3: expected case, x, y, z to differ .* row 2"),
+        ("D3a,p,102,4.0,-3.5,0.4,-0.1,100", r"row 3: expected u_std above 0"),
+        ("D3a,p,102,4.0,-3.5,0.4,0.1,0", r"row 3: expected duration_s above 0"),
+        ("D3a,p,103,4.0,-3.5,0.4,0.1,100", r"row 3: expected the same x in all rows of case 'D3a'"),
+        (",p,102,4.0,-3.5,0.4,0.1,100", r"row 3: expected a name in column case"),
+        ("", r"row 3"),
+        ("D3a,p,102,4.0,-3.5,0.4,0.1,100,7", r"cannot be read"),
+    ],
+)
+def test_a_wrong_row_is_refused_by_file_and_row(tmp_path, line, sentence):
+    case = with_file(tmp_path, POINTS + f"D3a,p,102,4.0,-3.6,0.3,0.1,100\n{line}\nD3a,p,102,4.0,-3.4,0.5,0.1,100\n")
+    with pytest.raises(InputError, match=sentence):
+        read_observations(case)
+
+
+def test_wrong_files_are_refused(tmp_path):
+    row = "D3a,p,102,4.0,-3.6,0.3,0.1,100\n"
+    with pytest.raises(InputError, match=r"row 1: expected the columns .* without z"):
+        read_observations(with_file(tmp_path, POINTS.replace("z", "height") + row))
+    with pytest.raises(InputError, match="expected rows below the heading"):
+        read_observations(with_file(tmp_path, POINTS))
+    with pytest.raises(InputError, match="cannot be read"):
+        read_observations(with_file(tmp_path, ""))
+    with pytest.raises(InputError, match="expected rows with case 'D3a', got only D9"):
+        read_observations(with_file(tmp_path, POINTS + row.replace("D3a", "D9")))
+    with pytest.raises(InputError, match=r"nowhere\.csv: .* cannot be read"):
+        read_observations(changed(CASES["d3a"], file=tmp_path / "nowhere.csv"))
+
+
+def test_one_section_of_an_experiment_is_read_once():
+    twice = CASES["d0"].model_copy(update={"observations": CASES["d0"].observations * 2})
+    with pytest.raises(InputError, match="section D0 of experiment D0 once"):
+        read_observations(twice)
+
+
+def test_velocities_are_read_as_they_are(tmp_path):
+    text = "experiment,section,x,y,u,u_se\nD3a,S1,36.0,-2.4,0.1732,0.012\nD3a,S1,36.0,-2.1,0.2591,0\n"
+    observations = read_observations(with_file(tmp_path, text, "velocity"))
+    first = observations.table.iloc[0]
+    assert (first["x"], first["y"], first["value"], first["standard_error"]) == (336.0, -2.4, 0.1732, 0.012)
+    assert first["kind"] == "velocity"
+    assert np.isnan(observations.table.loc[1, "standard_error"])
+    assert observations.table["used"].all()
+    assert observations.discharge == {}
+    assert observations.points.empty
+
+
+def test_levels_are_read_as_they_are(tmp_path):
+    table = read_observations(with_file(tmp_path, "experiment,x,y,level\nD3a,10,0,0.853\n", "level")).table
+    assert list(table["value"]) == [0.853]
+    assert list(table["section"]) == [""]
+    assert table["standard_error"].isna().all()
+
+
+def test_the_case_names_or_chooses_the_rows_of_a_file(tmp_path):
+    case = with_file(tmp_path, "section,x,y,u\nS1,1,2,0.3\nS2,1,3,0.4\n", "velocity")
+    chosen = read_observations(changed(case, experiment="D3a", section="S2", standard_error=0.02)).table
+    assert list(chosen["value"]) == [0.4]
+    assert list(chosen["experiment"]) == ["D3a"]
+    assert list(chosen["standard_error"]) == [0.02]
+    with pytest.raises(InputError, match="expected rows with section 'S3', got only S1, S2"):
+        read_observations(changed(case, experiment="D3a", section="S3"))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("experiment,section,x,y,u\nD9,S1,1,2,0.3\n", "row 2: expected an experiment of the case, one of D3a"),
+        ("experiment,section,x,y,u,u_se\nD3a,S1,1,2,0.3,-1\n", "row 2: expected u_se of at least 0"),
+        (
+            "experiment,section,x,y,u\nD3a,S1,1,2,0.3\nD3a,S1,1,2,0.4\n",
+            "row 3: expected experiment, section, x, y to d",
+        ),
+        ("experiment,section,x,y,v\nD3a,S1,1,2,0.3\n", "row 1: expected the columns"),
+    ],
+)
+def test_wrong_velocities_are_refused(tmp_path, text, sentence):
+    with pytest.raises(InputError, match=sentence):
+        read_observations(with_file(tmp_path, text, "velocity"))
+
+
+def test_no_observations_are_an_empty_table():
+    nothing = read_observations(CASES["d0"].model_copy(update={"observations": ()}))
+    assert tuple(nothing.table.columns) == STATION_COLUMNS
+    assert nothing.table.empty
+
+
+@pytest.mark.parametrize("name", list(KEY))
+def test_points_that_scatter_more_than_sampling_explains_widen_both_averages(name):
+    fitted = READ[name].profiles.query("law != 'linear'")
+    assert fitted["scatter"].max() > 1.05
+    assert (fitted["linear_error"] / fitted["fitted_error"]).between(0.9, 1.3).all()

@@ -1,0 +1,113 @@
+"""Posteriors on disk: they come back as they went, and xarray and ArviZ read them."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from stored import HASH, MEMBERS, a_header, no_space
+
+from vegglue.errors import InputError, StorageError
+from vegglue.results.posterior import LEVELS, CorrectedCanopy, Posterior
+from vegglue.storage.hdf5 import read_posterior, stored_hash, write_posterior
+
+
+def a_posterior(canopy: bool) -> Posterior:
+    """Two parameters, two stations of which one is used; every number differs from every other."""
+    random = np.random.default_rng(8)
+    names, station = ("n_b", "phi"), a_header().station
+    weights = random.random(MEMBERS)
+    two, levels = {"n_b": 0.1, "phi": 2.0}, {name: random.random(len(LEVELS)) for name in names}
+    sides = {name: random.random(2) for name in names}
+    per_kind = {"velocity": 0.02}
+    draws = random.integers(0, MEMBERS, (4, 500))
+    log_likelihood = random.random((MEMBERS, 2)) * [1, np.nan]
+    predictive = random.random((4, 500, 2))
+    corrected = CorrectedCanopy("phi", 0.8, 1.06, 1.36, random.random(MEMBERS), 1.5, 0.2, levels["phi"], 0.18, 0.12)
+    return Posterior(
+        parameters=names, likelihood="gaussian", sigma_rule="best-member", threshold=-np.inf, members=MEMBERS, failed=1,
+        weighed=11, used=1, best=3, effective_size=7.5, largest_weight=0.3, pareto_k=0.4, chi2=np.nan,
+        ensemble_hash=HASH, seed=5, version="0.1.0", unit={"n_b": "s m^(-1/3)", "phi": "-"},
+        theta={name: random.random(MEMBERS) for name in names}, weights=weights / weights.sum(), efficiency=weights - 1,
+        log_likelihood=log_likelihood, prediction=random.random((MEMBERS, 2)), median=two, sd=two, quantiles=levels,
+        prior_quantiles=levels, log10_median={"phi": 0.3}, log10_sd={"phi": 0.1}, correlation=random.random((2, 2)),
+        width_ratio=two, identified={"n_b": True, "phi": False}, bounds=sides, bound_mass=sides,
+        bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])}, sigma=per_kind, rmse=per_kind,
+        best_rmse=per_kind, noise=np.array([0.02, np.nan]), residual=random.random(2), best_residual=random.random(2),
+        model_band=random.random((5, 2)), total_band=random.random((5, 2)), draws=draws, predictive=predictive,
+        station=station, canopy=corrected if canopy else None, method="glue", refinement=None, transfer=None,
+    )  # fmt: skip
+
+
+def assert_same(one: Any, other: Any) -> None:
+    assert type(one) is type(other)
+    if isinstance(one, dict):
+        assert list(one) == list(other)
+        for key in one:
+            assert_same(one[key], other[key])
+    elif isinstance(one, pd.DataFrame):
+        pd.testing.assert_frame_equal(one, other, check_dtype=False)
+    elif isinstance(one, Posterior | CorrectedCanopy):
+        for field in fields(one):
+            assert_same(getattr(one, field.name), getattr(other, field.name))
+    else:
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("canopy", [True, False])
+def test_posterior_comes_back_as_it_went(tmp_path: Path, canopy: bool) -> None:
+    posterior = a_posterior(canopy)
+    write_posterior(tmp_path / "posterior.h5", posterior, "name: d0\n", HASH)
+    assert_same(read_posterior(tmp_path / "posterior.h5", HASH), posterior)
+    with pytest.raises(InputError, match="run `vegglue infer CONFIG` again"):
+        read_posterior(tmp_path / "posterior.h5", "e" * 64)
+
+
+def test_posterior_without_logarithmic_parameters_comes_back(tmp_path: Path) -> None:
+    posterior = replace(a_posterior(False), log10_median={}, log10_sd={})
+    write_posterior(tmp_path / "posterior.h5", posterior, "", HASH)
+    assert_same(read_posterior(tmp_path / "posterior.h5"), posterior)
+
+
+def test_failed_write_leaves_the_older_posterior(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "posterior.h5"
+    write_posterior(path, a_posterior(False), "", HASH)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("vegglue.storage.hdf5.os.fsync", no_space)
+        with pytest.raises(StorageError, match="the disk is full"):
+            write_posterior(path, a_posterior(True), "", "e" * 64)
+    assert stored_hash(path) == HASH
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_xarray_opens_every_group_of_a_posterior(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    write_posterior(tmp_path / "posterior.h5", a_posterior(True), "", HASH)
+    with h5py.File(tmp_path / "posterior.h5") as file:
+        names = set(file)
+    assert names == {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data", "constant_data",
+                     "sample_stats", "members", "stations", "canopy"}  # fmt: skip
+    for name in names:
+        with xarray.open_dataset(tmp_path / "posterior.h5", group=name, engine="h5netcdf") as data:
+            data.load()
+            assert not any(variable.startswith("phony") for variable in data.sizes)
+
+
+def test_arviz_summarises_and_plots_a_posterior(tmp_path: Path) -> None:
+    arviz, matplotlib = pytest.importorskip("arviz"), pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    posterior = a_posterior(True)
+    write_posterior(tmp_path / "posterior.h5", posterior, "", HASH)
+    data = arviz.from_netcdf(tmp_path / "posterior.h5", engine="h5netcdf")
+    summary = arviz.summary(data, kind="stats", round_to="none")
+    assert list(summary.index) == ["n_b", "phi"]
+    assert summary.loc["phi", "mean"] == pytest.approx(posterior.theta["phi"][posterior.draws].mean())
+    assert data.posterior["phi"].dims == ("chain", "draw")
+    assert data.log_likelihood["measured"].shape == (4, 500, 1)  # used stations only
+    assert data.observed_data["measured"].values.tolist() == [0.4]
+    assert arviz.plot_pair(data) is not None
+    matplotlib.pyplot.close("all")

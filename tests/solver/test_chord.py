@@ -1,0 +1,110 @@
+"""Members that pass through a few lanes: who ends how, and that company does not matter."""
+
+import numpy as np
+from channels import family, river, solved
+
+from vegglue.flow.problem import Problem, take
+from vegglue.solver.chord import ChordSolution, chord, stream
+from vegglue.solver.jacobian import Factors, factors
+from vegglue.solver.newton import finish
+
+
+def neighbours(seed: int, members: int) -> tuple[Problem, np.ndarray, Factors]:
+    """Members at random places, the state of the first, and its factors."""
+    batch = family(np.random.default_rng(seed).random((members, 2)))
+    first = take(batch, np.array([0]))
+    centre = solved(first)
+    return batch, centre, factors(first, centre)
+
+
+def test_members_pass_through_few_lanes_as_they_would_all_at_once():
+    batch, centre, shared = neighbours(8, 11)
+    together = chord(batch, np.repeat(centre, 11, axis=3), shared, 1e-9)
+    found: dict[int, tuple[bool, np.ndarray]] = {}
+    entered: list[int] = []
+
+    def starts_of(members: np.ndarray) -> np.ndarray:
+        entered.append(members.size)
+        return np.repeat(centre, members.size, axis=3)
+
+    def note(members: np.ndarray, ended: ChordSolution) -> None:
+        for lane, member in enumerate(members):
+            assert member not in found
+            found[int(member)] = bool(ended.converged[lane]), ended.state[..., lane]
+
+    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, 25, 4, note)
+    assert sorted(found) == list(range(11))
+    assert sum(entered) == 11
+    assert max(entered) <= 4
+    assert together.converged.all()
+    for member, (converged, state) in found.items():
+        assert converged
+        assert np.abs(state - together.state[..., member]).max() < 1e-7
+
+
+def test_a_member_that_strays_ends_and_spoils_no_other():
+    batch, centre, shared = neighbours(9, 4)
+    start = np.repeat(centre, 4, axis=3)
+    start[..., 2] = np.nan
+    end = chord(batch, start, shared, 1e-8)
+    assert end.converged.tolist() == [True, True, False, True]
+    assert np.isfinite(end.state[..., [0, 1, 3]]).all()
+
+
+def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
+    batch, centre, shared = neighbours(10, 6)
+    start = np.repeat(centre, 6, axis=3)
+    start[..., :2] = np.nan
+    found: dict[int, bool] = {}
+
+    def note(members: np.ndarray, ended: ChordSolution) -> None:
+        found.update(zip(members.tolist(), ended.converged.tolist(), strict=True))
+
+    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, 25, 3, note)
+    assert found == {0: False, 1: False, 2: True, 3: True, 4: True, 5: True}
+
+
+def test_one_that_strayed_is_not_taken_up_again():
+    """Its state may be anything: no factors are made there, and its correction says so."""
+    problem = river()
+    near = solved(problem)
+    far = near + 0.3 * np.random.default_rng(0).standard_normal(near.shape)
+    shared = factors(problem, near)
+    end = chord(problem, far, shared, 1e-8)
+    assert not end.converged[0]
+    assert np.isinf(end.correction[0])
+    _, kept = finish(problem, far, 1e-8)
+    assert kept is None
+
+
+def test_one_lane_serves_all():
+    batch, centre, shared = neighbours(11, 3)
+    ends: list[int] = []
+    stream(
+        batch,
+        np.arange(3),
+        lambda some: np.repeat(centre, len(some), axis=3),
+        shared,
+        1e-8,
+        40,
+        1,
+        lambda members, end: ends.extend(members[end.converged]),
+    )
+    assert ends == [0, 1, 2]
+
+
+def test_who_waits_alone_enters_while_others_are_at_work():
+    """Two of four lanes are free at once, and a single member waits: it does not wait for all."""
+    batch, centre, shared = neighbours(12, 5)
+    together = chord(batch, np.repeat(centre, 5, axis=3), shared, 1e-9)
+    asked: list[tuple[int, int]] = []
+    done: list[int] = []
+
+    def starts_of(some: np.ndarray) -> np.ndarray:
+        asked.append((len(some), len(done)))
+        return np.repeat(centre, len(some), axis=3)
+
+    stream(batch, np.arange(5), starts_of, shared, 1e-9, 60, 4, lambda members, end: done.extend(members))
+    assert len(set(together.iterations)) > 1, "else all end at once"
+    assert asked[1][0] == 1
+    assert asked[1][1] < 4

@@ -1,0 +1,106 @@
+"""Tangents against differences of solved states, adjoints against tangents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from channels import centres, river
+
+from vegglue.flow.backwater import backwater
+from vegglue.flow.equations import residual
+from vegglue.flow.problem import ALONG
+from vegglue.flow.sensor import read_sensors, reading_weights
+from vegglue.site.grid import Grid
+from vegglue.solver.jacobian import factors
+from vegglue.solver.newton import newton
+from vegglue.solver.tangent import adjoints, jacobian_times, tangents
+
+STEP = 1e-5
+
+
+def with_manning(factor):
+    problem = river()
+    coefficient = problem.coefficient.copy()
+    coefficient[0] *= factor
+    return replace(problem, coefficient=coefficient)
+
+
+def with_phi(factor):
+    problem = river()
+    return replace(problem, plants=replace(problem.plants, phi=problem.plants.phi * factor))
+
+
+def with_discharge(factor):
+    problem = river()
+    return replace(problem, inflows=tuple(replace(i, discharge=i.discharge * factor) for i in problem.inflows))
+
+
+def with_level(factor):
+    problem = river()
+    return replace(problem, outlet_level=problem.outlet_level * factor)
+
+
+CAUSES = (with_manning, with_phi, with_discharge, with_level)
+
+
+@pytest.fixture(scope="module")
+def solved():
+    problem = river()
+    state = newton(problem, backwater(problem), 1e-10).state
+    return problem, state, factors(problem, state)
+
+
+def difference(cause, of):
+    return (of(cause(1.0 + STEP)) - of(cause(1.0 - STEP))) / (2.0 * STEP)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_tangent_equals_difference_of_solved_states(solved, cause):
+    """Relative to the largest answer in the water: 1e-4 asked for."""
+    problem, state, shared = solved
+    tangent = tangents(problem, state, shared, difference(cause, lambda changed: residual(changed, state)))
+    solved_again = difference(cause, lambda changed: newton(changed, state, 1e-11, time_step=1e4).state)
+    deep = (state[:, 0, :, 0] - problem.bed) > 0.3
+    told, found = tangent[:, ALONG, :, 0][deep], solved_again[:, ALONG, :, 0][deep]
+    error = np.abs(told - found).max() / np.abs(found).max()
+    assert error < 1e-4
+
+
+def test_refinement_meets_the_equation(solved):
+    problem, state, shared = solved
+    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    left = causes + jacobian_times(problem, state, tangents(problem, state, shared, causes))
+    assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-5 * np.abs(causes).max(axis=(0, 1, 2))).all()
+
+
+def test_refinement_meets_the_equation_with_factors_of_a_state_nearby(solved):
+    """Cells at the waterline are wet in one state and dry in the other: repetition alone runs away there."""
+    problem, state, _ = solved
+    shared = factors(problem, newton(with_level(0.95), state, 1e-8).state)
+    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    left = causes + jacobian_times(problem, state, tangents(problem, state, shared, causes))
+    assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-4 * np.abs(causes).max(axis=(0, 1, 2))).all()
+
+
+def test_weights_of_a_reading_give_the_reading(solved):
+    problem, state, _ = solved
+    nx, ny = problem.shape
+    grid = Grid(centres(30.0, nx), centres(9.0, ny), problem.dx, problem.dy)
+    station = pd.DataFrame({
+        "kind": ["velocity", "level"] * 3, "x": [3.1, 14.0, 29.9, 0.1, 7.77, 14.6], "y": [4.6, 5.2, 4.4, 4.5, 0.1, 3.9],
+    })  # fmt: skip
+    read = read_sensors(problem, state, grid, station, ()).prediction[0]
+    assert np.einsum("ikjn,ikj->n", reading_weights(station, grid), state[..., 0]) == pytest.approx(read)
+
+
+def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):
+    """l . dR = -g . dx for a mean velocity in the wake of the patch; the adjoint is of single precision."""
+    problem, state, shared = solved
+    weights = np.zeros_like(state)
+    weights[40, ALONG, 8:16] = 0.125
+    adjoint = adjoints(shared, weights)
+    for cause in CAUSES:
+        rates = difference(cause, lambda changed: residual(changed, state))
+        told = float((weights * tangents(problem, state, shared, rates)).sum())
+        assert -float((adjoint * rates).sum()) == pytest.approx(told, rel=5e-3)

@@ -1,0 +1,194 @@
+"""Ensembles on disk: a run that stops goes on where it was, and what does not fit is told; readable by xarray."""
+
+import signal
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from stored import (
+    ALL,
+    CHUNKS,
+    HASH,
+    MEMBERS,
+    WINDOW,
+    a_header,
+    append,
+    assert_whole,
+    members_of,
+    rows_of,
+    start,
+    write_chunks,
+)
+
+from vegglue.errors import InputError, StorageError
+from vegglue.results.ensemble import ROWS, Header
+from vegglue.storage.hdf5 import ensemble_writer, read_ensemble, stored_hash
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "runs" / "d0" / "ensemble.h5"
+
+
+def part(path: Path) -> Path:
+    return path.with_name("ensemble.h5.part")
+
+
+def test_ensemble_comes_back_as_it_went(path: Path) -> None:
+    header = a_header()
+    write_chunks(path, ALL, header)
+    assert_whole(path, header)
+    ensemble = read_ensemble(path, HASH)
+    assert list(ensemble.parameters) == ["z_last", "a_first"]  # the order of the config
+    assert all(np.array_equal(ensemble.parameters[name], header.parameters[name]) for name in header.parameters)
+    pd.testing.assert_frame_equal(ensemble.station, header.station, check_dtype=False)
+    assert ensemble.station["used"].dtype == bool
+    assert (ensemble.experiments, ensemble.sections) == (header.experiments, header.sections)
+    assert (ensemble.config, ensemble.seed, ensemble.version) == ("name: d0\n", 5, "0.1.0")
+    assert stored_hash(path) == HASH
+
+
+def test_unfinished_run_is_resumed(path: Path) -> None:
+    write_chunks(path, {1}, a_header())
+    assert not path.exists()
+    with pytest.raises(InputError, match="only a part"):
+        read_ensemble(path)
+    assert write_chunks(path, ALL, a_header()) == {1}
+    assert_whole(path, a_header())
+
+
+def test_chunks_may_come_in_any_order(path: Path) -> None:
+    with ensemble_writer(path, a_header()) as writer:
+        for chunk in (2, 0, 1):
+            append(writer, chunk)
+    assert_whole(path, a_header())
+
+
+def test_members_survive_an_exception_in_the_run(path: Path) -> None:
+    with suppress(KeyboardInterrupt), ensemble_writer(path, a_header()) as writer:
+        append(writer, 0)
+        raise KeyboardInterrupt
+    with ensemble_writer(path, a_header()) as writer:
+        assert writer.done == {0}
+
+
+APPEND_FOREVER = """
+    import sys
+    from pathlib import Path
+    sys.path.insert(0, {tests!r})
+    from stored import WINDOW, a_header, append
+    from vegglue.storage.hdf5 import ensemble_writer
+    with ensemble_writer(Path({path!r}), a_header(window={window})) as writer:
+        append(writer, 1)
+        print("appended", flush=True)
+        while True:
+            append(writer, 2)
+"""
+
+
+@pytest.mark.parametrize("header", [a_header(), a_header(window=WINDOW)], ids=["rows alone", "with fields"])
+@pytest.mark.parametrize("delay", [0.0, 0.013, 0.05])
+def test_members_survive_a_kill_while_appending(path: Path, header: Header, delay: float) -> None:
+    with start(APPEND_FOREVER, path=str(path), window="None" if header.window is None else "WINDOW") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "appended\n"
+        time.sleep(delay)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    with ensemble_writer(path, header) as writer:
+        assert writer.set_aside is None
+        assert 1 in writer.done
+        for chunk in ALL - writer.done:
+            append(writer, chunk)
+    assert_whole(path, header)
+
+
+OTHER_PARAMETERS = {"z_last": np.ones(MEMBERS), "a_first": np.ones(MEMBERS)}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"config_hash": "e" * 64},
+        {"seed": 6},
+        {"version": "0.2.0"},
+        {"chunks": 4},
+        {"cut": "otherwise"},
+        {"parameters": OTHER_PARAMETERS},
+    ],
+)
+def test_unfinished_run_of_another_config_is_set_aside(path: Path, changes: dict[str, Any]) -> None:
+    write_chunks(path, {1}, a_header())
+    with ensemble_writer(path, a_header(**changes)) as writer:
+        assert writer.done == set()
+        assert writer.set_aside is not None
+        with h5py.File(writer.set_aside) as old:
+            assert old["progress/finished"][:].tolist() == [0, 1, 0]
+
+
+def test_broken_part_file_is_set_aside(path: Path) -> None:
+    write_chunks(path, {1}, a_header())
+    part(path).write_bytes(part(path).read_bytes()[:700])
+    with ensemble_writer(path, a_header()) as writer:
+        assert writer.done == set()
+        assert writer.set_aside == path.with_name("ensemble.h5.part.old")
+
+
+def test_missing_other_and_broken_ensembles_are_told(path: Path) -> None:
+    with pytest.raises(InputError, match=r"ensemble\.h5: .*found no file; run `vegglue simulate CONFIG`"):
+        read_ensemble(path)
+    write_chunks(path, ALL, a_header())
+    with pytest.raises(InputError, match=r"expected config hash eeeeeeeeeeee, found ffffffffffff: .* again"):
+        read_ensemble(path, "e" * 64)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(StorageError, match="cannot be opened"):
+        read_ensemble(path)
+    assert stored_hash(path) is None
+    path.write_bytes(content)
+    with h5py.File(path, "r+") as file:
+        del file["members/seconds"]
+    with pytest.raises(StorageError, match="is broken or of another version"):
+        read_ensemble(path)
+
+
+def test_rows_that_do_not_match_the_file_are_refused(path: Path) -> None:
+    rows = rows_of(0)
+    del rows["seconds"]
+    with ensemble_writer(path, a_header()) as writer, pytest.raises(ValueError, match="expected the rows"):
+        writer.append(0, members_of(0), rows)
+
+
+def test_long_reasons_are_cut_between_characters(path: Path) -> None:
+    with ensemble_writer(path, a_header()) as writer:
+        for chunk in range(CHUNKS):
+            reasons = np.array(["x" + "ü" * 300] * len(members_of(chunk)), object)
+            writer.append(chunk, members_of(chunk), rows_of(chunk) | {"reason": reasons})
+    assert set(read_ensemble(path).reason) == {"x" + "ü" * 119}
+
+
+def test_parameter_named_like_a_dimension_is_refused(path: Path) -> None:
+    named = {"member": np.ones(MEMBERS)}
+    with pytest.raises(InputError, match=r"\['member'\] are names of dimensions .* rename"):
+        write_chunks(path, set(), a_header(parameters=named, units={"member": "-"}))
+    assert [file.name for file in path.parent.iterdir()] == [".lock"]
+
+
+@pytest.mark.parametrize("group", ["members", "parameters", "stations", "progress"])
+def test_xarray_opens_every_group_of_an_ensemble(path: Path, group: str) -> None:
+    xarray = pytest.importorskip("xarray")
+    write_chunks(path, ALL, a_header())
+    with xarray.open_dataset(path, group=group, engine="h5netcdf") as data:
+        data.load()
+    if group == "members":
+        assert set(data.data_vars) == {*ROWS, "section_x"}
+        assert data["section_flow"].dims == ("member", "experiment", "section")
+        assert data["section"].values.tolist() == ["D0", "D3"]
+        assert data["seconds"].attrs["units"] == "s"
+    if group == "stations":
+        assert data["used"].values.tolist() == [True, False]

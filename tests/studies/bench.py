@@ -1,0 +1,210 @@
+"""Measured speed of the solver at the paper's scale: `make bench`. States figures, asserts none."""
+
+import cProfile
+import os
+import platform
+import pstats
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import parameters_at, unit_points
+from vegglue.case.prior import sample_prior
+from vegglue.ensemble.simulate import begin_and_chunks, begin_at, simulate, solve_chunk
+from vegglue.flow.backwater import backwater
+from vegglue.flow.equations import faces
+from vegglue.flow.problem import crop
+from vegglue.flow.problem_setup import build_problem
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+from vegglue.solver.batch import solve_members
+from vegglue.solver.march import advance, march
+from vegglue.solver.parameter_metric import leaves, parameter_metric
+from vegglue.solver.reference_member import settled
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
+from vegglue.solver.wet_band import rows_inside
+from vegglue.storage.hdf5 import read_ensemble
+
+CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
+PHASES = {
+    "flow.eased": "residual of chord steps",
+    "jacobian.jacobian": "Jacobian, its residuals included",
+    "blocks.factor": "factorisation",
+    "blocks.solve": "back-substitution",
+    "anderson.next_state": "Anderson mixing",
+    "neighbourhood._starts": "starts from solved neighbours",
+}
+PAPER_STEPS = 6000
+SAMPLE = 128
+SHALLOW = 0.3
+# Marching: looked at every quarter of an hour of flow [min], in steps [s], until it is near [m/s, m] or too long [min].
+QUARTER, MARCHED_STEP, NEAR, LONGEST = 15, 1.0, 1e-6, 300
+
+
+def main() -> None:
+    case = load_case(CONFIG)
+    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}")
+    step = marching(case)
+    member = steady(case)
+    print(f"steady state by Newton / {PAPER_STEPS:,} marched steps: {PAPER_STEPS * step / member:.0f} times faster")
+    same(case)
+    whole(case)
+    whole(on_grid(case, (300.0, 471.0), (0.5, 0.375)))
+    sizes(case)
+    cores(case)
+
+
+def marching(case) -> float:  # type: ignore[no-untyped-def]
+    """Seconds a member and step, eight members at once."""
+    site = build_site(case)
+    problem = build_problem(case, site, "D3a", sample_prior(case.parameters, 8, 1))
+    state = backwater(problem)
+    advance(problem, state, 0.3, 1.0)
+    began = time.perf_counter()
+    for _ in range(10):
+        state = state + advance(problem, state, 0.3, 1.0)
+    seconds = (time.perf_counter() - began) / 10 / 8
+    print(f"marching, 1142 x 40 cells, 8 members: {site.bed.size / seconds / 1e6:.1f} million cell-steps/s on one core")
+    return seconds
+
+
+def ensemble(case):  # type: ignore[no-untyped-def]
+    """Site, measurements and the places of all members."""
+    places = unit_points(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
+    return build_site(case), read_observations(case), places
+
+
+def steady(case) -> float:  # type: ignore[no-untyped-def]
+    """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
+    site, observations, places = ensemble(case)
+    begin, chunks = begin_and_chunks(case, site, places)
+    chunk = places[chunks[7]]
+    solve_chunk(case, site, observations, chunk[:2], begin)
+    profile = cProfile.Profile()
+    began = time.perf_counter()
+    rows = profile.runcall(solve_chunk, case, site, observations, chunk, begin)
+    seconds = time.perf_counter() - began
+    print(
+        f"steady, 1142 x 40 cells: {len(chunk) / seconds:.1f} members/s on one core, "
+        f"{np.median(rows['iterations']):.0f} iterations a member, mass error {np.nanmax(rows['mass_error']):.0e}, "
+        f"{int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed"
+    )
+    found = pstats.Stats(profile).stats.items()  # type: ignore[attr-defined]
+    calls = {f"{Path(file).stem}.{name}": (value[1], value[3]) for (file, _, name), value in found}
+    for name, words in PHASES.items():
+        count, spent = calls[name]
+        print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
+    return seconds / len(chunk)
+
+
+def sizes(case) -> None:  # type: ignore[no-untyped-def]
+    """Seconds a member in one process, SAMPLE neighbours in the middle of the prior, on other cells and reaches."""
+    along = [on_grid(case, (471.0 - length, 471.0), (0.5, 0.375)) for length in (171.0, 684.0, 2736.0)]
+    both = [on_grid(case, (300.0, 471.0), cell) for cell in ((1.0, 0.75), (0.5, 0.375), (0.25, 0.1875))]
+    for words, cases in (("longer", along), ("refined both ways", both)):
+        cells, seconds = np.array([timed(one) for one in cases]).T
+        for number, spent in zip(cells, seconds, strict=True):
+            print(f"{words}: {number:,.0f} cells, {1 / spent:.1f} members/s on one core")
+        power = np.polyfit(np.log(cells), np.log(seconds), 1)[0]
+        print(f"  cost grows with cells^{power:.2f} over a factor of {cells[-1] / cells[0]:.0f}")
+    for cell in ((1.0, 0.75), (0.25, 0.1875)):
+        number, spent = timed(on_grid(case, (0.0, 571.0), cell))
+        print(f"the paper's channel on cells of {cell[0]} x {cell[1]} m ({number:,} cells): {1 / spent:.1f} members/s")
+
+
+def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: ignore[no-untyped-def]
+    """A case on part of its channel, with the depth it has at its end, and on other cells."""
+    shorter = float(np.ptp(case.grid.x) - np.ptp(x))
+    rise = case.bed[0].trapezoid.bed_slope * shorter  # the floor is at one level at the start of any grid
+    experiments = {name: one.model_copy(update={"level": one.level + rise}) for name, one in case.experiments.items()}
+    grid = case.grid.model_copy(update={"x": x, "cell": cell})
+    return case.model_copy(update={"grid": grid, "experiments": experiments})
+
+
+def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
+    """Cells, and seconds a member on one core."""
+    site, observations, places = ensemble(case)
+    begin = begin_at(case, site)
+    slopes = [known.slopes for known in begin.values() if known is not None]
+    around = [places[leaf] for leaf in leaves(parameter_metric(places, slopes).spots, SAMPLE)]
+    chunk = min(around, key=lambda some: np.linalg.norm(some.mean(axis=0) - 0.5))
+    solve_chunk(case, site, observations, chunk[:2], begin)
+    began = time.perf_counter()
+    rows = solve_chunk(case, site, observations, chunk, begin)
+    seconds = time.perf_counter() - began
+    if (rows["status"] != 0).any():
+        print(f"  {int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed")
+    return site.bed.size, seconds / len(chunk)
+
+
+def whole(case) -> None:  # type: ignore[no-untyped-def]
+    """All members of an ensemble, over all cores, into a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, began = Path(folder) / "ensemble.h5", time.perf_counter()
+        simulate(case, read_observations(case), path, -1, lambda _: None)
+        seconds, found = time.perf_counter() - began, read_ensemble(path)
+    nx, ny = build_site(case).bed.shape
+    print(
+        f"{found.status.size:,} members on {nx} x {ny} cells, all cores: {seconds:.0f} s, "
+        f"{found.iterations.mean():.1f} steps a member, mass error {np.nanmax(found.mass_error):.0e}, "
+        f"{int((found.status == SOLVED_BY_MARCHING).sum())} marched, {int((found.status == FAILED).sum())} failed"
+    )
+
+
+def same(case) -> None:  # type: ignore[no-untyped-def]
+    """64 members spread over the priors: by chord steps in an ensemble, by Newton alone, and marched."""
+    short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
+    site = build_site(short)
+    places = unit_points(short, sample_prior(short.parameters, 64, 1))
+
+    def build(some):  # type: ignore[no-untyped-def]
+        return build_problem(short, site, "D3a", parameters_at(short, some))
+
+    solved = solve_members(build, places, 1e-8)
+    tasks = [(build(place[None]), solved.state[..., i : i + 1]) for i, place in enumerate(places)]
+    found = Parallel(n_jobs=-1)(delayed(three_ways)(*task) for task in tasks)
+    apart, left, minutes = (np.array(each) for each in zip(*found, strict=True))
+    print(
+        f"64 members over the priors, 342 x 40 cells: marched from a backwater estimate they come within "
+        f"{left.max():.0e} m/s or m of Newton, the median in {np.median(minutes):.0f} min of flow, the slowest in "
+        f"{minutes.max():.0f} (in the rows that are solved); ensemble and single member differ by at most "
+        f"{apart.max():.0e} where water is deeper than "
+        f"{SHALLOW:g} m (rows beyond the water differ)"
+    )
+
+
+def three_ways(problem, start):  # type: ignore[no-untyped-def]
+    """How far a member of an ensemble, and one marched, are from Newton's; minutes of flow it was marched."""
+    alone, _, band = settled(problem, start, 1e-9)
+    part = crop(problem, *band)
+    wet = faces(part, alone.state).cell[:, None] > SHALLOW
+    apart = np.abs(rows_inside(start, band) - alone.state)[np.broadcast_to(wet, alone.state.shape)].max()
+    state, left, minutes = rows_inside(backwater(problem), band), np.inf, 0
+    while left > NEAR and minutes < LONGEST:
+        state, minutes = march(part, state, MARCHED_STEP, int(QUARTER * 60.0 / MARCHED_STEP)), minutes + QUARTER
+        left = np.abs(state - alone.state).max()
+    return apart, left, minutes
+
+
+def cores(case) -> None:  # type: ignore[no-untyped-def]
+    """Speed-up from one to two processes over the same two chunks of the 5,000-member ensemble."""
+    site, observations, places = ensemble(case)
+    begin, chunks = begin_and_chunks(case, site, places)
+    chunks = chunks[8:10]
+    members, spent = sum(chunk.size for chunk in chunks), []
+    for jobs in (1, 2):
+        with Parallel(n_jobs=jobs) as pool:
+            pool(delayed(solve_chunk)(case, site, observations, places[chunk[:2]], begin) for chunk in chunks)
+            began = time.perf_counter()
+            pool(delayed(solve_chunk)(case, site, observations, places[chunk], begin) for chunk in chunks)
+            spent.append(time.perf_counter() - began)
+    gain = spent[0] / spent[1]
+    print(f"{members} members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two: {gain:.2f} times faster")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""The published confluence set through the whole loop, from a plane and from the surveyed bed: docs/confluence.md.
+
+`make confluence DATA=folder`, the folder as R.B. Canelas published it. Nothing of it is kept but errors of the models.
+"""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import as_yaml
+from vegglue.case.schema import Case
+from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.comparison import held_out, rung
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.engine.linearised_model import Model, linearise
+from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.screening.spatial_scan import SPOT_RADIUS
+from vegglue.site.channel_geometry import half_width
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow.loop import calibrated, child_path, diagnosed, grow, write_child
+from vegglue.workflow.run_folder import validation_of
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "confluence.md"
+BEGIN, END = "<!-- numbers by make confluence -->", "<!-- end of numbers -->"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model: what it is called, errors by section [m/s] in and out of sample, of levels [m], and its numbers."""
+
+    title: str
+    seen: dict[str, float]
+    unseen: dict[str, float]
+    numbers: dict[str, float]
+    values: dict[str, tuple[float, float, float]]
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def by_section(model: Model, prediction: np.ndarray) -> dict[str, float]:
+    """Root mean square error of each section [m/s], and of all velocities together."""
+    velocity = (model.station["kind"] == "velocity").to_numpy()
+    left = (model.station["value"].to_numpy(float) - prediction)[velocity]
+    section = model.station["section"].to_numpy(str)[velocity]
+    each = {str(name): rms(left[section == name]) for name in np.unique(section)}
+    return each | {"all": rms(left)}
+
+
+def row_of(title: str, case: Case, runs: Path) -> Row:
+    base = calibrated(case, folder_of(case, runs), excluded_by())
+    unseen = validation_of(case)
+    assert unseen is not None
+    there = linearise(unseen, base.fitted.point.z)
+    found = rung(base)
+    return Row(
+        title,
+        by_section(base.model, base.fitted.point.prediction),
+        {} if there is None else by_section(unseen, there.prediction),
+        {"levels": found.rmse["level"], "chi2": found.chi2, "stations": found.stations, "left out": held_out(found)},
+        found.values,
+    )
+
+
+def folder_of(case: Case, runs: Path) -> Path:
+    folder = runs / case.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def with_object(case: Case, found: Diagnosis) -> Case:
+    """The case with something of unknown kind at the place the diagnosis points at."""
+    assert found.where is not None
+    site = build_site(case)
+    radius = max(SPOT_RADIUS * half_width(site), 1.5 * max(site.grid.dx, site.grid.dy))
+    candidate = candidate_named(case, found.station, "unlisted_object")
+    shapes = {"x": round(found.where.x, 3), "y": round(found.where.y, 3), "radius": round(radius, 3)}
+    return write_child(case, child_path(case.source, [candidate]), [(candidate, shapes)])
+
+
+def climb(path: Path, title: str, runs: Path, jobs: int, objects: int = 1) -> tuple[list[Row], list[str]]:
+    """Rows of a case, of all that its diagnosis adds, and of an object where it points at a place, which is diagnosed
+    in its turn; and what each diagnosis said.
+    """
+    case = load_case(path)
+    found = diagnosed(case, folder_of(case, runs), jobs, print)
+    grown = grow(case, runs, jobs, print)
+    cases, titles = [load_case(one) for one in grown.paths], [title]
+    for step in found.steps[: len(cases) - 1]:
+        titles.append(f"{titles[-1]}, {step.accepted}")
+    rows = [row_of(name, one, runs) for name, one in zip(titles, cases, strict=True)]
+    said = [f"**{title}** ({found.verdict}): {found.sentence}"]
+    if grown.reason != found.sentence:
+        said.append(f"Of this, {grown.reason}".replace(found.sentence, "").strip())
+    if found.where is None or objects == 0:
+        return rows, said
+    name = f"{titles[-1]}, object at x = {found.where.x:.2f}, y = {found.where.y:.2f} m"
+    more, words = climb(with_object(cases[-1], found).source, name, runs, jobs, objects - 1)
+    return rows + more, said + words
+
+
+def table(rows: list[Row]) -> list[str]:
+    """Errors by section, one column for each model, in the order of the sections downstream."""
+    lines = ["| section | | " + " | ".join(f"({n})" for n in range(1, len(rows) + 1)) + " |"]
+    lines.append("|---|---|" + "---:|" * len(rows))
+    places = [(float(name[1:]), name, "seen") for name in rows[0].seen if name != "all"]
+    places += [(float(name[1:]), name, "unseen") for name in rows[0].unseen if name != "all"]
+    for x, name, which in [*sorted(places), (np.nan, "all", "seen"), (np.nan, "all", "unseen")]:
+        words = f"x = {x:.2f} m" if name != "all" else "**all**"
+        errors = [f"{getattr(row, which).get(name, np.nan):.3f}" for row in rows]
+        lines.append(f"| {words} | {'in' if which == 'seen' else 'out'} | {' | '.join(errors)} |")
+    numbers = (
+        ("levels", "levels [m]", ".4f"),
+        ("left out", "section left out, linear", ".3f"),
+        ("chi2", "chi2", ".0f"),
+    )
+    for key, words, digits in numbers:
+        lines.append(f"| {words} | in | {' | '.join(format(row.numbers[key], digits) for row in rows)} |")
+    return lines
+
+
+def page(rows: list[Row], said: list[str]) -> str:
+    """The part of the page that is made again."""
+    models = [f"{n}. {row.title}" for n, row in enumerate(rows, 1)]
+    stations = int(rows[0].numbers["stations"])
+    caption = (
+        f"Root mean square errors of depth-averaged velocity [m/s]; chi2 is of {stations} stations, errors as assumed."
+    )
+    values = []
+    for n, row in enumerate(rows, 1):
+        words = ", ".join(f"{name} {v:.3g} ({a:.3g} to {b:.3g})" for name, (v, a, b) in row.values.items())
+        values.append(f"{n}. {words}")
+    parts = (models, [caption], table(rows), ["Calibrated values (95 % range):"], values, ["What the diagnosis said:"],
+             [f"- {sentence}" for sentence in said])  # fmt: skip
+    return "\n\n".join("\n".join(part) for part in parts)
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__)
+    ask.add_argument("data", type=Path)
+    ask.add_argument("--runs", type=Path, default=ROOT / "runs" / "confluence")
+    ask.add_argument("--jobs", type=int, default=1)
+    given = ask.parse_args()
+    if not holds_confluence(given.data):
+        ask.error(f"{given.data} has no depth_averaged.csv; give the folder of the set, DATA=folder")
+    surveyed, plane = given.runs / "confluence.yaml", given.runs / "confluence-flat.yaml"
+    tree = case_from_confluence(given.data, surveyed)
+    surveyed.write_text(as_yaml(tree), encoding="utf-8")
+    plane.write_text(as_yaml(flat_bed(given.data, surveyed)), encoding="utf-8")
+    rows, said = climb(plane, "a plane", given.runs, given.jobs)
+    more, words = climb(surveyed, "the surveyed bed", given.runs, given.jobs)
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
+    PAGE.write_text(f"{before}\n\n{page(rows + more, said + words)}\n\n{after}", encoding="utf-8")
+    print(f"Written to {PAGE.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,212 @@
+"""`vegglue check`: each oddity is said in a sentence, a sound case is passed in silence, and the channel is drawn."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.figures.channel import save_channel_figure
+from vegglue.measurements.observations import read_observations
+from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.gridded_site import build_site
+from vegglue.site.polygons import distance_to_outline
+from vegglue.workflow.check import check_case
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SOUND = """
+name: sound
+grid: {x: [0, 40], y: [-5, 5], cell: [1.0, 0.5]}
+bed:
+  - trapezoid: {axis: 0.0, bottom_width: 4.0, bank_slope: 0.5, bed_slope: 0.001, level: 0.0}
+friction:
+  classes:
+    bed: {law: manning, n: n_b}
+    bank: {law: keulegan, k_s: 0.5}
+  default: bed
+  zones:
+    - {class: bank, beyond_slope_break: 0.2}
+plants:
+  stands:
+    reed: {phi: phi, canopy_height: 0.8, stems: 22}
+  patches:
+    - {name: p1, stand: reed, x: [10, 14], y: [0, 1.5], stems: 22}
+inflows:
+  upstream: {side: west}
+outlet: {}
+experiments:
+  low: {discharge: 2.0, level: 1.0}
+parameters:
+  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}
+  phi: {distribution: loguniform, low: 0.01, high: 100, unit: "-"}
+observations:
+  - {kind: velocity, file: velocities.csv}
+simulate: {members: 1024}
+"""
+ROWS = "experiment,section,x,y,u,u_se\nlow,A,12,0.7,0.3,0.01\nlow,A,12,-0.7,0.5,0.01\nlow,A,12,1.1,0.3,0.01\n"
+
+
+def odd(folder: Path, text: str = SOUND, rows: str = ROWS) -> list[str]:
+    (folder / "velocities.csv").write_text(rows)
+    (folder / "sound.yaml").write_text(text)
+    case = load_case(folder / "sound.yaml")
+    return check_case(case, build_site(case), read_observations(case))
+
+
+def test_a_sound_case_is_passed_in_silence(tmp_path):
+    assert odd(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("members: 1024", "members: 64", "Only 64 members will be simulated"),
+        ("members: 1024", "members: 1000", "Note: 1000 members is no power of two; .* with 1024."),
+        ("y: [0, 1.5], stems", "y: [0.1, 0.2], stems", "Patch p1 covers no cell centre"),
+        ("y: [0, 1.5], stems", "y: [0.2, 1.3], stems", "Patch p1 of 4.4 m2 becomes 6 m2 of cells"),
+        (
+            "stems: 22}\ninflows",
+            "stems: 22}\n    - {name: p2, stand: reed, x: [13, 20], y: [0, 1], stems: 1}\ninflows",
+            "Patch p1 loses 2 cells to patches listed after it",
+        ),
+        ("reed: {phi", "sedge: {phi: 1, canopy_height: 0.5}\n    reed: {phi", "Stand sedge grows in no patch"),
+        ("beyond_slope_break: 0.2", "beyond_slope_break: 2", "Friction class bank holds in no cell"),
+        ("level: 1.0}", "level: 1.0, plants: false}", "Parameter phi acts in no cell of any experiment"),
+        ("n: n_b}", "n: n_b}\n    mud: {law: manning, n: 0.1}", "Friction class mud holds in no cell"),
+        (
+            "canopy_height: 0.8",
+            "canopy_height: 1.3",
+            "The canopy of reed, 1.3 m, reaches above the water of experiment low",
+        ),
+        ("canopy_height: 0.8", "canopy_height: h_d", "The canopy of reed, 0.717 to 1.38 m, may reach above the water"),
+        ("k_s: 0.5", "k_s: 5", r"At k_s = 5 m, 12 h/k_s falls below 1.3 and is held there where h < 0.54 m: in 50 %"),
+        ("outlet: {}", "outlet: {range: [4.01, 4.02]}", "The outlet holds no cell centre: no water can leave"),
+        (
+            "outlet: {}",
+            "outlet: {range: [4, 5]}",
+            "The outlet level of experiment low, 1 m, is below the bed there, 1.09 m",
+        ),
+        ("level: 1.0}", "level: -0.5}", "The outlet level of experiment low, -0.5 m, is below the bed there"),
+        ("level: 1.0}", "level: 0.2}", "leaves at a Froude number of 1.3"),
+        ("level: 1.0}", "level: 2.0}", "Experiment low puts water on the side edges of the grid"),
+        ("{side: west}", "{side: west, range: [4.01, 4.02]}", "Inflow upstream holds no cell centre"),
+        ("{side: west}", "{side: west, range: [4.2, 5]}", "Inflow upstream lies above the water of experiment low"),
+        ("members: 1024}", "members: 1024}\ninfer: {sigma: known}", None),
+        (
+            "discharge: 2.0, level: 1.0}",
+            "discharge: 2.0, level: 1.0}\n  high: {discharge: 2, level: 1.1}",
+            "Experiment high has no used observation",
+        ),
+        ("observations:\n  - {kind: velocity, file: velocities.csv}\n", "", "There are no observations"),
+    ],
+)
+def test_an_oddity_is_said(tmp_path, old, new, expected):
+    assert old in SOUND
+    text = SOUND.replace(old, new)
+    if "h_d" in new:
+        text = text.replace(
+            "parameters:\n", "parameters:\n  h_d: {distribution: uniform, low: 0.7, high: 1.4, unit: m}\n"
+        )
+    said = odd(tmp_path, text)
+    if expected is None:
+        assert said == []
+    else:
+        assert [sentence for sentence in said if re.search(expected, sentence)], said
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        (
+            "low,A,12,4.6,0.3,0.01",
+            "The station at x = 12, y = 4.6 m of experiment low is outside the wet channel, about 0.3",
+        ),
+        ("low,A,12,5.6,0.3,0.01", "The station at x = 12, y = 5.6 m of experiment low is outside the grid"),
+        ("low,A,45,0,0.3,0.01", "The station at x = 45, y = 0 m of experiment low is outside the grid"),
+        ("low,A,12,1.5,0.3,0.01", "Stations of A at y = 1.5 m lie on the edge of patch p1"),
+    ],
+)
+def test_an_odd_station_is_said(tmp_path, row, expected):
+    assert [sentence for sentence in odd(tmp_path, rows=ROWS + row + "\n") if sentence.startswith(expected)]
+
+
+def test_stations_without_error_cannot_be_weighed_by_it(tmp_path):
+    text = SOUND.replace("members: 1024}", "members: 1024}\ninfer: {sigma: known}")
+    said = odd(tmp_path, text, ROWS.replace(",u_se", "").replace(",0.01\n", "\n"))
+    assert said == ["`infer.sigma` is known, but 3 of 3 used observations have no standard error."]
+
+
+def test_too_few_observations_are_said(tmp_path):
+    said = odd(tmp_path, rows="\n".join(ROWS.splitlines()[:2]) + "\n")
+    assert said == ["1 used observations cannot settle 2 parameters."]
+
+
+def test_the_papers_cases_are_sound_but_for_what_is_known():
+    known = {
+        "d0": ["Note: 5000 members", "At k_s = 5 m"],
+        "d3a": [
+            "Note: 5000 members",
+            "The station at x = 402, y = 6.4 m",
+            "At k_s = 5 m",
+            "Stations of D3 at y = 4 and 5.5 m",
+        ],
+        "d3b": ["Note: 5000 members", "At k_s = 5 m", "Stations of D3 at y = 4 m"],
+        "d3b_paper": ["Note: 5000 members", "The verticals of D3", "At k_s = 5 m", "Stations of D3 at y = 4 m"],
+    }
+    for name, beginnings in known.items():
+        case = load_case(CONFIGS / f"{name}.yaml")
+        said = check_case(case, build_site(case), read_observations(case))
+        assert len(said) == len(beginnings), said
+        assert all(sentence.startswith(start) for sentence, start in zip(said, beginnings, strict=True)), said
+
+
+def test_a_discharge_far_from_the_measured_one_is_said(tmp_path):
+    (tmp_path / "other.yaml").write_text(
+        f"extends: {CONFIGS / 'd3a.yaml'}\nexperiments: {{D3a: {{discharge: 3.2}}}}\n", encoding="utf-8"
+    )
+    case = load_case(tmp_path / "other.yaml")
+    said = check_case(case, build_site(case), read_observations(case))
+    assert [
+        s for s in said if s.startswith("The ADV of D3 in experiment D3a gives 2.6") and "the case says 3.2 m3/s" in s
+    ]
+
+
+def test_the_expected_water_is_parallel_to_the_floor_and_nowhere_below_the_outlet(tmp_path):
+    odd(tmp_path)
+    case = load_case(tmp_path / "sound.yaml")
+    site = build_site(case)
+    depth = expected_depth(case, site, case.experiments["low"])
+    # z_out = 1 m over a floor at -0.0395 m in the last cell.
+    assert depth.max(axis=1) == pytest.approx(1.0395)
+    rising = site.__class__(site.grid, site.bed[::-1], site.friction_class, site.class_names, site.patch)
+    assert (rising.bed + expected_depth(case, rising, case.experiments["low"])).min() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("x", "y", "expected"), [(1, 0.2, 0.2), (3, 2, 0.0), (-3, 4, 3.6055512754639896), (5, 1, 2.0)])
+def test_distance_to_an_outline(x, y, expected):
+    outline = np.array([[0, 0], [3, 0], [3, 2], [0, 2]], dtype=float)
+    assert distance_to_outline(outline, x, y) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("name", ["d0", "d3a"])
+def test_the_channel_is_drawn(tmp_path, name):
+    case = load_case(CONFIGS / f"{name}.yaml")
+    path = tmp_path / "new" / "channel.png"
+    save_channel_figure(case, build_site(case), read_observations(case), path)
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert path.stat().st_size > 20_000
+
+
+def test_a_bare_case_is_drawn_too(tmp_path):
+    text = SOUND.replace("observations:\n  - {kind: velocity, file: velocities.csv}\n", "")
+    text = (
+        re.sub(r"plants:\n(  .*\n)+", "", text)
+        .replace("  phi:", "  nu:")
+        .replace("outlet:", "eddy_viscosity: nu\noutlet:")
+    )
+    text = text.replace("upstream: {side: west}", "upstream: {side: west}\n  side: {side: north, range: [5, 9]}")
+    odd(tmp_path, text.replace("discharge: 2.0", "discharge: {upstream: 1, side: 1}"))
+    case = load_case(tmp_path / "sound.yaml")
+    save_channel_figure(case, build_site(case), read_observations(case), tmp_path / "channel.png")
+    assert (tmp_path / "channel.png").stat().st_size > 10_000

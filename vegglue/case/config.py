@@ -1,0 +1,165 @@
+"""Cases as files: YAML with `extends`, its names checked against each other, and the hash that ties results to it."""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from vegglue.case.consistency import disagreement
+from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal
+from vegglue.case.resolved_config import Tree
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+
+# Keys whose value is a path, relative to the file it is written in.
+PATHS = ("file", "raster", "points", "effect_file")
+# A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
+DECLARING = ("law", "distribution")
+
+
+def load_case(path: Path, trust: bool = False) -> Case:
+    """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do.
+
+    trust: whether a Python file that the case names may be run.
+    """
+    layers = _layers(path, ())
+    tree: Tree = {}
+    for _, layer in reversed(layers):
+        tree = _merged(tree, layer)
+    tree = _with_one_inflow_named(tree) | {"source": path.resolve()}
+    try:
+        case = Case.model_validate(tree)
+    except ValidationError as error:
+        raise _input_error(layers, first_refusal(tree, error.errors())) from None
+    if case.effect_file is not None and not trust:
+        raise InputError(
+            f"{shown_path(path)}: `effect_file` names {shown_path(case.effect_file)}, which runs as code: read it, and "
+            "add --trust if you trust it."
+        )
+    refusal = disagreement(case)
+    if refusal is not None:
+        raise _input_error(layers, refusal)
+    return case
+
+
+def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
+    """The file and what it extends, the most special one first."""
+    path = path.resolve()
+    if path in above:
+        circle = " -> ".join(shown_path(file) for file in (*above[above.index(path) :], path))
+        raise InputError(f"{shown_path(above[-1])}: `extends` goes round in a circle, {circle}: take one of them out.")
+    tree = _read(path, above)
+    base = tree.pop("extends", None)
+    layer = (path, _with_full_paths(tree, path.parent))
+    if base is None:
+        return [layer]
+    if not isinstance(base, str):
+        raise InputError(f"{shown_path(path)}: `extends` expected the name of one YAML file, got {base!r}.")
+    return [layer, *_layers(path.parent / base, (*above, path))]
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> Tree:
+    try:
+        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except OSError as error:
+        named = f", named by `extends` in {shown_path(above[-1])}," if above else ""
+        raise InputError(f"{shown_path(path)}{named} cannot be read: {error.strerror}; check the path.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{shown_path(path)} is not text in UTF-8: save it as UTF-8.") from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise InputError(
+            f"{shown_path(path)}{where}: {error.problem}; correct the YAML there or just before."
+        ) from None
+    except yaml.YAMLError as error:
+        raise InputError(f"{shown_path(path)} is not valid YAML: {' '.join(str(error).split())}.") from None
+    if not isinstance(tree, dict):
+        raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {type(tree).__name__}.")
+    return tree
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as its version 1.2 reads numbers (1e-7 is one), and no key twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys: set[Any] = set()
+        for key_node, _ in node.value:
+            if isinstance(key_node, yaml.ScalarNode) and key_node.value in keys:
+                twice = f"the key `{key_node.value}` stands twice"
+                raise yaml.constructor.ConstructorError(None, None, twice, key_node.start_mark)
+            keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+"), list("-+.0123456789")
+)
+
+
+def _with_full_paths(tree: Any, folder: Path) -> Any:
+    if isinstance(tree, list):
+        return [_with_full_paths(item, folder) for item in tree]
+    if not isinstance(tree, dict):
+        return tree
+    paths = {key: str((folder / tree[key]).resolve()) for key in PATHS if isinstance(tree.get(key), str)}
+    return {key: _with_full_paths(value, folder) for key, value in tree.items()} | paths
+
+
+def _merged(base: Any, layer: Any) -> Any:
+    """`layer` over `base`: mappings key by key, anything else replaced; null takes an inherited key away."""
+    if not isinstance(layer, dict):
+        return layer
+    if not isinstance(base, dict) or any(key in layer for key in DECLARING):
+        base = {}
+    both = base | {key: _merged(base.get(key), value) for key, value in layer.items()}
+    return {key: value for key, value in both.items() if value is not None}
+
+
+def _with_one_inflow_named(tree: Tree) -> Tree:
+    """With a single inflow, `discharge: 2.66` means all of it: write it as {inflow: 2.66}."""
+    inflows = tree.get("inflows")
+    if not (isinstance(inflows, dict) and len(inflows) == 1):
+        return tree
+    (inflow,) = inflows
+    named = _all_named(tree, inflow)
+    if isinstance(tree.get("validation"), dict):
+        named |= {"validation": tree["validation"] | _all_named(tree["validation"], inflow)}
+    return tree | named
+
+
+def _all_named(tree: Tree, inflow: str) -> Tree:
+    experiments = tree.get("experiments")
+    if not isinstance(experiments, dict):
+        return {}
+    return {"experiments": {name: _named(experiment, inflow) for name, experiment in experiments.items()}}
+
+
+def _named(experiment: Any, inflow: str) -> Any:
+    if not isinstance(experiment, dict) or isinstance(experiment.get("discharge"), dict | None):
+        return experiment
+    return experiment | {"discharge": {inflow: experiment["discharge"]}}
+
+
+def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputError:
+    """The sentence, with the file that says (or should say) what is refused: the first of those that say most of it."""
+    path, _ = max(layers, key=lambda layer: _depth(layer[1], refusal.place))
+    end = "" if refusal.complaint.endswith(("?", ".")) else "."
+    return InputError(f"{shown_path(path)}: `{dotted(refusal.place)}` {refusal.complaint}{end}")
+
+
+def _depth(tree: Any, place: KeyPath) -> int:
+    """How many keys of a place a tree has."""
+    for depth, key in enumerate(place):
+        keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
+        if key not in keys:
+            return depth
+        tree = tree[key]
+    return len(place)
+
+
+def shown_path(path: Path) -> str:
+    return os.path.relpath(path)

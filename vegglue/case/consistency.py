@@ -1,0 +1,182 @@
+"""Whether the parts of a case agree: every name used is declared and every declaration used, files and places exist."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
+from vegglue.case.parts import Interval, Value
+from vegglue.case.prior import quantile
+from vegglue.case.schema import Case
+from vegglue.case.site_schema import Inflow, Stand, StandOverride
+from vegglue.effects.definition import Amplitude, Shape
+from vegglue.effects.library import library
+
+# Names that dimensions of the result files have, and a variable in them must not.
+DIMENSIONS = ("chain", "draw", "member", "station", "experiment", "section")
+# A quantity that must be positive may fall to 0 at no more than this share of its prior [-].
+LEAST_PROBABILITY = 1e-6
+
+
+def disagreement(case: Case) -> Refusal | None:
+    """The first thing in a case that does not agree with the rest of it."""
+    checks = (_names, _files, _effects, _values, _parameters, _sides, _likelihood)
+    return next((refusal for check in checks for refusal in check(case)), None)
+
+
+def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
+    """Every number that may be a parameter: where it stands, what stands there, and whether it must be positive."""
+    for name, friction_class in case.friction.classes.items():
+        for key in ("n", "k_s", "c"):
+            yield ("friction", "classes", name, key), getattr(friction_class, key), True
+    owners: list[tuple[KeyPath, Mapping[str, Stand | StandOverride]]] = [(("plants",), case.plants.stands)]
+    owners += [(("experiments", name), experiment.stands) for name, experiment in case.experiments.items()]
+    for place, stands in owners:
+        for name, stand in stands.items():
+            for key in ("phi", "canopy_height", "bare_chezy"):
+                yield (*place, "stands", name, key), getattr(stand, key), True
+    for name, experiment in case.experiments.items():
+        for inflow, discharge in experiment.discharge.items():
+            yield ("experiments", name, "discharge", inflow), discharge, True
+        yield ("experiments", name, "level"), experiment.level, False
+    yield ("eddy_viscosity",), case.eddy_viscosity, True
+    for name, working in case.effects.items():
+        for key, value in working.values.items():
+            yield ("effects", name, "values", key), value, False
+
+
+def _unknown(place: KeyPath, word: str, known: Iterable[str], what: str) -> Iterator[Refusal]:
+    if word not in (names := list(known)):
+        yield Refusal(place, f"names the {what} `{word}`, which is not declared: {nearest(word, names)}")
+
+
+def _names(case: Case) -> Iterator[Refusal]:
+    classes, stands = case.friction.classes, case.plants.stands
+    yield from _unknown(("friction", "default"), case.friction.default, classes, "friction class")
+    for i, zone in enumerate(case.friction.zones):
+        for word in [zone.friction_class] if zone.friction_class else (zone.values or {}).values():
+            yield from _unknown(("friction", "zones", i), word, classes, "friction class")
+    patches = [patch.name for patch in case.plants.patches]
+    for i, patch in enumerate(case.plants.patches):
+        yield from _unknown(("plants", "patches", i, "stand"), patch.stand, stands, "stand")
+        if patch.name in patches[:i]:
+            yield Refusal(("plants", "patches", i, "name"), f"is `{patch.name}` a second time: rename one of them")
+    for name, experiment in case.experiments.items():
+        at = ("experiments", name)
+        for inflow in experiment.discharge:
+            yield from _unknown((*at, "discharge"), inflow, case.inflows, "inflow")
+        for inflow in case.inflows.keys() - experiment.discharge.keys():
+            yield Refusal((*at, "discharge"), f"says nothing about the inflow `{inflow}`: add it")
+        for stand in experiment.stands:
+            yield from _unknown((*at, "stands"), stand, stands, "stand")
+        for present in experiment.plants if isinstance(experiment.plants, tuple) else ():
+            yield from _unknown((*at, "plants"), present, patches, "patch")
+    for i, observation in enumerate(case.observations):
+        place = ("observations", i, "experiment")
+        if observation.experiment is not None:
+            yield from _unknown(place, observation.experiment, case.experiments, "experiment")
+    for name, working in case.effects.items():
+        for word in working.experiments or ():
+            yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
+    if case.canopy_correction is not None:
+        yield from _unknown(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
+
+
+def _values(case: Case) -> Iterator[Refusal]:
+    for place, value, positive in values(case):
+        if isinstance(value, str):
+            yield from _unknown(place, value, case.parameters, "parameter")
+            if positive and quantile(case.parameters[value], LEAST_PROBABILITY) <= 0:
+                complaint = f"may fall to 0 or below, but `{dotted(place)}` must be above 0: raise its lower bound"
+                yield Refusal(("parameters", value), complaint)
+        elif value is not None and positive and value <= 0:
+            yield Refusal(place, f"expected a number above 0, got {value:g}")
+
+
+def _effects(case: Case) -> Iterator[Refusal]:
+    """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
+    known = library(case.effect_file)
+    for key, working in case.effects.items():
+        place: KeyPath = ("effects", key)
+        name = working.effect or key
+        yield from _unknown(place if working.effect is None else (*place, "effect"), name, known, "effect")
+        effect = known[name]
+        parameters = {parameter.name: parameter for parameter in effect.parameters}
+        for word, value in working.values.items():
+            yield from _unknown_word((*place, "values", word), word, parameters)
+            yield from _in_support(case, (*place, "values", word), value, parameters[word])
+        if effect.amplitude.name not in working.values:
+            complaint = f"says nothing about `{effect.amplitude.name}`, without which {name} is off: add it"
+            yield Refusal((*place, "values"), complaint)
+        if effect.stage != "sensor" and (working.sections or working.devices):
+            yield Refusal(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
+
+
+def _unknown_word(place: KeyPath, word: str, known: Iterable[str]) -> Iterator[Refusal]:
+    names = list(known)
+    if word not in names:
+        yield Refusal(place, f"is no parameter of this effect: {nearest(word, names)}")
+
+
+def _in_support(case: Case, place: KeyPath, value: Value, parameter: Amplitude | Shape) -> Iterator[Refusal]:
+    low, high = parameter.low, parameter.high
+    if isinstance(value, str):
+        if value in case.parameters:
+            ends = [quantile(case.parameters[value], p) for p in (LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)]
+            if not low <= min(ends) <= max(ends) <= high:
+                complaint = (
+                    f"may leave {low:g} to {high:g} {parameter.unit}, where `{dotted(place)}` must lie: bound it"
+                )
+                yield Refusal(("parameters", value), complaint)
+    elif not low <= value <= high:
+        yield Refusal(place, f"expected a number from {low:g} to {high:g} {parameter.unit}, got {value:g}")
+
+
+def _parameters(case: Case) -> Iterator[Refusal]:
+    used = {value for _, value, _ in values(case) if isinstance(value, str)}
+    for name in case.parameters:
+        place = ("parameters", name)
+        if name in DIMENSIONS:
+            yield Refusal(place, f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it")
+        if name not in used:
+            yield Refusal(place, "is declared but used nowhere: name it where its value belongs, or remove it")
+
+
+def _sides(case: Case) -> Iterator[Refusal]:
+    for name, inflow in case.inflows.items():
+        yield from _inside(("inflows", name, "range"), inflow.range, _side(case, inflow))
+    yield from _inside(("outlet", "range"), case.outlet.range, case.grid.y)
+    if case.simulate.fields is not None:
+        yield from _inside(("simulate", "fields", "x"), case.simulate.fields.x, case.grid.x)
+
+
+def _side(case: Case, inflow: Inflow) -> Interval:
+    return case.grid.y if inflow.side == "west" else case.grid.x
+
+
+def _inside(place: KeyPath, part: Interval | None, whole: Interval) -> Iterator[Refusal]:
+    if part is None:
+        return
+    low, high = part
+    if low < whole[0] or high > whole[1]:
+        yield Refusal(place, f"expected a range within {whole[0]:g} to {whole[1]:g} m, got {low:g} to {high:g} m")
+
+
+def _files(case: Case) -> Iterator[Refusal]:
+    named: list[tuple[KeyPath, Path | None]] = []
+    for i, layer in enumerate(case.bed):
+        named += [(("bed", i, "raster"), layer.raster), (("bed", i, "points"), layer.points)]
+    named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
+    named += [(("observations", i, "file"), observation.file) for i, observation in enumerate(case.observations)]
+    named += [(("survey", "file"), case.survey.file)] if case.survey else []
+    named += [(("effect_file",), case.effect_file)]
+    for place, file in named:
+        if file is not None and not file.is_file():
+            yield Refusal(
+                place, f"expected an existing file, got {os.path.relpath(file)}: put it there or correct the path"
+            )
+
+
+def _likelihood(case: Case) -> Iterator[Refusal]:
+    if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
+        yield Refusal(("infer", "behavioural"), "goes with an informal likelihood, not with gaussian: remove it")

@@ -1,0 +1,100 @@
+"""What the schema has against a file, as one sentence: where, what was expected, what came, what to do."""
+
+import difflib
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, get_args, get_origin
+
+from vegglue.case.parts import Part
+from vegglue.case.schema import Case
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Keys that lead to the refused value, and the rest of the sentence."""
+
+    place: KeyPath
+    complaint: str
+
+
+def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]) -> Refusal:
+    """The first of pydantic's problems with a tree of keys and values; misspelt keys before what they leave missing."""
+    problem = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
+    kind, location, got = problem["type"], problem["loc"], problem["input"]
+    if kind == "missing":
+        place = (*_place(tree, location[:-1]), location[-1])
+        return Refusal(place, f"is missing{_meaning(place)}: add it")
+    place = _place(tree, location)
+    if kind == "extra_forbidden":
+        return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
+    expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    expected = expected.replace("greater than", "a number greater than").replace(
+        "String should match pattern", "text like"
+    )
+    quotes = "; write numbers without quotes" if isinstance(got, str) and "number" in expected else ""
+    return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{quotes}".lstrip())
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """What to write instead of an unknown word."""
+    known = list(known)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"did you mean `{near[0]}`?" if near else f"known here are {', '.join(known) or 'none'}"
+
+
+def dotted(place: KeyPath) -> str:
+    """friction.zones[0].class for ('friction', 'zones', 0, 'class')."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).lstrip(".")
+
+
+def _shown(got: Any) -> str:
+    text = ", ".join(f"{key}: {value}" for key, value in got.items()) if isinstance(got, dict) else repr(got)
+    return textwrap.shorten(text or "nothing", 120, placeholder=" ...")
+
+
+def _place(tree: Any, location: KeyPath) -> KeyPath:
+    """The part of a pydantic location that is keys of the tree, without the names of alternatives tried."""
+    place: KeyPath = ()
+    for key in location:
+        inside = key in tree if isinstance(tree, dict) else isinstance(tree, list) and key in range(len(tree))
+        if inside:
+            tree, place = tree[key], (*place, key)
+    return place
+
+
+def _below(annotation: Any, key: str | int) -> Any:
+    """The type that stands at a key of a value of the annotated type, or None."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        field = _fields(annotation).get(str(key))
+        return field.annotation if field else None
+    parts = get_args(annotation)
+    if get_origin(annotation) is dict:
+        return parts[1]
+    if get_origin(annotation) is tuple:
+        return parts[0]
+    return next((below for part in parts if (below := _below(part, key)) is not None), None)
+
+
+def _fields(annotation: Any) -> dict[str, Any]:
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        return {field.alias or name: field for name, field in annotation.model_fields.items()}
+    return {key: field for part in get_args(annotation) for key, field in _fields(part).items()}
+
+
+def _fields_at(place: KeyPath) -> dict[str, Any]:
+    annotation: Any = Case
+    for key in place:
+        annotation = _below(annotation, key)
+    return _fields(annotation)
+
+
+def _keys(place: KeyPath) -> list[str]:
+    return [key for key, field in _fields_at(place).items() if not field.exclude]
+
+
+def _meaning(place: KeyPath) -> str:
+    field = _fields_at(place[:-1]).get(str(place[-1])) if place else None
+    return f" ({field.description})" if field else ""

@@ -1,0 +1,85 @@
+"""Prior distributions: Sobol' points through their inverse distribution functions, and their density."""
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import scipy.stats
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri
+
+from vegglue.case.schema import Parameter
+
+# Distance [-] kept from probabilities 0 and 1, where an unbounded prior is infinite: half the spacing of 2^30 points.
+SMALLEST_PROBABILITY = 2.0**-31
+
+
+def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
+    """x with P(X <= x) = probability; at 0 and 1 the bounds of the prior, maybe infinite [unit of the prior]."""
+    number, share = _numbers(prior), np.asarray(probability, dtype=np.float64)
+    if prior.distribution == "uniform":
+        return np.asarray(number["low"] + share * (number["high"] - number["low"]))
+    if prior.distribution == "loguniform":
+        return np.asarray(number["low"] * (number["high"] / number["low"]) ** share)
+    if prior.distribution == "lognormal":
+        return np.asarray(number["median"] * np.exp(number["log_sd"] * ndtri(share)))
+    return _truncated_normal(number["mean"], number["sd"], prior.low, prior.high, share)
+
+
+def _truncated_normal(
+    mean: float, sd: float, low: float | None, high: float | None, share: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """mean + s sd Phi^-1(A + q (B - A)), from the tail (s = -1: the upper one) in which A and B keep their digits."""
+    a, b = -math.inf if low is None else (low - mean) / sd, math.inf if high is None else (high - mean) / sd
+    if a > 0.0:
+        mirrored = _truncated_normal(-mean, sd, None if high is None else -high, -low, 1.0 - share)  # type: ignore[operator]
+        return np.asarray(-mirrored)
+    below, above = ndtr(a), ndtr(b)
+    return np.clip(mean + sd * ndtri(below + share * (above - below)), low, high)
+
+
+def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
+    """F(x) = P(X <= x), the inverse of `quantile` [-]."""
+    return np.asarray(_distribution(prior).cdf(value), dtype=np.float64)
+
+
+def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
+    """x_ij = F_j^-1(s_ij) with s the scrambled Sobol' sequence; one array (members,) per parameter [unit of the prior].
+
+    The first members of a longer sample are the same, because the sequence is drawn up to the next power of two.
+    Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
+    """
+    if not parameters:
+        return {}
+    sequence = scipy.stats.qmc.Sobol(len(parameters), scramble=True, seed=seed)
+    points = sequence.random_base2(math.ceil(math.log2(members)))[:members]
+    points = np.clip(points, SMALLEST_PROBABILITY, 1.0 - SMALLEST_PROBABILITY)
+    return {name: quantile(prior, points[:, j]) for j, (name, prior) in enumerate(parameters.items())}
+
+
+def log_prior(parameters: Mapping[str, Parameter], theta: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """log p(theta) = sum_j log p_j(theta_j), shape (members,); -inf outside a bound. Priors are independent."""
+    terms = [np.asarray(_distribution(prior).logpdf(theta[name])) for name, prior in parameters.items()]
+    return np.sum(terms, axis=0, dtype=np.float64)
+
+
+@lru_cache(maxsize=256)  # scipy takes a millisecond to make one
+def _distribution(prior: Parameter) -> Any:
+    number = _numbers(prior)
+    if prior.distribution == "uniform":
+        return scipy.stats.uniform(number["low"], number["high"] - number["low"])
+    if prior.distribution == "loguniform":
+        return scipy.stats.loguniform(number["low"], number["high"])
+    if prior.distribution == "lognormal":
+        return scipy.stats.lognorm(number["log_sd"], scale=number["median"])
+    mean, sd = number["mean"], number["sd"]
+    low = -math.inf if prior.low is None else (prior.low - mean) / sd
+    high = math.inf if prior.high is None else (prior.high - mean) / sd
+    return scipy.stats.truncnorm(low, high, loc=mean, scale=sd)
+
+
+def _numbers(prior: Parameter) -> dict[str, float]:
+    keys = ("low", "high", "mean", "sd", "median", "log_sd")
+    return {key: math.nan if (value := getattr(prior, key)) is None else value for key in keys}

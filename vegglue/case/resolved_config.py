@@ -1,0 +1,61 @@
+"""A case as one text without `extends`, and the hashes that tie results to it."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from vegglue.case.schema import Case
+
+# What a finished ensemble does not depend on.
+NOT_SIMULATED = dict.fromkeys(
+    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction"), True
+) | {"simulate": {"field_budget"}}
+# Goes up whenever the same case gets other numbers, so that results of before no longer fit it.
+EQUATIONS = 3
+Tree = dict[str, Any]
+
+
+def resolved_yaml(case: Case) -> str:
+    """The case as one file without `extends`; data files are named relative to the file it was read from."""
+    return as_yaml(plain_tree(dumped(case), lambda file: _relative(file, case.source)))
+
+
+def as_yaml(tree: Tree) -> str:
+    """Keys and values as the text of a config."""
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+
+
+def case_hash(case: Case) -> str:
+    """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie."""
+    return _hash(dumped(case))
+
+
+def simulation_hash(case: Case) -> str:
+    """Like case_hash, of only what an ensemble depends on: unchanged by likelihood, title or reference values."""
+    return _hash(dumped(case, NOT_SIMULATED))
+
+
+def dumped(case: Case, without: Mapping[str, Any] | None = None) -> Tree:
+    return case.model_dump(by_alias=True, exclude_none=True, exclude=without)
+
+
+def plain_tree(tree: Any, of_file: Callable[[Path], Any]) -> Any:
+    if isinstance(tree, dict):
+        return {key: plain_tree(value, of_file) for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [plain_tree(value, of_file) for value in tree]
+    return of_file(tree) if isinstance(tree, Path) else tree
+
+
+def _hash(tree: Tree) -> str:
+    contents = plain_tree(tree, lambda file: hashlib.sha256(file.read_bytes()).hexdigest())
+    return hashlib.sha256(json.dumps([EQUATIONS, contents], ensure_ascii=False).encode()).hexdigest()
+
+
+def _relative(file: Path, source: Path) -> str:
+    return Path(os.path.relpath(file, source.parent)).as_posix()

@@ -1,0 +1,167 @@
+"""The schema of a case: what a YAML file may say, in which unit, and which names must agree. Nothing is read here."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
+from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
+
+
+class Experiment(Part):
+    discharge: dict[str, Value] = Field(description="one value, or one for each inflow [m3/s]")
+    level: Value = Field(description="water level at the outlet, in the datum of the bed [m]")
+    plants: bool | tuple[str, ...] = Field(default=True, description="true, false, or the names of the patches present")
+    stands: dict[str, StandOverride] = Field(default_factory=dict, description="what differs in this experiment")
+
+
+class Parameter(Part):
+    distribution: Literal["uniform", "loguniform", "normal", "lognormal"] = Field(description="kind of prior")
+    low: Number | None = Field(default=None, description="lower bound")
+    high: Number | None = Field(default=None, description="upper bound")
+    mean: Number | None = Field(default=None, description="mean of a normal prior, before its bounds")
+    sd: Positive | None = Field(default=None, description="standard deviation of a normal prior, before its bounds")
+    median: Positive | None = Field(default=None, description="median of a lognormal prior")
+    log_sd: Positive | None = Field(default=None, description="standard deviation of the natural logarithm")
+    unit: str = Field(description="SI unit, or -")
+    symbol: str = Field(default="", description="how it is written in the report")
+    meaning: str = Field(default="", description="what it is, in words")
+
+    @model_validator(mode="after")
+    def _complete_and_in_order(self) -> Self:
+        keys = {"uniform": ("low", "high"), "normal": ("mean", "sd"), "lognormal": ("median", "log_sd")}
+        bounds = ("low", "high") if self.distribution == "normal" else ()
+        exactly(self, self.distribution, keys | {"loguniform": ("low", "high")}, bounds)
+        if self.low is not None and self.high is not None and self.low >= self.high:
+            raise ValueError("a `low` below `high`")
+        if self.distribution == "loguniform" and self.low is not None and self.low <= 0:
+            raise ValueError("a `low` above 0 for a loguniform prior")
+        return self
+
+
+class EffectEntry(Part):
+    """An effect at work in a case; its key names it, and the effect too unless `effect` does."""
+
+    effect: str | None = Field(default=None, description="name of the effect in the library, if the key is another")
+    values: dict[str, Value] = Field(description="its amplitude and, as far as they are not left alone, its shapes")
+    experiments: tuple[str, ...] | None = Field(default=None, description="where it acts, everywhere when left out")
+    sections: tuple[str, ...] = Field(default=(), description="sensor effects: sections it is limited to")
+    devices: tuple[str, ...] = Field(default=(), description="sensor effects: devices it is limited to")
+
+
+class Offset(Part):
+    x: Number = Field(default=0.0, description="added to x of the file [m]")
+    y: Number = Field(default=0.0, description="added to y of the file [m]")
+
+
+class Observation(Part):
+    kind: Literal["adv", "velocity", "level"] = Field(description="points in the vertical, depth-averaged, or gauges")
+    file: Path = Field(description="CSV file")
+    experiment: str | None = Field(default=None, description="experiment of all rows, if the file has no such column")
+    section: str | None = Field(default=None, description="section of all rows, if the file has no such column")
+    case: str | None = Field(default=None, description="adv: rows of the file with this value in column `case`")
+    average: Literal["paper", "profile"] | None = Field(default=None, description="adv: rule of depth-averaging")
+    offset: Offset = Field(default_factory=Offset, description="added to the coordinates of the file [m]")
+    floor: Number | None = Field(default=None, description="adv: level of the channel floor in z of the file [m]")
+    surface: Number | None = Field(default=None, description="adv: measured water level in z of the file [m]")
+    standard_error: Positive | None = Field(default=None, description="of all values, if the file has no such column")
+
+    @model_validator(mode="after")
+    def _keys_of_the_kind(self) -> Self:
+        adv = ("experiment", "section", "case", "average", "floor", "surface")
+        exactly(self, self.kind, {"adv": adv, "velocity": (), "level": ()}, ("experiment", "section"))
+        return self
+
+
+class Survey(Part):
+    file: Path = Field(description="CSV of the plant survey: quantity,mean,standard_deviation,samples [SI]")
+    debris: bool = Field(default=False, description="true: stem diameters with the debris that hangs in them")
+    spread: Literal["plants", "mean"] = Field(default="plants", description="one plant for all, or their mean")
+    deflected_height: Positive | None = Field(default=None, description="height of the bent plants [m]")
+    undergrowth_density: Annotated[tuple[Positive, Positive], AfterValidator(rising)] | None = Field(
+        default=None, description="assumed range, if there is any [1/m2]"
+    )
+
+
+class Numerics(Part):
+    film_depth: Positive = Field(default=0.01, description="depth at the waterline, a tenth of it on dry land [m]")
+    bank_argument_minimum: Annotated[Number, Field(gt=1)] = Field(default=1.3, description="floor of 12 h/k_s [-]")
+    emergent: Literal["constant", "proportional"] = Field(
+        default="constant", description="phi or phi h/h_d where h < h_d"
+    )
+    shear_depth: Literal["smallest"] | None = Field(
+        default=None, description="shear over the smallest depth of the cells around a point; else over its own"
+    )
+    tolerance: Positive = Field(
+        default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
+    )
+
+
+class KeptFields(Part):
+    x: Interval = Field(description="range along x, over the whole width of the grid [m]")
+
+
+class Simulate(Part):
+    members: Annotated[int, Field(strict=True, gt=0)] = Field(default=4096, description="size of the ensemble")
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(default=1, description="seed of the Sobol' sequence")
+    fields: KeptFields | None = Field(default=None, description="where level, u and v of all members are kept")
+    field_budget: Positive = Field(default=200.0, description="most they may take before compression [MB]")
+
+
+class Infer(Part):
+    method: Literal["refine", "glue"] = Field(default="refine", description="draws around the best members, or these")
+    likelihood: Literal["gaussian", "nse", "inverse-variance"] = Field(
+        default="gaussian", description="how residuals weigh"
+    )
+    sigma: Literal["best-member", "known"] = Field(
+        default="best-member", description="errors estimated from what the best leaves, or known"
+    )
+    behavioural: Number | None = Field(default=None, description="threshold of an informal likelihood [-]")
+
+
+class Validation(Part):
+    """Measurements that no calibration sees: for judging a finished model only."""
+
+    experiments: dict[str, Experiment] = Field(min_length=1, description="flows that nothing is calibrated to")
+    observations: tuple[Observation, ...] = Field(min_length=1, description="what was measured in them")
+
+
+class Reference(Part):
+    source: str = Field(default="", description="who found these values")
+    table: dict[str, Number | tuple[Number, Number]] = Field(default_factory=dict, description="[median, sd] or number")
+    made_with: dict[str, Number] = Field(default_factory=dict, description="what a synthetic record was made from")
+
+
+class CanopyCorrection(Part):
+    stand: str = Field(description="stand whose phi is corrected")
+    from_height: Positive = Field(description="canopy height the ensemble was made with [m]")
+    to_height: Positive = Field(description="canopy height to correct for [m]")
+    depth: Positive = Field(description="depth at which C is to stay the same [m]")
+
+
+class Case(Part):
+    """Everything one run depends on. Results go to runs/<name>/."""
+
+    source: Path = Field(exclude=True, description="file the case was read from")
+    name: str = Field(pattern=r"^[a-z0-9_-]+$", description="lower-case letters, digits, _ and -")
+    title: str = Field(default="", description="title of the report")
+    grid: GridExtent = Field(description="regular grid of the model")
+    bed: tuple[BedLayer, ...] = Field(min_length=1, description="layers, later ones win where they have data")
+    friction: Friction = Field(description="resistance laws and where they hold")
+    plants: Plants = Field(default_factory=Plants, description="stands and patches")
+    inflows: dict[str, Inflow] = Field(min_length=1, description="where water enters")
+    outlet: Outlet = Field(default_factory=Outlet, description="where it leaves: the east side")
+    experiments: dict[str, Experiment] = Field(min_length=1, description="flows that share parameters")
+    eddy_viscosity: Value = Field(default=0.01, description="[m2/s]")
+    effects: dict[str, EffectEntry] = Field(default_factory=dict, description="physical effects at work, see `effects`")
+    effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
+    parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
+    observations: tuple[Observation, ...] = Field(default=(), description="measurements")
+    survey: Survey | None = Field(default=None, description="plant survey")
+    numerics: Numerics = Field(default_factory=Numerics, description="choices of the solver")
+    simulate: Simulate = Field(default_factory=Simulate, description="size and seed of the ensemble")
+    infer: Infer = Field(default_factory=Infer, description="likelihood")
+    validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
+    reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
+    canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")

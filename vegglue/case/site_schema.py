@@ -1,0 +1,144 @@
+"""The part of the schema that describes a site: grid, bed, friction, plants, inflows and outlet."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from vegglue.case.parts import Interval, Number, Part, Polygon, Positive, Value, exactly
+
+
+class GridExtent(Part):
+    x: Interval = Field(description="from upstream to downstream [m]")
+    y: Interval = Field(description="across [m]")
+    cell: tuple[Positive, Positive] = Field(description="size of a cell along x and y [m]")
+
+    @model_validator(mode="after")
+    def _whole_cells(self) -> Self:
+        for axis, (low, high), size in (("x", self.x, self.cell[0]), ("y", self.y, self.cell[1])):
+            count = (high - low) / size
+            if abs(count - round(count)) > 1e-6 or count < 3:
+                raise ValueError(f"a whole number of at least 3 cells along {axis}, where these make {count:g}")
+        return self
+
+
+class Trapezoid(Part):
+    axis: Number = Field(description="y of the channel axis [m]")
+    bottom_width: Positive = Field(description="width of the floor [m]")
+    top_width: Positive | None = Field(default=None, description="width between the tops of the banks, flat beyond [m]")
+    bank_slope: Positive = Field(description="rise over run of the banks [-]")
+    bed_slope: Number = Field(description="fall of the floor per length along x [-]")
+    level: Number = Field(description="level of the floor at the upstream edge of the grid [m]")
+
+    @model_validator(mode="after")
+    def _wider_at_the_top(self) -> Self:
+        if self.top_width is not None and self.top_width <= self.bottom_width:
+            raise ValueError("a `top_width` above `bottom_width`")
+        return self
+
+
+class BedLayer(Part):
+    trapezoid: Trapezoid | None = Field(default=None, description="channel from design numbers")
+    raster: Path | None = Field(default=None, description="ESRI ASCII grid of bed levels [m]")
+    points: Path | None = Field(default=None, description="CSV of surveyed points x,y,z [m]")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if len(self.model_fields_set) != 1:
+            raise ValueError("exactly one of `trapezoid`, `raster`, `points`")
+        return self
+
+
+class FrictionClass(Part):
+    law: Literal["manning", "keulegan", "chezy"] = Field(description="C = h^(1/6)/n, 18 log10(12 h/k_s), or given")
+    n: Value | None = Field(default=None, description="Manning coefficient [s m^-1/3]")
+    k_s: Value | None = Field(default=None, description="Nikuradse roughness height [m]")
+    c: Value | None = Field(default=None, description="Chézy coefficient [m^1/2/s]")
+
+    @model_validator(mode="after")
+    def _coefficient_of_the_law(self) -> Self:
+        exactly(self, self.law, {"manning": ("n",), "keulegan": ("k_s",), "chezy": ("c",)})
+        return self
+
+
+class Zone(Part):
+    friction_class: str | None = Field(default=None, alias="class", description="friction class of the zone")
+    steeper_than: Positive | None = Field(default=None, description="cells where |grad z_b| is above this [-]")
+    beyond_slope_break: Positive | None = Field(
+        default=None, description="from the lowest cell of a cross-section outward, all from the first one steeper [-]"
+    )
+    polygon: Polygon | None = Field(default=None, description="corners x, y [m]")
+    x: Interval | None = Field(default=None, description="range along x, alone or with y [m]")
+    y: Interval | None = Field(default=None, description="range along y, alone or with x [m]")
+    raster: Path | None = Field(default=None, description="ESRI ASCII grid of class numbers")
+    values: dict[int, str] | None = Field(default=None, description="class of each number in the raster")
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> Self:
+        rules = self.model_fields_set & {"steeper_than", "beyond_slope_break", "polygon", "raster"}
+        if len(rules) + bool(self.model_fields_set & {"x", "y"}) != 1:
+            raise ValueError("one of `steeper_than`, `beyond_slope_break`, `polygon`, `raster`, or a range `x`, `y`")
+        if (self.raster is None) != (self.values is None) or (self.raster is None) == (self.friction_class is None):
+            raise ValueError("a `class`, or for a raster its `values` instead")
+        return self
+
+
+class Friction(Part):
+    classes: dict[str, FrictionClass] = Field(min_length=1, description="resistance laws by name")
+    default: str = Field(description="friction class where no zone applies")
+    zones: tuple[Zone, ...] = Field(default=(), description="rules in order, later ones win")
+
+
+class Stand(Part):
+    phi: Value = Field(description="plant drag C_d m D h_d at `stems` [-]")
+    canopy_height: Value = Field(description="height h_d of the deflected canopy [m]")
+    bare_chezy: Value = Field(default=60.0, description="Chézy coefficient C_b of the bed under the plants [m^1/2/s]")
+    stems: Positive = Field(default=1.0, description="density at which phi holds [1/m2]")
+    law: Literal["baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi"] = Field(
+        default="baptist", description="resistance law of the plants"
+    )
+
+
+class StandOverride(Part):
+    phi: Value | None = Field(default=None, description="plant drag in this experiment [-]")
+    canopy_height: Value | None = Field(default=None, description="canopy height in this experiment [m]")
+    bare_chezy: Value | None = Field(default=None, description="Chézy coefficient under the plants [m^1/2/s]")
+
+
+class Patch(Part):
+    name: str = Field(description="name of the patch")
+    stand: str = Field(description="stand growing in it")
+    stems: Positive = Field(default=1.0, description="density of the patch [1/m2]")
+    x: Interval | None = Field(default=None, description="range along x, with y [m]")
+    y: Interval | None = Field(default=None, description="range along y, with x [m]")
+    polygon: Polygon | None = Field(default=None, description="corners x, y [m]")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if (self.x is None) != (self.y is None) or (self.x is None) == (self.polygon is None):
+            raise ValueError("either both `x` and `y`, or a `polygon`")
+        return self
+
+
+class Plants(Part):
+    stands: dict[str, Stand] = Field(default_factory=dict, description="kinds of plants by name")
+    patches: tuple[Patch, ...] = Field(default=(), description="where they stand, later ones win")
+
+
+class Inflow(Part):
+    side: Literal["west", "south", "north"] = Field(description="side of the grid the water enters by")
+    range: Interval | None = Field(default=None, description="part of that side, all of it when left out [m]")
+    spread: Literal["conveyance", "uniform"] = Field(default="conveyance", description="by h^(5/3), or evenly")
+    angle: Annotated[Number, Field(gt=0, lt=180)] | None = Field(
+        default=None, description="south, north: from downstream to where the water heads, 90 if not given [degrees]"
+    )
+
+    @model_validator(mode="after")
+    def _straight_from_the_west(self) -> Self:
+        if self.side == "west" and self.angle is not None:
+            raise ValueError("no `angle` for an inflow from the west, which enters along x")
+        return self
+
+
+class Outlet(Part):
+    range: Interval | None = Field(default=None, description="part of the east side in y, all of it when left out [m]")

@@ -1,0 +1,67 @@
+"""A child config: what it extends, which effects it adds, with a prior for the amplitude of each."""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from vegglue.case.messages import nearest
+from vegglue.case.resolved_config import Tree
+from vegglue.case.schema import Case
+from vegglue.case.text_files import case_name
+from vegglue.effects.library import library
+from vegglue.errors import InputError
+from vegglue.screening.candidates import Candidate, places_of, prior_of, working_of
+
+
+def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
+    """The candidate that `discharge_error[high]` or `streamlining` names: an effect, and where it acts.
+
+    Errors: InputError for an unknown effect, one that is at work already, or a place it cannot act in.
+    """
+    found = re.fullmatch(r"(\w+)(?:\[([^\]]+)\])?", name)
+    known = library(case.effect_file)
+    if found is None or found[1] not in known:
+        raise InputError(f"--add: `{name}` is not an effect of the library: {nearest(name.split('[')[0], known)}")
+    effect = known[found[1]]
+    where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
+    places = places_of(case, station)
+    kind = next((kind for kind, names in places.items() if where and set(where) <= set(names)), None)
+    if where and (kind is None or (kind in ("section", "device") and effect.stage != "sensor")):
+        raise InputError(
+            f"--add: `{name}` acts nowhere: expected names of experiments ({', '.join(places['experiment'])})"
+            + (f" or sections ({', '.join(places['section'])})" if effect.stage == "sensor" else "")
+            + f", got {', '.join(where)}; correct them."
+        )
+    candidate = Candidate(effect, **{f"{kind}s": where}) if kind else Candidate(effect)
+    if candidate.key in case.effects:
+        raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
+    return candidate
+
+
+def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Tree:
+    """Keys and values of the child that `target` is to hold: effects, and the priors of their amplitudes."""
+    tree: Tree = {
+        "extends": Path(os.path.relpath(parent.source, target.resolve().parent)).as_posix(),
+        "name": child_name(parent.name, [candidate for candidate, _ in added]),
+        "title": f"{parent.title or parent.name}, with {' and '.join(candidate.name for candidate, _ in added)}",
+        "effects": {},
+        "parameters": {},
+    }
+    for candidate, shapes in added:
+        unknown = set(shapes) - {shape.name for shape in candidate.effect.shapes}
+        if unknown:
+            names = [shape.name for shape in candidate.effect.shapes]
+            raise InputError(f"--shape: `{min(unknown)}` is not a shape of {candidate.name}: it has {names or 'none'}.")
+        working = working_of(candidate, candidate.parameter, shapes)
+        tree["effects"][candidate.key] = working.model_dump(mode="json", exclude_defaults=True)
+        prior = prior_of(candidate.effect).model_dump(exclude_none=True, exclude={"symbol"})
+        tree["parameters"][candidate.parameter] = prior
+    return tree
+
+
+def child_name(parent: str, added: Sequence[Candidate]) -> str:
+    """A name for the child's folder of results."""
+    return case_name("-".join([parent, *(candidate.key for candidate in added)]))

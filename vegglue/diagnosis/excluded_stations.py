@@ -1,0 +1,38 @@
+"""Stations that a diagnosis set aside: no model that is compared afterwards is judged by them."""
+
+from dataclasses import replace
+
+import pandas as pd
+
+from vegglue.engine.linearised_model import Model
+from vegglue.results.diagnosis import Diagnosis
+
+# What makes a measurement the same in a case and in those that extend it.
+MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
+
+
+def excluded_by(*found: Diagnosis) -> pd.DataFrame:
+    """The measurements that any of the diagnoses has flagged."""
+    flagged = [one.station.iloc[list(one.flagged)][MEASUREMENT] for one in found if one.flagged]
+    return pd.concat(flagged, ignore_index=True).drop_duplicates() if flagged else pd.DataFrame(columns=MEASUREMENT)
+
+
+def excluding(model: Model, aside: pd.DataFrame) -> Model:
+    """The model, with these measurements not used."""
+    known = set(aside.itertuples(index=False, name=None))
+    there = [row in known for row in model.station[MEASUREMENT].itertuples(index=False, name=None)]
+    station = model.station.copy()
+    station.loc[there, "used"] = False
+    return replace(model, station=station)
+
+
+def exclusion_in_words(aside: pd.DataFrame) -> str:
+    """One sentence for a reader of what was compared, '' when nothing was set aside."""
+    if aside.empty:
+        return ""
+    places = "; ".join(
+        f"{' '.join(filter(None, (row.experiment, row.section)))} at x = {row.x:g}, y = {row.y:g} m"
+        for row in aside.itertuples()
+    )
+    many, they = ("1 station is", "it") if len(aside) == 1 else (f"{len(aside)} stations are", "them")
+    return f"{many} left out of every model, as the diagnosis set {they} aside: {places}."

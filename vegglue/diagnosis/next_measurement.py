@@ -1,0 +1,211 @@
+"""The next measurement: which one would tell rival explanations apart, and how much it would say per hour of work.
+
+Rival i, fitted to the data at hand, predicts new measurements; rival j predicts others, after it has been calibrated to
+all of them. What is left between both,
+
+    D^2 = |(I - P_[J, S_j]) S_i a_i|^2,
+
+in squared standard errors, is the gain of the log-likelihood ratio (times two) that i would win over j by measuring.
+j may be the model without any effect: then D^2 says whether i would be seen at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.calibration.noise import Noise
+from vegglue.case.schema import Case, Experiment
+from vegglue.engine.linearised_model import Model, fingerprint, linearise
+from vegglue.screening.candidates import Candidate, change_of
+from vegglue.site.gridded_site import build_site
+
+# Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
+HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
+# Verticals are planned this far apart, in half widths of the floor; sections this share of the reach.
+VERTICAL_SPACING, SECTIONS = 0.25, 12
+# Other discharges, relative to the lowest and to the highest one at hand, with the outlet level that goes with them
+# (h ~ Q^0.6). A quarter brings plants to the surface, where what depends on speed or depth leaves other traces.
+LOWER, HIGHER = (0.25, 0.5), (1.4,)
+LEVEL_POWER = 0.6
+# Below this D^2 a measurement does not separate anything.
+SEPARATES = 4.0
+
+
+@dataclass(frozen=True)
+class MeasurementPlan:
+    """One measurement that could be made: its stations and their rows of the extended table, where, and its cost [h].
+
+    setting: the experiment it is made in.
+    """
+
+    name: str
+    rows: np.ndarray
+    stations: pd.DataFrame
+    hours: float
+    x: float
+    experiment: str
+    setting: Experiment
+
+
+@dataclass(frozen=True)
+class MeasurementWorth:
+    """A plan, the least D^2 between any two rivals now and with it, and the gain per hour."""
+
+    plan: MeasurementPlan
+    now: float
+    then: float
+
+    @property
+    def per_hour(self) -> float:
+        return (self.then - self.now) / self.plan.hours
+
+
+Rival = tuple[Candidate, dict[str, float], float]
+
+
+def worth_of_measurements(
+    model: Model, noise: Noise, z: Array, questions: Sequence[Sequence[Rival]]
+) -> list[list[MeasurementWorth]]:
+    """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
+    be told from calibration: (effect, shapes, gain (amplitude - off)^power).
+    """
+    for case in (_with_other_discharges(model.case, LOWER), _with_other_discharges(model.case, ()), model.case):
+        wide, plans = planned(model, case)
+        point = linearise(wide, z)
+        if point is not None:
+            break
+    else:
+        return [[] for _ in questions]
+    every = [rival for question in questions for rival in question]
+    changed = [change_of(wide.case, one, shapes) for one, shapes, _ in every]
+    errors = _errors(wide.station, noise)[:, None]
+    slope = point.slope / errors
+    traces = fingerprint(wide, point, changed) / errors * np.array([gain for _, _, gain in every])
+    known = np.zeros(len(wide.station), dtype=bool)
+    known[: len(model.station)] = model.station["used"].to_numpy(bool)
+    ends = np.cumsum([len(question) for question in questions])
+    own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
+    return [_ranked(plans, known, slope, part) for part in own]
+
+
+def _ranked(plans: Sequence[MeasurementPlan], known: np.ndarray, slope: Array, traces: Array) -> list[MeasurementWorth]:
+    now = _least(slope[known], traces[known])
+    found = []
+    for plan in plans:
+        rows = known.copy()
+        rows[plan.rows] = True
+        found.append(MeasurementWorth(plan, now, _least(slope[rows], traces[rows])))
+    return sorted(found, key=lambda one: -one.per_hour)
+
+
+def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
+    """The model with every station that could be measured behind those that were, and the plans they make; case: the
+    model's with further experiments.
+    """
+    tables, plans, count = [model.station], [], len(model.station)
+    velocity = model.station[(model.station["kind"] == "velocity") & model.station["used"]]
+    for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
+        table = _stations(experiment, plan_name, x, y, kind)
+        rows, setting = np.arange(count, count + len(table)), case.experiments[experiment]
+        plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment, setting))
+        tables.append(table)
+        count += len(table)
+    return Model(case, model.site, pd.concat(tables, ignore_index=True)), plans
+
+
+def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:
+    """Name, experiment, x, y, kind and hours of every measurement worth a thought."""
+    usual, y = next(reversed(model.case.experiments)), _verticals(velocity)
+    low, high = model.case.grid.x
+    places = np.linspace(low, high, SECTIONS + 2)[1:-1]
+    taken = [float(x) for x in velocity["x"].unique()]
+    hours = HOURS["section"] + y.size * HOURS["vertical"]
+    new = [float(x) for x in places if min(abs(x - there) for there in taken) > 0.3 * (places[1] - places[0])]
+    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, "velocity", hours) for x in new]
+    ideas += [
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), np.array([_middle(y)]), "level", HOURS["gauge"])
+        for x in places[::2]
+    ]
+    others = [name for name in case.experiments if name not in model.case.experiments]
+    for x in taken:
+        at, here = f"the section at x = {x:g} m", np.sort(velocity[velocity["x"] == x]["y"].unique().astype(float))
+        ideas.append((f"{at} again ({usual})", usual, x, here, "velocity", hours))
+        more = hours + HOURS["discharge"]
+        ideas += [(f"{at} {experiment}", experiment, x, here, "velocity", more) for experiment in others]
+    return ideas
+
+
+def _verticals(velocity: pd.DataFrame) -> Array:
+    """Where verticals stand in the section that has most of them [m]."""
+    counts = velocity.groupby("x")["y"].nunique()
+    return np.sort(velocity[velocity["x"] == counts.idxmax()]["y"].unique().astype(float))
+
+
+def _middle(y: Array) -> float:
+    return float(0.5 * (y[0] + y[-1]))
+
+
+def _stations(experiment: str, section: str, x: float, y: Array, kind: str) -> pd.DataFrame:
+    return pd.DataFrame(
+        {"experiment": experiment, "kind": kind, "section": section, "x": x, "y": y, "value": 0.0,
+         "standard_error": np.nan, "used": False, "reason": "", "depth": np.nan, "device": ""}
+    )  # fmt: skip
+
+
+def _with_other_discharges(case: Case, lower: Sequence[float]) -> Case:
+    """The case with experiments at discharges it has not seen, `lower` ones and HIGHER, where those at hand are
+    numbers.
+    """
+    known = list(case.experiments.items())
+    numbers = [(name, one) for name, one in known if _plain(one)]
+    if not numbers:
+        return case
+    totals = {name: sum(float(q) for q in one.discharge.values()) for name, one in numbers}
+    lowest, highest = min(totals, key=lambda name: totals[name]), max(totals, key=lambda name: totals[name])
+    floor = float(build_site(case).bed[-1].min())
+    more = {}
+    for name, factor in [(lowest, factor) for factor in lower] + [(highest, factor) for factor in HIGHER]:
+        one = case.experiments[name]
+        depth = float(one.level) - floor
+        level = floor + depth * factor**LEVEL_POWER
+        discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
+        more[f"at {factor * totals[name]:.2f} m3/s"] = one.model_copy(update={"discharge": discharge, "level": level})
+    return case.model_copy(update={"experiments": {**case.experiments, **more}})
+
+
+def _plain(one: Experiment) -> bool:
+    return not isinstance(one.level, str) and not any(isinstance(q, str) for q in one.discharge.values())
+
+
+def _errors(station: pd.DataFrame, noise: Noise) -> Array:
+    """Errors of measurements at hand, and those to come: as good as the usual one of their kind."""
+    errors = noise.among_all(noise.of_data, len(station))
+    kinds = station["kind"].to_numpy()
+    for kind in dict.fromkeys(kinds):
+        known = errors[(kinds == kind) & np.isfinite(errors)]
+        fallback = {"velocity": 0.015, "level": 0.003}[kind]
+        errors[(kinds == kind) & ~np.isfinite(errors)] = np.median(known) if known.size else fallback
+    return errors
+
+
+def _least(slope: Array, traces: Array) -> float:
+    """The least D^2 over ordered pairs of rivals; against the model without any when there is only one."""
+    least = np.inf
+    for i in range(traces.shape[1]):
+        others: list[int | None] = [j for j in range(traces.shape[1]) if j != i] or [None]
+        for j in others:
+            calibrated = slope if j is None else np.column_stack([slope, traces[:, j]])
+            least = min(least, _left(calibrated, traces[:, i], slope.shape[1]))
+    return float(least)
+
+
+def _left(calibrated: Array, trace: Array, priors: int) -> float:
+    """|(I - P) trace|^2 with the rows of the priors below the slopes."""
+    below = np.zeros((priors, calibrated.shape[1]))
+    below[:, :priors] = np.eye(priors)
+    wide, target = np.vstack([calibrated, below]), np.concatenate([trace, np.zeros(priors)])
+    answer, *_ = np.linalg.lstsq(wide, target, rcond=1e-10)
+    return float(np.sum((target - wide @ answer) ** 2))

@@ -1,0 +1,173 @@
+"""Suspects calibrated in earnest: the best of them, the rivals that may be it instead, the model that follows; then
+backwards, which effects accepted earlier a later one has made superfluous."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import scipy.stats
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, grid_difference
+from vegglue.calibration.fit import Fitted, chi2, fit, interval95, objective
+from vegglue.calibration.noise import with_grid_error
+from vegglue.case.parameter_space import z_of
+from vegglue.diagnosis.verdict import MOST_GROUPS
+from vegglue.engine.linearised_model import Model, linearise
+from vegglue.parallel import in_threads
+from vegglue.results.diagnosis import Step, Suspect
+from vegglue.screening import score_test
+from vegglue.screening.candidates import Candidate, at_work, with_effect
+from vegglue.screening.residual_screening import Screening, refit_start
+
+# Suspects that are refitted in one round, and steps each of them may take.
+REFITTED, REFIT_STEPS = 6, 8
+# Scores this much below the best one's (in squares, and as a share of it) are not refitted.
+BEHIND, BEHIND_SHARE = 15.0, 0.45
+# Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
+# others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
+IN_SET, HARDLY = 0.95, 0.05
+
+
+@dataclass(frozen=True)
+class Refit:
+    """The quick model with one effect more at its best place; column: its trace; amplitude with its 95 % interval."""
+
+    candidate: Candidate
+    column: int
+    fitted: Fitted
+    amplitude: float
+    interval95: tuple[float, float]
+
+    def told(self, suspect: Suspect) -> Suspect:
+        """The suspect with what its refit says of it."""
+        told = replace(suspect, amplitude=self.amplitude, interval95=self.interval95, refitted=True)
+        return replace(told, objective=self.fitted.objective)
+
+
+def refits_of(seen: Screening, jobs: int, say: Callable[[str], None]) -> list[Refit]:
+    """The most suspect effects refitted, the best first; those that find no flow are left out."""
+    tried = _handful(seen)
+    say(f"refitting with {', '.join(seen.traces.candidates[j].name for j in tried)}")
+    found = in_threads(partial(_refit, seen), [(j,) for j in tried], jobs)
+    return sorted((one for one in found if one is not None), key=lambda one: one.fitted.objective)
+
+
+def accepted(
+    seen: Screening, refits: list[Refit], later: bool, say: Callable[[str], None]
+) -> tuple[Step, Baseline] | None:
+    """The best refit as a step, with the rivals that may be it instead, and the baseline it leads to.
+
+    None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
+    say nothing, or when no flow is found with it.
+    """
+    _, noise, point = seen.base.quick
+    fall = [objective(noise, point) - one.fitted.objective for one in refits]
+    if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
+        return None
+    best, chance, groups = refits[0], *_rivals(seen, refits, np.array(fall))
+    if later and len(groups) > MOST_GROUPS:
+        return None
+    say(f"calibrating with {best.candidate.name}")
+    further = _onward(seen, best)
+    if further is None:
+        return None
+    before, p_family = chi2(seen.noise, seen.base.fitted.point), float(np.exp(seen.effects.log_p()))
+    rivals, chances = tuple(chance), tuple(chance.values())
+    return Step(best.candidate.name, rivals, chances, groups, before, further.fitted.chi2, p_family), further
+
+
+def _rivals(seen: Screening, refits: list[Refit], fall: Array) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """The chance of each refit in the fewest groups that hold IN_SET of it, the likeliest first, and these groups.
+
+    fall (k,): by how much each lowers the objective.
+    """
+    columns, names = [one.column for one in refits], [one.candidate.name for one in refits]
+    chance = score_test.chances_of_rivals(fall)
+    near = chance >= HARDLY * chance.max()
+    alike = np.where(near & near[:, None], score_test.cosines(seen.projected)[np.ix_(columns, columns)], 0.0)
+    kept = score_test.fewest(score_test.alike_groups(range(len(refits)), alike), chance, IN_SET)
+    likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
+    return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
+
+
+def _onward(seen: Screening, best: Refit) -> Baseline | None:
+    """The model with the accepted effect as the next baseline, the error of its grid looked at again; None where it
+    finds no flow.
+    """
+    base, place = seen.base, best.fitted.point
+    model = _with(base.model, seen, best)
+    if base.coarse is None:
+        return Baseline(model, base.noise, best.fitted, None, None)
+    start = place if base.quick[0] is base.model else linearise(model, place.z, place) or linearise(model, place.z)
+    if start is None:
+        return None
+    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, seen, best)
+    on_coarse = linearise(coarse, fitted.point.z, base.on_coarse)
+    noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
+    return Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse)
+
+
+def _with(model: Model, seen: Screening, one: Refit) -> Model:
+    return replace(model, case=with_effect(model.case, one.candidate, seen.traces.settings[one.column]))
+
+
+def _handful(seen: Screening) -> list[int]:
+    """Candidates worth a refit, the best score first."""
+    squares = {j: seen.best_score(j) ** 2 for j in seen.order}
+    most = max(squares.values())
+    least = min(most - BEHIND, BEHIND_SHARE * most)
+    return [j for j in seen.order[:REFITTED] if squares[j] >= max(least, 4.0)] or seen.order[:1]
+
+
+def _refit(seen: Screening, candidate: int) -> Refit | None:
+    one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
+    quick, noise, point = seen.base.quick
+    model = replace(quick, case=with_effect(quick.case, one, seen.traces.settings[column]))
+    start = linearise(model, refit_start(seen, candidate, model.case), point)
+    if start is None:
+        return None
+    fitted = fit(model, noise, start, REFIT_STEPS)
+    amplitude, low, high = interval95(model, fitted, one.parameter)
+    return Refit(one, column, fitted, amplitude, (low, high))
+
+
+# An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
+NEEDED = 2.0
+
+
+def pruned(base: Baseline, earlier: list[str], say: Callable[[str], None]) -> tuple[Baseline, list[str]]:
+    """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
+    unneeded: list[str] = []
+    for name in earlier:
+        one = next(one for one in at_work(base.model.case).values() if one.name == name)
+        j = base.model.names.index(one.parameter)
+        spread = float(np.sqrt(base.fitted.covariance[j, j]))
+        off = z_of(base.model.case.parameters[one.parameter], one.effect.amplitude.off)
+        if abs(base.fitted.point.z[j] - off) > NEEDED * spread:
+            continue
+        say(f"{name} is no longer needed")
+        fewer = _without(base, one.key, one.parameter)
+        if fewer is not None:
+            base, unneeded = fewer, [*unneeded, name]
+    return base, unneeded
+
+
+def _without(base: Baseline, key: str, parameter: str) -> Baseline | None:
+    """The model calibrated again without one of its effects."""
+
+    def less(model: Model) -> Model:
+        case = model.case
+        effects = {name: one for name, one in case.effects.items() if name != key}
+        parameters = {name: one for name, one in case.parameters.items() if name != parameter}
+        return replace(model, case=case.model_copy(update={"effects": effects, "parameters": parameters}))
+
+    kept = np.array([name != parameter for name in base.model.names])
+    start = linearise(less(base.model), base.fitted.point.z[kept], base.fitted.point)
+    if start is None:
+        return None
+    fitted = fit(less(base.model), base.noise, start)
+    coarse = None if base.coarse is None else less(base.coarse)
+    on_coarse = None if coarse is None else linearise(coarse, fitted.point.z, base.on_coarse)
+    return Baseline(less(base.model), base.noise, fitted, coarse, on_coarse)

@@ -1,0 +1,123 @@
+"""What a physical effect is: a small pure function of the flow at cell centres, declared beside its parameters.
+
+Each effect acts at one stage. Its function gets what stands there and its parameters, (m,) each, and returns what it
+changes, by name:
+
+    site        act(ground, ...)    -> {"bed"}                                   added to the bed level [m]
+    boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}        takes their place
+    plants      act(stand, ...)     -> {"phi", "canopy_height"}                           takes their place
+    resistance  act(cells, ...)     -> {"rate"}                                           takes its place [1/m]
+    exchange    act(cells, ...)     -> {"viscosity"} [m2/s], {"xx", "xy", "yy"} [m3/s2]   added
+    force       act(cells, ...)     -> {"x", "y"}                                         added [m/s2]
+    sensor      act(reading, ...)   -> {"value"}                                          takes its place
+
+In {"xx", "xy", "yy"} are momentum fluxes h T, so that the force on the water is -(1/h) div(h T).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from vegglue.arrays import Array
+
+Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
+STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
+# What each stage hands on, and whether an effect adds to it or takes its place.
+ADDED = {"site": ("bed",), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
+REPLACED = {
+    "boundary": ("discharge", "level", "spread", "lateral"),
+    "plants": ("phi", "canopy_height"),
+    "resistance": ("rate",),
+    "sensor": ("value",),
+}
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """The one parameter that switches an effect: nothing happens at `off`.
+
+    scale: a plausible size, the standard deviation of its prior around `off`; low, high: where it must lie. power: the
+    predictions answer to (amplitude - off)^power, to first order.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    scale: float
+    low: float
+    high: float
+    off: float = 0.0
+    power: int = 1
+
+    def gain(self, value: float) -> float:
+        """What predictions answer to: (value - off)^power, of the sign of the difference."""
+        return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)
+
+    def size(self, gain: float) -> float:
+        """How far from off the value of that gain lies."""
+        return float(np.sign(gain) * np.abs(gain) ** (1.0 / self.power))
+
+    def at(self, gain: float) -> float:
+        """The value of that gain, kept within the support."""
+        return float(np.clip(self.off + self.size(gain), self.low, self.high))
+
+    def may_be(self, gain: float, most: float) -> bool:
+        """Whether the value of a gain lies within the support, and within `most` times scale of off."""
+        value = self.off + self.size(gain)
+        return self.low <= value <= self.high and abs(value - self.off) <= most * self.scale
+
+    @property
+    def small(self) -> float:
+        """A step from off into the support, small but large against rounding in its power."""
+        step = (0.02 if self.power == 1 else 0.2) * self.scale
+        return step if self.off + step <= self.high else -step
+
+    @property
+    def plausible(self) -> float:
+        """Gain of a plausible size."""
+        return self.scale**self.power
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter that means nothing while the effect is off: where, how wide, which exponent.
+
+    default: its value unless told; grid: the values a search tries; low, high: where it must lie.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    default: float
+    low: float
+    high: float
+    grid: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`.
+
+    each: whether it is one cause for the whole case, or a cause of its own in each experiment, section or device.
+    mirrored: whether a mirrored flow feels the mirrored effect; if not, `equation` says what breaks the mirror.
+    """
+
+    name: str
+    stage: Stage
+    title: str
+    equation: str
+    act: Callable[..., Mapping[str, Array]]
+    amplitude: Amplitude
+    shapes: tuple[Shape, ...] = ()
+    source: str = ""
+    doi: str = ""
+    checked: bool = False
+    each: Literal["case", "experiment", "section", "device"] = "case"
+    mirrored: bool = True
+    tags: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Amplitude | Shape, ...]:
+        return (self.amplitude, *self.shapes)

@@ -1,0 +1,58 @@
+"""The library of effects, listed by hand: a new one is a function in one of these files and an entry in its list."""
+
+import importlib.util
+import os
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+
+from vegglue.effects import boundary, exchange, force, plants, resistance, sensor, site, unlisted
+from vegglue.effects.definition import Effect
+from vegglue.errors import InputError
+
+SHIPPED: tuple[Effect, ...] = (
+    *site.EFFECTS,
+    *boundary.EFFECTS,
+    *plants.EFFECTS,
+    *resistance.EFFECTS,
+    *exchange.EFFECTS,
+    *force.EFFECTS,
+    *sensor.EFFECTS,
+    *unlisted.EFFECTS,
+)
+
+
+@lru_cache
+def library(own: Path | None = None) -> Mapping[str, Effect]:
+    """All effects by name: those shipped, then those of a user's file, which is run to read them.
+
+    Errors: InputError when the file cannot be run, has no EFFECTS, or repeats a name.
+    """
+    known = {effect.name: effect for effect in SHIPPED}
+    for effect in effects_of(own) if own else ():
+        if effect.name in known:
+            raise InputError(f"{_shown(own)}: the effect `{effect.name}` exists already; give yours another name.")
+        known[effect.name] = effect
+    return MappingProxyType(known)
+
+
+def effects_of(path: Path) -> tuple[Effect, ...]:
+    """The effects of a user's file, which is run; InputError when it cannot be, or has no EFFECTS."""
+    shown = _shown(path)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{shown}: expected a Python file (.py) with a tuple EFFECTS; correct `effect_file`.")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a file of the user's may raise
+        raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
+    found = getattr(module, "EFFECTS", None)
+    if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):
+        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {type(found).__name__}; add it.")
+    return found
+
+
+def _shown(path: Path | None) -> str:
+    return os.path.relpath(path or "")

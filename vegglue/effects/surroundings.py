@@ -1,0 +1,159 @@
+"""What an effect gets to see at its stage: the channel, the flow at cell centres, plants, boundaries, readings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array
+
+
+@dataclass(frozen=True)
+class ChannelGeometry:
+    """What does not move, at cell centres, (nx, ny, 1) [m] where not said otherwise.
+
+    offset: distance from the channel axis over the half width of the floor, positive towards larger y [-]; half_width:
+    that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: 1 where plants stand
+    in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite; edge: distance
+    across from the nearest side of a patch, positive outside it and negative inside, infinite in columns without one;
+    wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite.
+    """
+
+    x: Array
+    y: Array
+    dx: float
+    dy: float
+    bed: Array
+    offset: Array
+    half_width: Array
+    side_slope: Array
+    bank: Array
+    planted: Array
+    front: Array
+    edge: Array
+    wake: Array
+    patch: Array  # index of the patch, -1 without
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k [1/m], the
+    part of it that is the bed's, and viscosity [m2/s]; gradients [1/s]. shear_depth: by which du/dy weighs what is on
+    either side, (nx, ny - 1, m) [m], the smaller depth of the two cells, or empty.
+    """
+
+    ground: ChannelGeometry
+    depth: Array
+    level: Array
+    u: Array
+    v: Array
+    rate: Array
+    bed_rate: Array
+    viscosity: Array
+    shear_depth: Array
+
+    @property
+    def speed(self) -> Array:
+        """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s], never zero, so that it has a derivative at rest."""
+        return np.sqrt(self.u**2 + self.v**2 + 1e-6)
+
+    @property
+    def shear_velocity(self) -> Array:
+        """u* = (k_bed h)^(1/2) |U| [m/s], of the bed alone."""
+        return np.sqrt(self.bed_rate * self.depth) * self.speed
+
+    @property
+    def u_x(self) -> Array:
+        return along(self.u, self.ground.dx)
+
+    @property
+    def u_y(self) -> Array:
+        if self.shear_depth.size:
+            return weighted_across(self.u, self.shear_depth, self.ground.dy)
+        return across(self.u, self.ground.dy)
+
+    @property
+    def v_x(self) -> Array:
+        return along(self.v, self.ground.dx)
+
+    @property
+    def v_y(self) -> Array:
+        return across(self.v, self.ground.dy)
+
+
+@dataclass(frozen=True)
+class PlantCells:
+    """Plants of each vegetated cell, (cell, m): phi [-], canopy height h_d [m], depth [m], speed [m/s]; and, (cell, 1),
+    front: distance from the upstream end of the patch, edge: from its nearest side, x, y [m].
+    """
+
+    phi: Array
+    canopy_height: Array
+    depth: Array
+    speed: Array
+    front: Array
+    edge: Array
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class BoundaryValues:
+    """What enters and leaves: discharge of each inflow and member (inflow, m) [m3/s], outlet level (m,) [m], relative
+    spread across the inflows (inflow, cell, m) [-], lateral inflow along the reach (m,) [m3/s]; place: -1 .. 1 across
+    each inflow (inflow, cell, 1).
+    """
+
+    discharge: Array
+    level: Array
+    spread: Array
+    lateral: Array
+    place: Array
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What instruments show: value (station, m) [m/s or m]; velocity: (station, 1) 1 for velocities, 0 for levels;
+    and of the flow at each station depth [m], u [m/s], friction rate k [1/m], du/dy [1/s] (station, m), canopy height
+    over depth (station, m), 0 outside plants; x, y [m] (station, 1).
+    """
+
+    value: Array
+    velocity: Array
+    depth: Array
+    u: Array
+    rate: Array
+    u_y: Array
+    canopy_share: Array
+    x: Array
+    y: Array
+
+
+def along(values: Array, dx: float) -> Array:
+    """d/dx by central differences, one-sided at the ends."""
+    return _slope(values, dx) if values.shape[0] > 1 else np.zeros_like(values)
+
+
+def across(values: Array, dy: float) -> Array:
+    """d/dy by central differences, one-sided at the ends."""
+    if values.shape[1] < 2:
+        return np.zeros_like(values)
+    return _slope(values.swapaxes(0, 1), dy).swapaxes(0, 1)
+
+
+def weighted_across(values: Array, weight: Array, dy: float) -> Array:
+    """d/dy, the mean of what is on either side by its weight (nx, ny - 1, m): beside land what is on the wet one."""
+    step, whole = np.zeros_like(values), np.zeros_like(values)
+    weighted = weight * np.diff(values, axis=1)
+    for total, side in ((step, weighted), (whole, weight)):
+        total[:, :-1] += side
+        total[:, 1:] += side
+    return step / (whole * dy)
+
+
+def _slope(values: Array, step: float) -> Array:
+    """What numpy.gradient gives along the first axis, in fewer passes: effects ask for it in every residual."""
+    slope = np.empty_like(values)
+    np.subtract(values[2:], values[:-2], out=slope[1:-1])
+    slope[1:-1] *= 0.5 / step
+    slope[0], slope[-1] = (values[1] - values[0]) / step, (values[-1] - values[-2]) / step
+    return slope

@@ -1,0 +1,162 @@
+"""The channel as the model sees it, for `vegglue check`: bed, friction classes, plants, boundaries and stations."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch as Swatch
+from matplotlib.patches import Polygon
+
+from vegglue.case.schema import Case
+from vegglue.figures.style import COLOUR, SMALL, canvas, label, save, styled
+from vegglue.measurements.observations import Observations
+from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.gridded_site import Site
+from vegglue.site.polygons import corners_of
+
+CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
+# Free room drawn around patches and stations [m].
+MARGIN_OF_BED = 12.0
+
+
+def save_channel_figure(case: Case, site: Site, observations: Observations, path: Path) -> None:
+    """Write the channel to a PNG: all of it, and the reach with plants and stations enlarged."""
+    save(draw_channel(case, site, observations), path, dots_per_inch=150)
+
+
+@styled
+def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
+    """Above the whole grid (not to scale), in the middle the reach of interest, below the bed across its middle."""
+    figure, (whole, reach, across) = canvas(9.4, 7.2, nrows=3, height_ratios=[1, 1.6, 1.4])
+    low, high = _reach_of_interest(case, observations)
+    for axes in (whole, reach):
+        _draw_classes(axes, site)
+        _draw_waterlines(axes, case, site)
+        _draw_patches(axes, case, site)
+        _draw_stations(axes, observations)
+        axes.set(ylabel="y [m]", ylim=case.grid.y)
+    _draw_boundaries(whole, case)
+    whole.axvspan(low, high, fill=False, edgecolor=COLOUR["ink"], linewidth=0.8, linestyle=":")
+    whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: classes, boundaries and stations (not to scale)")
+    reach.set(xlim=(low, high), xlabel="x [m], flow to the right", title="The reach between the dotted lines")
+    for patch in case.plants.patches:
+        x, y = corners_of(patch).mean(axis=0)
+        label(reach, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
+    reach.legend(
+        handles=_legend(case, site, observations),
+        loc="lower left",
+        ncols=7,
+        fontsize=SMALL,
+        framealpha=1,
+        facecolor=COLOUR["paper"],
+    )
+    _draw_section(across, case, site, 0.5 * (low + high))
+    return figure
+
+
+def _reach_of_interest(case: Case, observations: Observations) -> tuple[float, float]:
+    x = [corner for patch in case.plants.patches for corner in corners_of(patch)[:, 0]] + list(observations.table["x"])
+    if not x:
+        return case.grid.x
+    return max(case.grid.x[0], min(x) - MARGIN_OF_BED), min(case.grid.x[1], max(x) + MARGIN_OF_BED)
+
+
+def _draw_classes(axes: Axes, site: Site) -> None:
+    grid = site.grid
+    extent = (
+        grid.x[0] - 0.5 * grid.dx,
+        grid.x[-1] + 0.5 * grid.dx,
+        grid.y[0] - 0.5 * grid.dy,
+        grid.y[-1] + 0.5 * grid.dy,
+    )
+    colours = ListedColormap([_class_colour(index) for index in range(len(site.class_names))])
+    axes.imshow(
+        site.friction_class.T,
+        extent=extent,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        cmap=colours,
+        vmin=-0.5,
+        vmax=len(site.class_names) - 0.5,
+    )
+
+
+def _draw_waterlines(axes: Axes, case: Case, site: Site) -> None:
+    for experiment in case.experiments.values():
+        depth = expected_depth(case, site, experiment)
+        if depth.min() < 0 < depth.max():
+            axes.contour(site.grid.x, site.grid.y, depth.T, [0.0], colors=COLOUR["model"], linewidths=0.8)
+
+
+def _class_colour(index: int) -> str:
+    return COLOUR[CLASS_COLOURS[index % len(CLASS_COLOURS)]]
+
+
+def _draw_patches(axes: Axes, case: Case, site: Site) -> None:
+    densest = max((patch.stems for patch in case.plants.patches), default=1.0)
+    i, j = np.nonzero(site.patch >= 0)
+    axes.plot(site.grid.x[i], site.grid.y[j], ",", color=COLOUR["stems"])
+    for patch in case.plants.patches:
+        strength = 0.3 + 0.6 * patch.stems / densest
+        axes.add_patch(Polygon(corners_of(patch), facecolor=COLOUR["plants"], alpha=strength, edgecolor="none"))
+        axes.add_patch(Polygon(corners_of(patch), fill=False, edgecolor=COLOUR["stems"], linewidth=0.8))
+
+
+def _draw_stations(axes: Axes, observations: Observations) -> None:
+    table = observations.table
+    used = table["used"].astype(bool)
+    axes.plot(table["x"][used], table["y"][used], "o", markersize=2.6, color=COLOUR["measured"])
+    axes.plot(table["x"][~used], table["y"][~used], "x", markersize=4.5, color=COLOUR["ink"])
+
+
+def _draw_boundaries(axes: Axes, case: Case) -> None:
+    (west, east), (south, north) = case.grid.x, case.grid.y
+    line: dict[str, Any] = {"linewidth": 3.0, "solid_capstyle": "butt", "clip_on": False}
+    for name, inflow in case.inflows.items():
+        if inflow.side == "west":
+            low, high = inflow.range or case.grid.y
+            axes.plot([west, west], [low, high], color=COLOUR["model"], **line)
+            label(axes, west, 0.5 * (low + high), name, "model", xytext=(6, 0))
+        else:
+            low, high = inflow.range or case.grid.x
+            y = south if inflow.side == "south" else north
+            axes.plot([low, high], [y, y], color=COLOUR["model"], **line)
+            label(axes, 0.5 * (low + high), y, name, "model", xytext=(0, 6 if inflow.side == "south" else -10))
+    low, high = case.outlet.range or case.grid.y
+    axes.plot([east, east], [low, high], color=COLOUR["model"], **line)
+    label(axes, east, 0.5 * (low + high), "outlet", "model", xytext=(-6, 0), ha="right")
+
+
+def _legend(case: Case, site: Site, observations: Observations) -> list[Line2D | Swatch]:
+    shown: list[Line2D | Swatch] = [
+        Swatch(color=_class_colour(i), label=name) for i, name in enumerate(site.class_names)
+    ]
+    if case.plants.patches:
+        shown.append(Swatch(color=COLOUR["plants"], label="plants (darker: more stems)"))
+    shown.append(Line2D([], [], color=COLOUR["model"], linewidth=0.8, label="about the waterline"))
+    if len(observations.table):
+        shown.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=COLOUR["measured"], label="station"))
+    if not observations.table["used"].astype(bool).all():
+        shown.append(Line2D([], [], linestyle="", marker="x", markersize=5, color=COLOUR["ink"], label="not used"))
+    return shown
+
+
+def _draw_section(axes: Axes, case: Case, site: Site, x: float) -> None:
+    i = int(np.abs(site.grid.x - x).argmin())
+    bed = site.bed[i]
+    axes.plot(site.grid.y, bed, color=COLOUR["ink"], linewidth=1.2)
+    axes.plot(site.grid.y, bed, ".", markersize=3, color=COLOUR["ink"])
+    for name, experiment in case.experiments.items():
+        depth = expected_depth(case, site, experiment)[i]
+        level = bed + depth
+        axes.fill_between(site.grid.y, bed, level, where=depth > 0, interpolate=True, color=COLOUR["water"], zorder=0)
+        axes.plot(site.grid.y, np.where(depth > 0, level, np.nan), color=COLOUR["model"], linewidth=1.0)
+        if (depth > 0).any():
+            label(axes, site.grid.y[depth > 0][0], level[0], name, "model")
+    axes.set(xlim=case.grid.y, xlabel="y [m]", ylabel="z [m]")
+    axes.set_title(f"Bed across x = {site.grid.x[i]:g} m, and the outlet's depth kept along the floor")

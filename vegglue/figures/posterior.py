@@ -1,0 +1,240 @@
+"""Figures of parameters: marginal and joint posteriors, plant drag beside its rigid-cylinder estimate, weights."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
+from vegglue.figures.typography import short, symbol_math, unit_math
+from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
+
+GRID = 240  # points of a drawn density
+SHOWN_QUANTILES = 1024  # members drawn for the prior: the start of a Sobol' sequence is as even as the whole
+DISCS = 400  # members drawn for the posterior, at most
+NARROW_WIDTH = 3.4  # three to a row of the page [inch]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One parameter as it is drawn: its values (member,) and bounds, on a logarithmic axis where `logarithmic`.
+
+    before: values drawn from the prior alone (n,), empty where the prior is not to be drawn.
+    """
+
+    values: Array
+    before: Array
+    low: float
+    high: float
+    logarithmic: bool
+    symbol: str
+    unit: str
+
+    @property
+    def title(self) -> str:
+        return f"{symbol_math(self.symbol)} [{unit_math(self.unit)}]"
+
+    def coordinate(self, value: Array | float) -> Array:
+        """Where a value is drawn: itself, or its common logarithm."""
+        return np.log10(value) if self.logarithmic else np.asarray(value, float)
+
+
+@dataclass(frozen=True)
+class ReferenceValue:
+    """A value of others to mark: its name in the figure, itself, and its sd on the drawn axis (or NaN)."""
+
+    name: str
+    value: float
+    sd: float
+    marker: str
+
+
+def density(values: Array, weights: Array, low: float, high: float) -> tuple[Array, Array]:
+    """p(x) = sum_k w_k [N(x; x_k, b) + N(x; 2 low - x_k, b) + N(x; 2 high - x_k, b)], b = 0.9 s n^(-1/5) (Silverman).
+
+    Mirrored at the bounds, so that no mass leaks out; n is the effective number of members, s the lesser of standard
+    deviation and quartile distance / 1.34. Returns grid and density (GRID,).
+    """
+    share = weights / weights.sum()
+    quartile = weighted_quantile(values, weights, [0.25, 0.75])
+    sd = np.sqrt(share @ (values - share @ values) ** 2)
+    spread = min(sd, float(np.ptp(quartile)) / 1.34) or sd
+    width = max(0.9 * spread * effective_size(weights) ** -0.2, (high - low) / 200)
+    grid = np.linspace(low, high, GRID)
+    kept = share > 1e-8
+    total = np.zeros(GRID)
+    for mirrored in (values[kept], 2 * low - values[kept], 2 * high - values[kept]):
+        total += np.exp(-0.5 * ((grid[:, None] - mirrored) / width) ** 2) @ share[kept]
+    return grid, total / (width * np.sqrt(2 * np.pi))
+
+
+@styled
+def draw_marginal(unknown: Unknown, weights: Array, references: Sequence[ReferenceValue]) -> Figure:
+    """Prior (grey) and posterior (blue) density of one parameter, 50 and 95 % shaded, values of others marked."""
+    figure, axes = canvas(NARROW_WIDTH, 2.7)
+    values, before = unknown.coordinate(unknown.values), unknown.coordinate(unknown.before)
+    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    grid, posterior = density(values, weights, low, high)
+    quantiles = weighted_quantile(values, weights, [0.025, 0.25, 0.5, 0.75, 0.975])
+    prior = density(before, np.ones(len(before)), low, high)[1] if before.size else np.zeros(GRID)
+    axes.fill_between(grid, prior, color=COLOUR["prior"], linewidth=0)
+    for (left, right), colour in ((quantiles[[0, 4]], "wide"), (quantiles[[1, 3]], "narrow")):
+        inside = np.linspace(left, right, GRID)
+        axes.fill_between(inside, np.interp(inside, grid, posterior), color=COLOUR[colour], linewidth=0)
+    axes.plot(grid, posterior, color=COLOUR["model"], linewidth=1.4)
+    peak = float(posterior.max())
+    axes.plot([quantiles[2]] * 2, [0, np.interp(quantiles[2], grid, posterior)], color=COLOUR["model"], linewidth=0.9)
+    _name_densities(axes, grid, prior, posterior)
+    for place, reference in enumerate(references):
+        _mark(axes, unknown, reference, peak * (1.10 + 0.13 * place))
+    axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), xlabel=unknown.title, yticks=[])
+    axes.spines["left"].set_visible(False)
+    if unknown.logarithmic:
+        _powers(axes, "x")
+    return figure
+
+
+def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> None:
+    at = int(np.argmax(posterior))
+    right = at < GRID / 2
+    side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
+    label(axes, grid[at], posterior[at], "posterior", "model", **side)
+    if not prior.any():
+        return
+    gap = int(np.argmax(np.where((grid > grid[12]) & (grid < grid[-40]), prior - posterior, -np.inf)))
+    label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
+
+
+def _mark(axes: Axes, unknown: Unknown, reference: ReferenceValue, height: float) -> None:
+    value = float(unknown.coordinate(reference.value))
+    error = None if np.isnan(reference.sd) else reference.sd
+    axes.errorbar(value, height, xerr=error, fmt=reference.marker, markersize=5, color=COLOUR["ink"], elinewidth=1)
+    axes.axvline(value, ymax=0.97, color=COLOUR["ink"], linewidth=0.5, dashes=(1, 2), zorder=0)
+    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    left = value > 0.5 * (low + high)
+    label(axes, value - (error or 0) if left else value + (error or 0), height, reference.name,
+          ha="right" if left else "left", va="center", xytext=(-6 if left else 6, 0))  # fmt: skip
+
+
+def _window(unknown: Unknown, heavy: NDArray[np.int64], marked: Sequence[float]) -> tuple[float, float]:
+    """The drawn range around the members that count and the marks, within the prior."""
+    shown = unknown.coordinate(np.concatenate([unknown.values[heavy], marked]))
+    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    margin = 0.15 * float(np.ptp(shown)) + 0.05 * (high - low)
+    return max(low, shown.min() - margin), min(high, shown.max() + margin)
+
+
+def _powers(axes: Axes, which: str) -> None:
+    """Name a drawn common logarithm by the value it stands for."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    ticks = np.add.outer(np.arange(np.floor(low), high + 1), np.log10(np.arange(1, 10)))
+    inside = (ticks >= low - 1e-9) & (ticks <= high + 1e-9)
+    steps = [0] if inside[:, 0].sum() >= 3 else [0, 2] if inside[:, [0, 2]].sum() >= 3 else [0, 1, 4]
+    axis.set_ticks(ticks[:, steps][inside[:, steps]])
+    axis.set_ticks(ticks[inside], minor=True)
+    axis.set_major_formatter(FuncFormatter(lambda power, _: short(10.0**power, 1)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+@styled
+def draw_joint(
+    across: Unknown, upward: Unknown, weights: Array, marks: Sequence[tuple[str, float, float, str]]
+) -> Figure:
+    """Members in the plane of two parameters: prior as dots, posterior as discs of area proportional to weight.
+
+    marks: name, value across, value upward, marker.
+    """
+    figure, axes = canvas(NARROW_WIDTH, 3.0)
+    x, y = across.coordinate(across.values), upward.coordinate(upward.values)
+    before = across.coordinate(across.before)[:SHOWN_QUANTILES], upward.coordinate(upward.before)[:SHOWN_QUANTILES]
+    axes.plot(*before, ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
+    heavy = np.flatnonzero(weights > 1e-3 * weights.max())
+    discs = heavy[:: -(-heavy.size // DISCS)]  # draws of about equal weight are many: each n-th of them
+    axes.scatter(
+        x[discs], y[discs], 55 * weights[discs] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0
+    )
+    for place, (name, value_x, value_y, marker) in enumerate(marks):
+        at = float(across.coordinate(value_x)), float(upward.coordinate(value_y))
+        axes.plot(*at, marker, markersize=7, color=COLOUR["ink"], fillstyle="none", markeredgewidth=1.3, zorder=6)
+        side: dict[str, Any] = (
+            {"ha": "left", "xytext": (7, 5)} if place % 2 == 0 else {"ha": "right", "xytext": (-7, -11)}
+        )
+        label(axes, *at, name, **side)
+    axes.set(xlabel=across.title, ylabel=upward.title)
+    axes.set_xlim(*_window(across, heavy, [value for _, value, _, _ in marks]))
+    axes.set_ylim(*_window(upward, heavy, [value for _, _, value, _ in marks]))
+    for unknown, which in ((across, "x"), (upward, "y")):
+        if unknown.logarithmic:
+            _powers(axes, which)
+    return figure
+
+
+@styled
+def draw_cylinder(inferred: Array, weights: Array, cylinder: Array, low: float, high: float, symbol: str) -> Figure:
+    """Plant drag inferred from the flow beside the drag of rigid cylinders of the surveyed size, logarithmic axis."""
+    figure, axes = canvas(WIDTH, HEIGHT)
+    low, high = np.log10(low), np.log10(high)
+    greater = weighted_quantile(inferred, weights, [0.5])[0] > np.median(cylinder)
+    sides = ("right", "left") if greater else ("left", "right")
+    for values, share, name, line, face, side in (
+        (cylinder, np.ones(len(cylinder)), "rigid cylinders\n(plant survey)", "stems", "plants", sides[0]),
+        (inferred, weights, "inferred\nfrom the flow", "model", "wide", sides[1]),
+    ):
+        grid, height = density(np.log10(values), share, low, high)
+        axes.fill_between(grid, height, color=COLOUR[face], linewidth=0, alpha=0.75)
+        axes.plot(grid, height, color=COLOUR[line], linewidth=1.4)
+        at = int(np.argmax(height))
+        label(axes, grid[at], height[at], name, line, ha=side, xytext=(8 if side == "left" else -8, -8))
+    axes.set(xlim=(low, high), xlabel=f"{symbol_math(symbol)} of the dense patches [–]", yticks=[])
+    axes.set_ylim(0, axes.get_ylim()[1] * 1.05)
+    axes.spines["left"].set_visible(False)
+    _powers(axes, "x")
+    return figure
+
+
+@styled
+def draw_weights(weights: Array) -> Figure:
+    """Share of the posterior carried by the heaviest members: the fewer carry it, the less it is to be trusted."""
+    figure, axes = canvas()
+    cumulated = np.cumsum(np.sort(weights)[::-1]) / weights.sum()
+    number = np.arange(1, len(weights) + 1)
+    axes.plot(number, cumulated, color=COLOUR["model"], linewidth=1.5, drawstyle="steps-post")
+    for share in (0.5, 0.95):
+        at = int(np.searchsorted(cumulated, share))
+        axes.plot([1, number[at], number[at]], [share, share, 0], color=COLOUR["muted"], linewidth=0.7, dashes=(3, 2))
+        text = f"{100 * share:.0f} % in {number[at]:,} members"
+        label(axes, 1.15, share, text, "ink", xytext=(0, 3))
+    axes.set(
+        xscale="log",
+        xlim=(1, len(weights)),
+        ylim=(0, 1.02),
+        xlabel="members, heaviest first",
+        ylabel="share of the weight [–]",
+    )
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    return figure
+
+
+@styled
+def draw_mass_error(mass_error: Array, limit: float) -> Figure:
+    """Members by their largest discharge error |Q/Q_in − 1|, logarithmic, with the limit they are held to."""
+    figure, axes = canvas()
+    exponent = np.log10(np.maximum(mass_error[np.isfinite(mass_error)], 1e-16))
+    axes.hist(exponent, bins=40, color=COLOUR["model"], linewidth=0)
+    axes.axvline(np.log10(limit), color=COLOUR["measured"], linewidth=1.2)
+    top = axes.get_ylim()[1]
+    label(axes, float(np.log10(limit)), top, "limit", "measured", ha="right", va="top", xytext=(-4, 0))
+    axes.set(xlabel="largest |Q / Q of the inflow − 1| [–]", ylabel="members")
+    low, high = axes.get_xlim()
+    step = max(1, round((high - low) / 6))
+    ticks = np.arange(np.ceil(low), high + 1e-9, step)
+    axes.set_xticks(ticks, [rf"$10^{{{tick:.0f}}}$" for tick in ticks])
+    axes.tick_params(labelsize=SMALL + 1)
+    return figure

@@ -1,0 +1,176 @@
+"""How figures look: one palette, one face, and pictures that follow the page they stand in (light, dark, paper).
+
+Every colour of the palette is drawn as a fixed light-mode value, so a file on disk stands on its own; in the page the
+same values become CSS variables, which the page sets for light and for dark.
+"""
+
+import html
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from io import StringIO
+from pathlib import Path
+from typing import Any, ParamSpec
+
+import matplotlib
+from matplotlib import font_manager
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+Drawing = ParamSpec("Drawing")
+# name: (light, dark). Blue for the model, vermilion for measurements: told apart in every common colour blindness.
+PALETTE = {
+    "paper": ("#fefefe", "#15181c"),
+    "ink": ("#1d2126", "#e9ebee"),
+    "muted": ("#626b76", "#a3acb7"),
+    "rule": ("#dde1e6", "#333a42"),
+    "prior": ("#c6ccd3", "#4a525c"),
+    "wide": ("#d5e4f2", "#1d3850"),
+    "narrow": ("#9fc4e4", "#2f6491"),
+    "model": ("#1c5d99", "#86c0f3"),
+    "measured": ("#c4461b", "#ff8d5c"),
+    "plants": ("#a9d3bd", "#2d5b49"),
+    "stems": ("#1d6b4f", "#83cfae"),
+    "earth": ("#cbbfae", "#4b443b"),
+    "water": ("#e4f0f7", "#1c2d38"),
+}
+COLOUR = {name: light for name, (light, _) in PALETTE.items()}
+OUTLINE = "#101010"  # lines over a coloured field: the same on a light and on a dark page
+WIDTH, HEIGHT = 4.7, 3.1  # one column of the page [inch]
+SMALL = 7.5  # direct labels [pt]
+
+
+def _face() -> list[str]:
+    """The first of some sober faces that is installed; DejaVu Sans comes with matplotlib and fills missing glyphs."""
+    installed = {font.name for font in font_manager.fontManager.ttflist}
+    wanted = ("Source Sans 3", "Inter", "Helvetica", "Arial", "Liberation Sans")
+    return [*[name for name in wanted if name in installed][:1], "DejaVu Sans"]
+
+
+def _settings() -> dict[str, Any]:
+    face = _face()
+    ink, muted = COLOUR["ink"], COLOUR["muted"]
+    return {
+        "font.family": face,
+        "font.size": 9,
+        "mathtext.fontset": "custom",
+        "mathtext.rm": face[0],
+        "mathtext.it": f"{face[0]}:italic",
+        "mathtext.cal": face[0],  # never used; its own default is seldom installed, and then complained about
+        "mathtext.fallback": "stixsans",
+        "text.color": ink,
+        "axes.labelcolor": ink,
+        "axes.edgecolor": muted,
+        "axes.facecolor": "none",
+        "axes.linewidth": 0.7,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.titlesize": 9.5,
+        "axes.titlelocation": "left",
+        "axes.titleweight": "bold",
+        "axes.grid": False,
+        "axes.axisbelow": True,
+        "grid.color": COLOUR["rule"],
+        "grid.linewidth": 0.6,
+        "xtick.color": muted,
+        "ytick.color": muted,
+        "xtick.labelcolor": ink,
+        "ytick.labelcolor": ink,
+        "xtick.major.width": 0.7,
+        "ytick.major.width": 0.7,
+        "lines.solid_capstyle": "round",
+        "figure.facecolor": COLOUR["paper"],
+        "savefig.facecolor": COLOUR["paper"],
+        "savefig.dpi": 200,
+        "figure.dpi": 200,
+        "svg.fonttype": "path",  # glyphs as outlines: the same on every machine, no font asked of the reader
+        "svg.hashsalt": "vegglue",  # the same picture, the same file
+    }
+
+
+def _styled_context() -> Any:
+    return matplotlib.rc_context(_settings())  # type: ignore[arg-type]  # its keys are a literal type of 300 names
+
+
+def styled(draw: Callable[Drawing, Figure]) -> Callable[Drawing, Figure]:
+    """A drawing function that draws in this style, whatever the settings of its caller."""
+
+    @wraps(draw)
+    def drawn(*args: Drawing.args, **keywords: Drawing.kwargs) -> Figure:
+        with _styled_context():
+            return draw(*args, **keywords)
+
+    return drawn
+
+
+def canvas(width: float = WIDTH, height: float = HEIGHT, **subplots: Any) -> tuple[Figure, Any]:
+    """A figure of width x height [inch] and its axes."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(**subplots)
+
+
+def label(axes: Axes, x: float, y: float, text: str, colour: str = "ink", **keywords: Any) -> None:
+    """A direct label at a data point; haloed, so lines may pass under it; `keywords` as of matplotlib's annotate."""
+    settings: dict[str, Any] = {
+        "xytext": (4, 4),
+        "textcoords": "offset points",
+        "fontsize": SMALL,
+        "color": COLOUR[colour],
+        "zorder": 8,
+    } | keywords
+    text_ = axes.annotate(text, (x, y), **settings)
+    text_.set_path_effects([withStroke(linewidth=2.2, foreground=COLOUR["paper"])])
+
+
+def save(figure: Figure, path: Path, dots_per_inch: float = 200) -> None:
+    """Write a figure by itself, PNG or SVG by the ending of `path`, in a folder that is made if need be."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with _styled_context():
+        figure.savefig(path, dpi=dots_per_inch)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure for the page: file name without ending, caption (HTML), spoken text, inline SVG, width [px]."""
+
+    name: str
+    caption: str
+    alt: str
+    svg: str
+    width: int
+
+
+def publish(figure: Figure, folder: Path, name: str, caption: str, alt: str, note: str = "") -> Picture:
+    """Write folder/name.png and .svg with `note` in their corner, and return the picture for the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with _styled_context():
+        if note:
+            figure.suptitle(note, x=0.995, ha="right", fontsize=SMALL - 0.5, color=COLOUR["muted"])
+        text = StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None, "Title": name, "Description": alt})
+        figure.savefig(folder / f"{name}.png", metadata={"Description": alt})
+    (folder / f"{name}.svg").write_text(text.getvalue(), encoding="utf-8")
+    return Picture(name, caption, alt, inline(text.getvalue(), name, alt), round(96 * figure.get_size_inches()[0]))
+
+
+def inline(svg: str, name: str, alt: str) -> str:
+    """An SVG file as a part of a page: no prologue or metadata, ids of its own, colours of the page, a spoken text."""
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r"<title>.*?</title>", "", body, flags=re.DOTALL)
+    used = set(re.findall(r"(?:href=\"#|url\(#)([^\")]+)", body))
+    body = re.sub(r' id="([^"]+)"', lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", body)
+    body = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", body)
+    for key, colour in COLOUR.items():
+        body = body.replace(colour, f"var(--{key})")
+    spoken = html.escape(alt, quote=True)
+    body = re.sub(r"\n\s*", "\n", body)
+    return re.sub(r'<svg[^>]*?(viewBox="[^"]+")[^>]*>', rf'<svg role="img" aria-label="{spoken}" \1>', body, count=1)
+
+
+def palette_css() -> tuple[str, str]:
+    """The palette as CSS variables: light, dark."""
+    light, dark = (";".join(f"--{name}:{pair[i]}" for name, pair in PALETTE.items()) for i in (0, 1))
+    return light, dark

@@ -1,0 +1,137 @@
+"""From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
+
+import dataclasses
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.case_effects import Theta, active_effects, value_of
+from vegglue.case.schema import Case, Experiment
+from vegglue.case.site_schema import Inflow, Stand, StandOverride
+from vegglue.effects.active_effect import ActiveEffect, applied
+from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
+from vegglue.flow.problem import InflowSegment, Problem, VegetatedCells
+from vegglue.resistance import bed_laws, plant_laws
+from vegglue.site.channel_geometry import channel_geometry, patches_present
+from vegglue.site.gridded_site import Site
+
+BED_LAWS = {"manning": (bed_laws.MANNING, "n"), "keulegan": (bed_laws.KEULEGAN, "k_s"), "chezy": (bed_laws.CHEZY, "c")}
+
+
+def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
+    """The problem of one experiment for all members of theta, {parameter: (members,)}."""
+    members = len(next(iter(theta.values()))) if theta else 1
+    setting = case.experiments[experiment]
+    classes = [case.friction.classes[name] for name in site.class_names]
+    acting = active_effects(case, experiment, theta, members)
+    ground = channel_geometry(case, site, experiment) if acting else None
+    boundary = bounded(acting, _boundary(case, site, setting, theta, members))
+    return Problem(
+        dx=site.grid.dx,
+        dy=site.grid.dy,
+        bed=site.bed,
+        friction_class=site.friction_class,
+        law=np.array([BED_LAWS[item.law][0] for item in classes], dtype=np.int64),
+        coefficient=np.array([value_of(getattr(item, BED_LAWS[item.law][1]), theta, members) for item in classes]),
+        plants=_plants(case, site, experiment, theta, members),
+        viscosity=value_of(case.eddy_viscosity, theta, members),
+        inflows=tuple(
+            _inflow(inflow, site, discharge, spread)
+            for inflow, discharge, spread in zip(
+                case.inflows.values(), boundary.discharge, boundary.spread, strict=True
+            )
+        ),
+        outlet=_within(case.outlet.range, site.grid.y),
+        outlet_level=boundary.level,
+        film=case.numerics.film_depth,
+        log_argument_minimum=case.numerics.bank_argument_minimum,
+        phi_proportional=case.numerics.emergent == "proportional",
+        smallest_shear_depth=case.numerics.shear_depth == "smallest",
+        lift=lifted(acting, ground) if ground else np.zeros((0, 0, 0)),
+        source=_source(boundary.lateral, ground) if ground else np.zeros((0, 0, 0)),
+        acting=acting,
+        ground=ground,
+    )
+
+
+def _boundary(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> BoundaryValues:
+    """What the case says of inflows and outlet; spread and place have as many cells as the longest side."""
+    cells = [_inflow_cells(inflow, site).size for inflow in case.inflows.values()]
+    place = np.zeros((len(cells), max(cells), 1))
+    for inflow, size in enumerate(cells):
+        place[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+    return BoundaryValues(
+        discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
+        level=value_of(setting.level, theta, members),
+        spread=np.ones((len(cells), max(cells), 1)),
+        lateral=np.zeros(members),
+        place=place,
+    )
+
+
+def _source(lateral: Array, ground: ChannelGeometry) -> Array:
+    """Lateral inflow spread over the floor, (nx, ny, m) [m/s]; empty without one."""
+    if not lateral.any():
+        return np.zeros((0, 0, 0))
+    floor = 1.0 - ground.bank
+    return np.ascontiguousarray(floor * lateral / (floor.sum() * ground.dx * ground.dy))
+
+
+def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
+    """Vegetated cells of the patches present; phi is proportional to stems."""
+    column, row = np.nonzero(np.isin(site.patch, patches_present(case, experiment)))
+    index = site.patch[column, row]
+    fields, law = np.empty((3, column.size, members)), np.empty(column.size, dtype=np.int64)
+    for patch in np.unique(index):
+        stems, name = case.plants.patches[patch].stems, case.plants.patches[patch].stand
+        stand = case.plants.stands[name]
+        phi, height, chezy = _stand(stand, case.experiments[experiment].stands.get(name), theta, members)
+        fields[:, index == patch] = np.stack([phi * stems / stand.stems, height, chezy])[:, None]
+        law[index == patch] = plant_laws.PLANT_LAWS.index(stand.law)
+    return VegetatedCells(column, row, fields[0], fields[1], fields[2], law)
+
+
+def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: int) -> tuple[Array, Array, Array]:
+    """phi, canopy height and bare Chezy coefficient of a stand in one experiment."""
+
+    def own(name: str) -> Array:
+        other = getattr(override, name) if override is not None else None
+        return value_of(getattr(stand, name) if other is None else other, theta, members)
+
+    return own("phi"), own("canopy_height"), own("bare_chezy")
+
+
+def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> InflowSegment:
+    cells = _inflow_cells(inflow, site)
+    start, stop = int(cells[0]), int(cells[-1]) + 1
+    along = 0.0 if inflow.angle is None else 1.0 / float(np.tan(np.radians(inflow.angle)))
+    return InflowSegment(
+        inflow.side, start, stop, discharge, inflow.spread == "conveyance", spread[: stop - start], along
+    )
+
+
+def _inflow_cells(inflow: Inflow, site: Site) -> np.ndarray:
+    return np.flatnonzero(_within(inflow.range, site.grid.y if inflow.side == "west" else site.grid.x))
+
+
+def _within(part: tuple[float, float] | None, centres: Array) -> np.ndarray:
+    """Cells whose centre lies in a range, all of them without one."""
+    if part is None:
+        return np.ones(centres.size, dtype=bool)
+    return (centres >= part[0]) & (centres < part[1])
+
+
+def lifted(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry) -> Array:
+    """By how much members' beds lie higher, (nx, ny, m) [m]; empty when no effect says so."""
+    nothing = np.zeros((0, 0, 0))
+    if not any(one.effect.stage == "site" and one.on.any() for one in acting):
+        return nothing
+    members = len(next(iter(acting[0].values.values())))
+    change = applied(acting, "site", ground, {"bed": np.zeros((*ground.bed.shape[:2], members))})
+    return np.ascontiguousarray(change["bed"])
+
+
+def bounded(acting: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
+    """What enters and leaves after the effects of the stage boundary."""
+    neutral = {item.name: getattr(boundary, item.name) for item in dataclasses.fields(boundary) if item.name != "place"}
+    return BoundaryValues(**applied(acting, "boundary", boundary, neutral), place=boundary.place)

@@ -1,0 +1,175 @@
+"""A field team's folder -> a case: site.json, velocities.csv and levels.csv, with wide priors and sensible defaults.
+
+site.json says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at x = 0, y = 0 on
+the axis), patches (x, y, stems_per_m2), canopy_height_guess_m, eddy_viscosity_m2_s, and experiments (discharge_m3_s,
+downstream_level_m). What is not said there is left at the defaults below.
+"""
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vegglue.case.resolved_config import Tree
+from vegglue.case.text_files import case_name
+from vegglue.errors import InputError
+
+# Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
+# well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
+CELLS_ACROSS, LENGTHENED = 16, 8.0 / 3.0
+# Dry bank kept above the highest water level [m].
+FREEBOARD = 0.35
+# Relative error of a canopy height estimated by eye.
+BY_EYE = 0.12
+
+
+def case_from_folder(folder: Path, target: Path) -> Tree:
+    """The config, as keys and values, of the measurements in a folder; files are named relative to `target`.
+
+    Errors: InputError when site.json or velocities.csv is missing or says too little.
+    """
+    site = _read_site(folder / "site.json")
+    channel, experiments = site["channel"], site["experiments"]
+    patches = site.get("patches", [])
+    tree: Tree = {
+        "name": case_name(folder.resolve().name),
+        "title": f"Measurements of {folder.resolve().name}",
+        "grid": _grid(channel, experiments),
+        "bed": [{"trapezoid": _trapezoid(channel)}],
+        "friction": {
+            "classes": {"bed": {"law": "manning", "n": "n_b"}, "bank": {"law": "keulegan", "k_s": "k_s"}},
+            "default": "bed",
+            "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
+        },
+        "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
+        "outlet": {},
+        "eddy_viscosity": float(site.get("eddy_viscosity_m2_s", 0.01)),
+        "experiments": {name: _experiment(given) for name, given in experiments.items()},
+        "parameters": dict(PARAMETERS),
+        "observations": _observations(folder, target),
+        "simulate": {"members": 256, "seed": 1},
+        "infer": {"sigma": "known"},
+    }
+    if site.get("holdout") and (folder / "holdout.csv").is_file():
+        tree["validation"] = {
+            "experiments": {name: _experiment(given) for name, given in site["holdout"].items()},
+            "observations": [{"kind": "velocity", "file": _named(folder / "holdout.csv", target)}],
+        }
+    if patches:
+        tree["plants"] = _plants(patches)
+        guess = float(site.get("canopy_height_guess_m", 0.8))
+        tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(guess)}
+    return tree
+
+
+PARAMETERS: Tree = {
+    "n_b": {
+        "distribution": "loguniform", "low": 0.01, "high": 0.2, "unit": "s m^(-1/3)", "symbol": "n_b",
+        "meaning": "Manning coefficient of the bed",
+    },
+    "k_s": {
+        "distribution": "loguniform", "low": 0.01, "high": 5.0, "unit": "m", "symbol": "k_s",
+        "meaning": "Nikuradse roughness height of the banks",
+    },
+}  # fmt: skip
+PHI: Tree = {
+    "distribution": "loguniform", "low": 0.02, "high": 100.0, "unit": "-", "symbol": "φ",
+    "meaning": "drag of the densest patches",
+}  # fmt: skip
+
+
+def _canopy(guess: float) -> Tree:
+    return {
+        "distribution": "normal", "mean": guess, "sd": round(BY_EYE * guess, 4), "low": round(0.4 * guess, 4),
+        "high": round(1.8 * guess, 4), "unit": "m", "symbol": "h_d",
+        "meaning": "height of the canopy, estimated by eye",
+    }  # fmt: skip
+
+
+def _read_site(path: Path) -> Tree:
+    try:
+        site = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{_shown(path)} cannot be read: {error.strerror}; a folder to import has one.") from None
+    except ValueError as error:
+        raise InputError(f"{_shown(path)} is not valid JSON: {error}; correct it there.") from None
+    _need(path, site, "", "channel", "experiments")
+    _need(path, site["channel"], "channel.", "length_m", "bottom_width_m", "bank_slope_v_per_h", "bed_slope")
+    if not site["experiments"]:
+        raise InputError(f"{_shown(path)}: `experiments` expected one or more, got none; add those that were measured.")
+    for name, given in site["experiments"].items():
+        _need(path, given, f"experiments.{name}.", "discharge_m3_s", "downstream_level_m")
+    return dict(site)
+
+
+def _need(path: Path, tree: Any, within: str, *keys: str) -> None:
+    for key in keys:
+        if not isinstance(tree, Mapping) or key not in tree:
+            raise InputError(f"{_shown(path)}: `{within}{key}` is missing; add it.")
+        value = tree[key]
+        if within and not (isinstance(value, int | float) and math.isfinite(value)):
+            raise InputError(f"{_shown(path)}: `{within}{key}` expected a number, got {value!r}; correct it.")
+
+
+def _trapezoid(channel: Mapping[str, Any]) -> Tree:
+    return {
+        "axis": 0.0,
+        "bottom_width": float(channel["bottom_width_m"]),
+        "bank_slope": round(float(channel["bank_slope_v_per_h"]), 6),
+        "bed_slope": float(channel["bed_slope"]),
+        "level": 0.0,
+    }
+
+
+def _grid(channel: Mapping[str, Any], experiments: Mapping[str, Any]) -> Tree:
+    """Cells that fit the floor, as wide as the water can get."""
+    length, width = float(channel["length_m"]), float(channel["bottom_width_m"])
+    fall = float(channel["bed_slope"]) * length
+    highest = max(float(given["downstream_level_m"]) for given in experiments.values())
+    # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
+    depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
+    dy = width / CELLS_ACROSS
+    beside = math.ceil(depth / float(channel["bank_slope_v_per_h"]) / dy / 2) * 2
+    columns = round(length / (dy * LENGTHENED) / 2) * 2
+    half = round(0.5 * width + beside * dy, 6)
+    return {"x": [0.0, length], "y": [-half, half], "cell": [length / columns, dy]}
+
+
+def _experiment(given: Mapping[str, Any]) -> Tree:
+    return {"discharge": float(given["discharge_m3_s"]), "level": float(given["downstream_level_m"])}
+
+
+def _plants(patches: list[Mapping[str, Any]]) -> Tree:
+    densest = max(float(patch.get("stems_per_m2", 1.0)) for patch in patches)
+    stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
+    rows = [
+        {
+            "name": f"p{number}",
+            "stand": "plants",
+            "x": [float(x) for x in patch["x"]],
+            "y": [float(y) for y in patch["y"]],
+            "stems": float(patch.get("stems_per_m2", 1.0)),
+        }
+        for number, patch in enumerate(patches, 1)
+    ]
+    return {"stands": {"plants": stand}, "patches": rows}
+
+
+def _observations(folder: Path, target: Path) -> list[Tree]:
+    found = []
+    for kind, name in (("velocity", "velocities.csv"), ("level", "levels.csv")):
+        if (folder / name).is_file():
+            found.append({"kind": kind, "file": _named(folder / name, target)})
+    if not found:
+        raise InputError(f"{_shown(folder)}: expected velocities.csv or levels.csv, got neither; put them there.")
+    return found
+
+
+def _named(file: Path, target: Path) -> str:
+    return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
+
+
+def _shown(path: Path) -> str:
+    return os.path.relpath(path)

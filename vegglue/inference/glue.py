@@ -1,0 +1,112 @@
+"""GLUE: weigh the members of an ensemble by how well they predict what was measured.
+
+Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305; the Gaussian likelihood and its sigma as in
+Berends et al. (2020), https://doi.org/10.1016/j.advwatres.2020.103675.
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.inference.canopy_correction import corrected_canopy
+from vegglue.inference.likelihood import MemberFit, fit_members
+from vegglue.inference.posterior_summary import marginals, predictions
+from vegglue.inference.weighted_statistics import effective_size, pareto_shape
+from vegglue.measurements.observations import Observations
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+
+
+def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterior:
+    """p(theta | u) ~ L(u | theta) p(theta): a member drawn from the prior weighs w_k = L_k / sum L.
+
+    gaussian: L = prod_i (2 pi s_i^2)^(-1/2) exp(-(u_i - U_i)^2 / (2 s_i^2)) over the used stations i, with s the root
+    mean square residual of the best member, one for each kind of measurement (best-member), or the standard errors of
+    the data (known). nse and inverse-variance: see likelihood.py. `behavioural` is the smallest Nash-Sutcliffe
+    efficiency of a member with weight, for any of the three; failed members have none.
+
+    Errors: InputError when nothing can be weighed: stations other than those simulated, none used, no member solved,
+    standard errors missing, sigma zero, no member above the threshold.
+    """
+    station = observations.table
+    check_stations(ensemble, station)
+    fit = fit_members(ensemble, station, case.infer.sigma)
+    threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
+    weights = member_weights(fit, case.infer.likelihood, threshold)
+    return Posterior(
+        method="glue",
+        likelihood=case.infer.likelihood,
+        sigma_rule=case.infer.sigma,
+        threshold=threshold,
+        weights=weights,
+        prediction=ensemble.prediction,
+        station=station,
+        refinement=None,
+        transfer=None,
+        canopy=corrected_canopy(ensemble.parameters, case, weights),
+        **{name: getattr(fit, name) for name in ("best", "sigma", "noise", "efficiency", "log_likelihood")},
+        ensemble_hash=ensemble.config_hash,
+        seed=ensemble.seed,
+        version=ensemble.version,
+        **_counts(fit, weights, station),
+        **marginals(ensemble.parameters, case, weights),
+        **predictions(ensemble.prediction, fit.best, fit.noise, weights, station, ensemble.seed),
+    )
+
+
+def check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
+    """Errors: InputError when the stations are not those that were simulated, or none is used."""
+    same = len(station) == len(ensemble.station) and all(
+        np.array_equal(station[column].to_numpy(), ensemble.station[column].to_numpy())
+        for column in ("experiment", "kind", "x", "y")
+    )
+    if not same:
+        raise InputError(
+            f"observations: the {len(station)} stations are not the {len(ensemble.station)} that were simulated; "
+            "run `vegglue simulate CONFIG` again."
+        )
+    if not station["used"].any():
+        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check CONFIG` says why.")
+
+
+def _counts(fit: MemberFit, weights: Array, station: pd.DataFrame) -> dict[str, Any]:
+    return {
+        "members": len(weights),
+        "failed": int(np.sum(~fit.solved)),
+        "weighed": int(np.sum(weights > 0)),
+        "used": int(station["used"].sum()),
+        "effective_size": effective_size(weights),
+        "largest_weight": float(weights.max()),
+        "pareto_k": pareto_shape(weights),
+    }
+
+
+def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:
+    """w_k = L_k / sum L (member,) [-]; zero for failed members and those of an efficiency below the threshold.
+
+    gaussian: L = prod_i p(u_i | U_i). nse: L = max(E, 0). inverse-variance: L = 1 / (1 - E), proportional to the
+    inverse error variance of Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305, with their shape 1.
+
+    Errors: InputError when no member has weight.
+    """
+    if (likelihood != "gaussian" or threshold > -np.inf) and np.isnan(fit.efficiency[fit.best]):
+        raise InputError("observations: no efficiency is defined where all measured values are equal; use gaussian.")
+    kept = fit.solved & ((threshold == -np.inf) | (fit.efficiency >= threshold))
+    weights = np.zeros(len(kept))
+    if likelihood == "gaussian":
+        log_weight = np.nansum(fit.log_likelihood, axis=1)
+        weights[kept] = np.exp(log_weight[kept] - np.max(log_weight[kept], initial=-np.inf))
+    elif likelihood == "nse":
+        weights[kept] = np.maximum(fit.efficiency[kept], 0)
+    else:
+        weights[kept] = 1 / np.maximum(1 - fit.efficiency[kept], np.finfo(float).tiny)
+    if not weights.sum() > 0:
+        raise InputError(
+            f"infer.behavioural: expected a member with an efficiency of at least {threshold:g} (and above 0 for nse), "
+            f"the best has {np.nanmax(fit.efficiency):.3g}; lower the threshold or widen the priors."
+        )
+    return weights / weights.sum()

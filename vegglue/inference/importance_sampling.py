@@ -1,0 +1,80 @@
+"""Draws from a posterior by importance sampling with true runs; between rounds an emulator says where to look next.
+
+Nothing here knows what is sampled. A weight is the density of a true run over that of all proposals together, so that
+the emulator decides how much a draw is worth and never what the result is.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.stats
+
+from vegglue.arrays import Array
+from vegglue.inference.emulator import Emulator, learned
+from vegglue.inference.student_mixture import Mixture, draw, follow, pooled_weights
+from vegglue.inference.weighted_statistics import effective_size
+
+ROUNDS, FIRST, MOST_DRAWS = 7, 192, 1024
+# Draws come in sets of this size: neighbours are solved together.
+DRAWS_TOGETHER = 16
+Predict = Callable[[Array], Array]
+LogDensity = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """All draws z (m, p), values predicted there (m, n), NaN where that failed, and log density (m,), -inf there.
+
+    weights (m,): to a sum of one; drawn, worth: draws and effective draws so far, after each round.
+    """
+
+    z: Array
+    values: Array
+    log_density: Array
+    weights: Array
+    drawn: tuple[int, ...]
+    worth: tuple[float, ...]
+
+
+def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float, seed: int) -> Sample:
+    """Draws until they are worth `wanted` equal ones, or ROUNDS are over.
+
+    predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,).
+    """
+    places = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
+    mixture, size = start, FIRST
+    rounds: list[tuple[int, Mixture]] = []
+    parts: list[tuple[Array, Array, Array]] = []
+    drawn: list[int] = []
+    worth: list[float] = []
+    while True:
+        new = draw(mixture, places.random(size))
+        values = predict(new)
+        parts.append((new, values, _known(density(new, values))))
+        rounds.append((size, mixture))
+        z, values, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
+        weights = pooled_weights(logs, z, rounds)
+        drawn.append(len(z))
+        worth.append(effective_size(weights))
+        if worth[-1] >= wanted or len(rounds) == ROUNDS:
+            return Sample(z, values, logs, weights, tuple(drawn), tuple(worth))
+        last = effective_size(pooled_weights(parts[-1][2], new, rounds[-1:])) / size
+        emulator = learned(z, values, logs, mixture.centre[0], mixture.lower[0])
+        mixture = follow(partial(_emulated, emulator, density), mixture, seed + len(rounds))
+        size = _next_size(wanted - worth[-1], last)
+
+
+def _emulated(emulator: Emulator, density: LogDensity, z: Array) -> Array:
+    return density(z, emulator.predict(z))
+
+
+def _known(logs: Array) -> Array:
+    return np.where(np.isnan(logs), -np.inf, logs)
+
+
+def _next_size(missing: float, share: float) -> int:
+    """Draws of the next round: few while they are worth little, else what is missing."""
+    size = 2 * FIRST if share < 0.25 else np.clip(1.1 * missing / max(share, 0.75), DRAWS_TOGETHER, MOST_DRAWS)
+    return int(DRAWS_TOGETHER * np.ceil(size / DRAWS_TOGETHER))

@@ -1,0 +1,108 @@
+"""How well each member of an ensemble predicts what was measured, and what it therefore weighs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError
+from vegglue.results.ensemble import Ensemble
+from vegglue.solver.status import FAILED
+
+
+@dataclass(frozen=True)
+class MemberFit:
+    """What each member makes of the used stations."""
+
+    solved: NDArray[np.bool_]  # (member,)
+    best: int
+    sigma: dict[str, float]  # by kind of measurement
+    noise: Array  # (station,) NaN unknown
+    efficiency: Array  # (member,) NaN for failed members
+    log_likelihood: Array  # (member, station) NaN where not used or failed
+
+
+def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
+    """Rows of the used stations by kind of measurement."""
+    used = station["used"].to_numpy(bool)
+    return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}
+
+
+def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> MemberFit:
+    """Residual, sigma and Gaussian log-likelihood of each member at the stations, under the rule of sigma:
+
+    best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2;
+    known: the standard errors of the data. E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
+
+    Errors: InputError when no member was solved, a standard error is missing, or sigma would be zero.
+    """
+    kinds = stations_by_kind(station)
+    used = np.concatenate(list(kinds.values()))
+    solved = (ensemble.status != FAILED) & np.isfinite(ensemble.prediction[:, used]).all(axis=1)
+    if not solved.any():
+        raise InputError(f"ensemble: none of the {len(solved)} members was solved; see the reasons stored with them.")
+    value = station["value"].to_numpy(float)
+    residual = np.where(solved[:, None], value - ensemble.prediction, np.nan)
+    square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
+    errors = _known_errors(station, used) if rule == "known" else None
+    misfit = _profile_misfit(square, kinds) if errors is None else np.sum((residual / errors)[:, used] ** 2, axis=1)
+    best = int(np.nanargmin(misfit))
+    sigma = {kind: float(np.sqrt(each[best])) for kind, each in square.items()}
+    noise = station["kind"].map(sigma).to_numpy(float) if errors is None else errors
+    return MemberFit(
+        solved=solved,
+        best=best,
+        sigma=sigma if errors is None else {kind: root_mean_square(errors[rows]) for kind, rows in kinds.items()},
+        noise=noise,
+        efficiency=efficiency(residual, station),
+        log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy(bool)),
+    )
+
+
+def efficiency(residual: Array, station: pd.DataFrame) -> Array:
+    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k, (member,); residual (member, station)."""
+    value = station["value"].to_numpy(float)
+    kinds = stations_by_kind(station).values()
+    return 1 - np.mean([np.mean(residual[:, rows] ** 2, axis=1) / _variance(value[rows]) for rows in kinds], axis=0)
+
+
+def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Array:
+    errors = station["standard_error"].to_numpy(float)
+    unknown = [int(row) for row in used if not errors[row] > 0]
+    if unknown:
+        first = station.iloc[unknown[0]]
+        raise InputError(
+            f"observations: `infer.sigma: known` needs a standard error above 0 at every used station, but "
+            f"{len(unknown)} of {len(used)} have none, the first at x = {first['x']:g} m, y = {first['y']:g} m; "
+            "add `standard_error` to the observation or use `sigma: best-member`."
+        )
+    return errors
+
+
+def _profile_misfit(square: dict[str, Array], kinds: dict[str, NDArray[np.intp]]) -> Array:
+    """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]."""
+    for kind, each in square.items():
+        if np.nanmin(each) == 0:
+            raise InputError(
+                f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the residual; "
+                "give standard errors and use `infer.sigma: known`."
+            )
+    return np.sum([len(kinds[kind]) * np.log(each) for kind, each in square.items()], axis=0)
+
+
+def _variance(values: Array) -> float:
+    """NaN instead of zero: against a constant no efficiency is defined."""
+    return float(np.var(values)) or float("nan")
+
+
+def _log_likelihood(residual: Array, noise: Array, used: NDArray[np.bool_]) -> Array:
+    """ln p(u_i | U_i) = -ln(2 pi s_i^2) / 2 - (u_i - U_i)^2 / (2 s_i^2)."""
+    noise = np.where(used, noise, np.nan)
+    return -0.5 * np.log(2 * np.pi * noise**2) - 0.5 * (residual / noise) ** 2
+
+
+def root_mean_square(values: Array) -> float:
+    """sqrt(mean x^2), in the unit of the values; NaN without any, or with one that is unknown."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

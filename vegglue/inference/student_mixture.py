@@ -1,0 +1,154 @@
+"""A mixture of Student's t that follows a density: drawn from, evaluated, and fitted to weighted draws."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from scipy.special import chdtri, gammaln, logsumexp, ndtri
+
+from vegglue.arrays import Array
+from vegglue.inference.weighted_statistics import effective_size, systematic_draws
+
+# Degrees of freedom of every component: tails heavy enough for a posterior that is not normal.
+FREEDOM = 5.0
+# Effective draws that a fit asks for; with fewer the weights are tempered, w^t with t < 1.
+TO_FIT = 200
+# Rounds and draws of following a density that costs next to nothing; components at most, and added in a round.
+FOLLOW_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, MORE = 8, 4096, 12, 3
+# Rounds whose draws are pooled; draws of equal weight that a fit is made to, in so many steps.
+POOLED, FITTED, FIT_STEPS = 3, 2000, 10
+# Share of its draws that a normal density may lose because a flatter one is followed, so that tails are covered too.
+SPENT = 0.2
+# A round in which the draws are worth this share of their number, or hardly more than in the last one, is the last.
+WORTH, HARDLY_BETTER = 0.85, 1.03
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """sum_k share_k t(centre_k, lower_k lower_k'), of FREEDOM: share (k,), centre (k, p), lower (k, p, p)."""
+
+    share: Array
+    centre: Array
+    lower: Array
+
+
+def around(centres: Array, covariances: Array, log_mass: Array) -> Mixture:
+    """A component for each mode (k, p) with its covariance (k, p, p); shares go with exp(log_mass) (k,)."""
+    return Mixture(np.exp(log_mass - logsumexp(log_mass)), centres, np.asarray(np.linalg.cholesky(covariances), float))
+
+
+def draw(mixture: Mixture, places: Array) -> Array:
+    """z (m, p) at places (m, p + 2) of the unit cube: which component, how far out, and in which direction."""
+    places = np.clip(places, 1e-9, 1.0 - 1e-9)
+    which = np.minimum(np.searchsorted(np.cumsum(mixture.share), places[:, 0]), mixture.share.size - 1)
+    stretch = np.sqrt(FREEDOM / chdtri(FREEDOM, places[:, 1]))
+    away = np.einsum("mij,mj->mi", mixture.lower[which], ndtri(places[:, 2:]))
+    return np.asarray(mixture.centre[which] + stretch[:, None] * away)
+
+
+def log_density(mixture: Mixture, z: Array) -> Array:
+    """ln sum_k share_k t_k(z), (m,)."""
+    return np.asarray(logsumexp(_parts(mixture, z)[0], axis=1))
+
+
+def _parts(mixture: Mixture, z: Array) -> tuple[Array, Array]:
+    """ln share_k t_k(z) and the squared distance from each centre, (m, k) both."""
+    p = z.shape[1]
+    pairs = zip(mixture.centre, mixture.lower, strict=True)
+    away = np.stack([_distance(lower, z - centre) for centre, lower in pairs], axis=1)
+    scale = np.log(np.diagonal(mixture.lower, axis1=1, axis2=2)).sum(axis=1)
+    constant = gammaln(0.5 * (FREEDOM + p)) - gammaln(0.5 * FREEDOM) - 0.5 * p * np.log(FREEDOM * np.pi)
+    logs = np.log(mixture.share) + constant - scale - 0.5 * (FREEDOM + p) * np.log1p(away / FREEDOM)
+    return logs, away
+
+
+def _distance(lower: Array, away: Array) -> Array:
+    return np.asarray(np.sum(scipy.linalg.solve_triangular(lower, away.T, lower=True) ** 2, axis=0))
+
+
+def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]]) -> Array:
+    """w_i = p(z_i) / sum_r (n_r / n) q_r(z_i), to a sum of one: draws of all rounds, each from its own mixture.
+
+    Cornuet et al. (2012), https://doi.org/10.1111/j.1467-9469.2011.00756.x.
+    """
+    sizes = np.array([size for size, _ in rounds], float)
+    logs = np.stack([log_density(mixture, z) for _, mixture in rounds])
+    log_weight = log_target - logsumexp(logs, axis=0, b=(sizes / sizes.sum())[:, None])
+    weights = np.exp(log_weight - np.max(log_weight))
+    return np.asarray(weights / weights.sum())
+
+
+def follow(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixture:
+    """The start moved, reshaped and split until it resembles the density: target z (m, p) -> its log (m,)."""
+    random = np.random.default_rng(seed)
+    mixture, before, power = start, 0.0, _power(start.centre.shape[1])
+    rounds: list[tuple[int, Mixture]] = []
+    parts: list[tuple[Array, Array]] = []
+    for _ in range(FOLLOW_ROUNDS):
+        new = draw(mixture, random.random((EMULATED_DRAWS, start.centre.shape[1] + 2)))
+        logs = power * target(new)
+        rounds, parts = [*rounds[1 - POOLED :], (EMULATED_DRAWS, mixture)], [*parts[1 - POOLED :], (new, logs)]
+        worth = effective_size(pooled_weights(logs, new, rounds[-1:])) / EMULATED_DRAWS
+        if worth > WORTH or 0.5 < worth < HARDLY_BETTER * before:
+            break
+        before = worth
+        z, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
+        weights = tempered(pooled_weights(logs, z, rounds), TO_FIT)
+        equal = z[systematic_draws(weights, FITTED, random)]
+        mixture = _grown(mixture, equal, min(MORE, MOST_COMPONENTS - mixture.share.size), random)
+        for _ in range(FIT_STEPS):
+            mixture = _fitted(mixture, equal, effective_size(weights))
+    return mixture
+
+
+def _power(dimensions: int) -> float:
+    """b < 1 such that draws of p^b are worth 1 - SPENT of as many of p, (b (2 - b))^(dimensions / 2) for a normal p."""
+    return float(1.0 - np.sqrt(1.0 - (1.0 - SPENT) ** (2.0 / dimensions)))
+
+
+def tempered(weights: Array, wanted: float) -> Array:
+    """w^t with the largest t <= 1 at which they are worth `wanted`, or what there is; to a sum of one."""
+    if effective_size(weights) >= wanted:
+        return weights
+    low, high = 0.0, 1.0
+    logs = np.log(np.maximum(weights, 1e-300))
+    logs -= logs.max()
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        enough = effective_size(np.exp(middle * logs)) >= wanted
+        low, high = (middle, high) if enough else (low, middle)
+    return np.asarray(np.exp(low * logs) / np.exp(low * logs).sum())
+
+
+def _grown(mixture: Mixture, z: Array, more: int, random: np.random.Generator) -> Mixture:
+    """With `more` components at some of the draws z (m, p), half as wide as all of them together."""
+    if more <= 0:
+        return mixture
+    spread = np.cov(z.T, ddof=0).reshape(z.shape[1], -1) / 4.0
+    lower = np.linalg.cholesky(spread + 1e-6 * np.diag(np.diag(spread)) + 1e-300 * np.eye(z.shape[1]))
+    k = mixture.share.size
+    return Mixture(
+        np.concatenate([mixture.share * k, np.ones(more)]) / (k + more),
+        np.concatenate([mixture.centre, z[random.choice(len(z), more, replace=False)]]),
+        np.concatenate([mixture.lower, np.tile(lower, (more, 1, 1))]),
+    )
+
+
+def _fitted(mixture: Mixture, z: Array, worth: float) -> Mixture:
+    """One step of expectation and maximisation for a mixture of t's (Cappé et al. 2008, doi:10.1007/s11222-008-9059-x).
+
+    z (m, p): draws of equal weight, worth that many independent ones. A component that few of them belong to keeps most
+    of its shape.
+    """
+    logs, away = _parts(mixture, z)
+    belongs = np.exp(logs - logsumexp(logs, axis=1, keepdims=True)) / len(z)
+    share, p = belongs.sum(axis=0), z.shape[1]
+    gain = belongs * (FREEDOM + p) / (FREEDOM + away)
+    centre, lower = mixture.centre.copy(), mixture.lower.copy()
+    for k in np.flatnonzero(share * worth > 1.0):
+        centre[k] = gain[:, k] @ z / gain[:, k].sum()
+        scatter = (z - centre[k]).T @ ((z - centre[k]) * gain[:, k, None])
+        kept = 2.0 * p / worth
+        lower[k] = np.linalg.cholesky((scatter + kept * lower[k] @ lower[k].T) / (share[k] + kept))
+    return replace(mixture, share=(share + 0.05 / share.size) / 1.05, centre=centre, lower=lower)

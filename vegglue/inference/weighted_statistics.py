@@ -1,0 +1,132 @@
+"""Statistics of weighted members: quantiles, moments, what the weights are worth, and equal-weight draws."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
+
+from vegglue.arrays import Array
+
+# Halvings of the bracket of a mixture quantile: 2^-50 of its width is below rounding.
+BISECTIONS = 50
+
+
+def weighted_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
+    """q(p) interpolates the sorted values at p_k = (w_1 + ... + w_k - w_k/2) / sum w; no weight, no part in it.
+
+    values: (member, ...); weights: (member,); returns (level, ...) in the unit of the values. Where a weighted value is
+    NaN the quantile is NaN.
+    """
+    values, weights = values[weights > 0], weights[weights > 0]
+    columns = values.reshape(len(weights), -1)
+    quantiles = [_column_quantile(column, weights, np.atleast_1d(levels)) for column in columns.T]
+    return np.reshape(np.transpose(quantiles), (np.size(levels), *values.shape[1:]))
+
+
+def _column_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
+    if np.isnan(values).any():
+        return np.full(np.size(levels), np.nan)
+    order = np.argsort(values)
+    share = weights[order] / weights.sum()
+    return np.interp(np.asarray(levels, float), np.cumsum(share) - 0.5 * share, values[order])
+
+
+def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLike) -> Array:
+    """q(p) with sum_k w_k Phi((q - c_k) / s) = p: quantiles of members that each carry a normal error.
+
+    centres: (member, station); weights: (member,); sd: (station,) > 0; returns (level, station) in the unit of centres.
+    Where a centre or sd is NaN the quantile is NaN.
+    """
+    kept = weights > 1e-12 * weights.max()  # what the others carry is below rounding
+    centres, share = centres[kept], weights[kept] / weights[kept].sum()
+    low = np.tile(centres.min(axis=0) - 10 * sd, (np.size(levels), 1))
+    high = np.tile(centres.max(axis=0) + 10 * sd, (np.size(levels), 1))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = _mixture_distribution(middle, centres, share, sd) < np.reshape(levels, (-1, 1))
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return 0.5 * (low + high)
+
+
+def _mixture_distribution(at: Array, centres: Array, share: Array, sd: Array) -> Array:
+    return np.array([share @ ndtr((row - centres) / sd) for row in at])
+
+
+def weighted_covariance(values: Array, weights: Array) -> Array:
+    """cov_ij = sum_k w_k (x_ki - m_i)(x_kj - m_j) / sum w, m the weighted mean; values (member, i), returns (i, j)."""
+    share = weights[weights > 0] / weights.sum()
+    centred = values[weights > 0] - share @ values[weights > 0]
+    return (centred * share[:, None]).T @ centred
+
+
+def correlation(covariance: Array) -> Array:
+    """r_ij = cov_ij / sqrt(cov_ii cov_jj) [-]; NaN where a quantity does not vary."""
+    sd = np.sqrt(np.diag(covariance))
+    scale = np.outer(sd, sd)
+    return np.divide(covariance, scale, out=np.full_like(covariance, np.nan), where=scale > 0)
+
+
+def effective_size(weights: Array) -> float:
+    """n = (sum w)^2 / sum w^2: equal members that the weights are worth [-]. Kish (1965), Survey Sampling."""
+    return float(weights.sum() ** 2 / np.sum(weights**2))
+
+
+def systematic_draws(weights: Array, count: int, random: np.random.Generator) -> NDArray[np.int64]:
+    """Indices of `count` equal-weight draws: members where (u + i) / count falls in the cumulated weights, shuffled.
+
+    Each member comes floor or ceil of count * weight times. Kitagawa (1996), https://doi.org/10.2307/1390750.
+    """
+    cumulated = np.cumsum(weights)
+    places = (random.random() + np.arange(count)) / count * cumulated[-1]
+    return random.permutation(np.searchsorted(cumulated, places, side="right"))
+
+
+def pareto_shape(weights: Array) -> float:
+    """k-hat [-]: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) weights.
+
+    Above 0.7 the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than 5 weights
+    stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens (2009),
+    https://doi.org/10.1198/tech.2009.08017.
+    """
+    ordered = np.sort(weights / np.max(weights))
+    tail = _tail(len(ordered))
+    excess = ordered[-tail:] - ordered[-tail - 1]
+    excess = excess[excess > 0]
+    return _generalised_pareto(excess)[0] if len(excess) >= 5 else float("nan")
+
+
+def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
+    """Weights (m,) to a sum of one whose largest are replaced by quantiles of the distribution fitted to them; k-hat.
+
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large ones
+    they stay as they are: k-hat is NaN where all are alike, infinite where hardly any counts.
+    """
+    weights = np.exp(log_weights - np.max(log_weights))
+    order = np.argsort(weights, kind="stable")
+    tail = order[-_tail(len(weights)) :]
+    cut = weights[order[-len(tail) - 1]]
+    excess = weights[tail] - cut
+    if np.sum(excess > 0) < 5:
+        return weights / weights.sum(), float("inf" if effective_size(weights) < 5 else "nan")
+    k, scale = _generalised_pareto(excess[excess > 0])
+    level = (np.arange(len(tail)) + 0.5) / len(tail)
+    grown = -scale * np.log1p(-level) if abs(k) < 1e-9 else scale * np.expm1(-k * np.log1p(-level)) / k
+    weights[tail] = np.minimum(cut + grown, 1.0)
+    return weights / weights.sum(), k
+
+
+def _tail(count: int) -> int:
+    return int(np.ceil(min(count / 5, 3 * np.sqrt(count))))
+
+
+def _generalised_pareto(excess: Array) -> tuple[float, float]:
+    """Shape k and scale: posterior mean over a grid of b = -k/scale; k has a weak prior of 0.5 worth 10 values."""
+    count = len(excess)
+    grid = 30 + int(np.sqrt(count))
+    quartile = excess[int(count / 4 + 0.5) - 1]
+    b = (1 - np.sqrt(grid / (np.arange(1, grid + 1) - 0.5))) / (3 * quartile) + 1 / excess[-1]
+    k = np.log1p(-b[:, None] * excess).mean(axis=1)
+    profile = count * (np.log(-b / k) - k - 1)
+    share = np.exp(profile - profile.max())
+    best = (b * share).sum() / share.sum()
+    shape = float(np.log1p(-best * excess).mean())
+    return (shape * count + 0.5 * 10) / (count + 10), float(-shape / best)

@@ -1,0 +1,228 @@
+"""ADV points of one section: placed in the channel, judged, averaged over the depth and summed to the discharge."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.case.schema import Case, Observation
+from vegglue.errors import InputError
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.measurements.dead_probes import dead_probes
+from vegglue.measurements.section_discharge import (
+    CrossSection,
+    Discharge,
+    combine,
+    conveyance_weights,
+    grid_weights,
+    neighbour_error,
+)
+from vegglue.measurements.vertical_profile import (
+    CanopyHeight,
+    Column,
+    fit_canopy_height,
+    fit_log_law,
+    fit_two_layers,
+    linear_average,
+    sampling_error,
+)
+from vegglue.site.bed import bed_levels
+from vegglue.site.grid import Grid
+from vegglue.site.zones import cells_of_patch
+
+EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
+GRID_STEP = 0.02  # m, along y and z: cells of the regular grid a section is summed on
+SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
+SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing about its time scale
+# Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
+TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
+DURATION = 60.0  # s
+
+
+@dataclass(frozen=True)
+class Section:
+    """One measured section: `points`, `profiles`, and the rest for this one section as in observations.Observations."""
+
+    points: pd.DataFrame
+    profiles: pd.DataFrame
+    discharge: dict[str, Discharge]
+    neighbour_error: float
+    canopy_height: CanopyHeight | None
+
+
+def read_section(case: Case, observation: Observation) -> Section:
+    """Everything one `kind: adv` entry yields; InputError names file and row of what cannot be used as given."""
+    points = _read_points(observation)
+    section = _cross_section(case, observation, points["x"].iloc[0])
+    points = _without_dead_probes(_with_errors(_placed(case, observation, points)), section)
+    profiles = pd.DataFrame([_profile(group) for _, group in points.groupby("y")])
+    good = profiles[profiles["used"]]
+    error = neighbour_error(good["y"].to_numpy(), good["fitted"].to_numpy())
+    columns = [_column(group) for _, group in points[points["used"]].groupby("y")]
+    among = [column for column, plants in zip(columns, good["plants"], strict=True) if plants]
+    canopy = fit_canopy_height(among) if among else None
+    return Section(points, profiles, _discharge(section, columns, good, error), error, canopy)
+
+
+def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
+    """Depth average and standard error (rows,) [m/s] by the rule `paper` or `profile`.
+
+    The error of the paper's rule has a part for the straight line it draws to the bed and the constant it draws to the
+    surface: the difference d between both rules taken as the bound of a uniform distribution, d / sqrt(3).
+    """
+    if rule == "profile":
+        return profiles["fitted"], profiles["fitted_error"]
+    shape = (profiles["linear"] - profiles["fitted"]) / np.sqrt(3.0)
+    return profiles["linear"], np.hypot(profiles["linear_error"], shape)
+
+
+def _read_points(observation: Observation) -> pd.DataFrame:
+    """Rows of the observed case, upwards in each vertical, in the coordinates of the grid."""
+    path, wanted = observation.file, observation.case
+    rows = read_table(path, ("case", "device"), ("x", "y", "z", "u"), ("v", "w", "u_std", "duration_s"))
+    for column in {"u_std", "duration_s"} & set(rows.columns):
+        refuse_rows(path, rows[column] <= 0.0, f"expected {column} above 0; mend or remove the row")
+    refuse_repeated(path, rows, ("case", "x", "y", "z"))
+    chosen = rows[rows["case"] == wanted]
+    if chosen.empty:
+        raise InputError(
+            f"{shown_name(path)}: expected rows with case {wanted!r}, got only {', '.join(rows['case'].unique())}; "
+            f"correct `case` in the observation."
+        )
+    refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
+    moved = chosen.assign(x=chosen["x"] + observation.offset.x, y=chosen["y"] + observation.offset.y)
+    return moved.drop(columns="case").sort_values(["y", "z"]).reset_index(drop=True)
+
+
+def _across(case: Case) -> Array:
+    low, high = case.grid.y
+    return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
+
+
+def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
+    """Bed level at x and each y in the datum of the file, in which the lowest bed of the section is `floor`."""
+    lowest = _local_bed(case, x, _across(case)).min()
+    return _local_bed(case, x, y) - lowest + float(observation.floor or 0.0)
+
+
+def _local_bed(case: Case, x: float, y: Array) -> Array:
+    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP))[0]
+
+
+def _cross_section(case: Case, observation: Observation, x: float) -> CrossSection:
+    y = _across(case)
+    return CrossSection(y, _bed(case, observation, x, y), float(observation.surface or 0.0))
+
+
+def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> NDArray[np.bool_]:
+    """Whether the verticals at y stand in plants of the experiment, at least EDGE inside their patch."""
+    present = case.experiments[str(observation.experiment)].plants
+    patches = [patch for patch in case.plants.patches if present is True or (present and patch.name in present)]
+    result = np.zeros(len(y), dtype=bool)
+    for patch in patches:
+        left, right = (cells_of_patch(patch, Grid(np.array([x]), y + side, 1.0, 1.0))[0] for side in (-EDGE, EDGE))
+        result |= left & right
+    return result
+
+
+def _placed(case: Case, observation: Observation, points: pd.DataFrame) -> pd.DataFrame:
+    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water."""
+    x, y, surface = points["x"].iloc[0], points["y"].to_numpy(), float(observation.surface or 0.0)
+    bed = _bed(case, observation, x, y)
+    reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
+    if (reason != "").all():
+        raise InputError(
+            f"{shown_name(observation.file)}: expected points of case {observation.case!r} between the bed and the "
+            f"water surface at z = {surface:g} m, got none; check `floor`, `surface` and `offset` of the observation."
+        )
+    return points.assign(
+        experiment=observation.experiment,
+        section=observation.section,
+        bed=bed,
+        depth=surface - bed,
+        height=points["z"] - bed,
+        plants=_among_plants(case, observation, x, y),
+        used=reason == "",
+        reason=reason,
+    )
+
+
+def _with_errors(points: pd.DataFrame) -> pd.DataFrame:
+    """Sampling error of every point; the integral time scale, which no file gives, is taken as h / U of the vertical.
+
+    That is eddies as long as the water is deep, carried past at the mean velocity.
+    """
+    mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST).to_numpy()
+    deviation = points["u_std"].to_numpy() if "u_std" in points else TURBULENCE * mean
+    duration = points["duration_s"].to_numpy() if "duration_s" in points else np.full(len(points), DURATION)
+    error = sampling_error(deviation, duration, points["depth"].clip(lower=0.0).to_numpy() / mean)
+    return points.assign(standard_error=np.maximum(error, SMALLEST_ERROR), u_std=points.get("u_std", np.nan))
+
+
+def _without_dead_probes(points: pd.DataFrame, section: CrossSection) -> pd.DataFrame:
+    """Points with `used` false and the reason given in every vertical where the probe was dead."""
+    verticals = (
+        points[points["used"]]
+        .assign(speed=points["u"].abs())
+        .groupby("y", as_index=False)
+        .agg(
+            points=("u", "size"),
+            largest=("speed", "max"),
+            mean=("u", "mean"),
+            deviation=("u_std", "median"),
+            plants=("plants", "first"),
+        )
+    )
+    wet = section.y[section.depth > 0.0]
+    names = ("y", "points", "largest", "mean", "deviation", "plants")
+    reasons = dead_probes((wet[0], wet[-1]), *(verticals[name].to_numpy() for name in names))
+    reason = points["y"].map(dict(zip(verticals["y"], reasons, strict=True))).fillna("")
+    return points.assign(reason=points["reason"].mask(reason != "", reason), used=points["used"] & (reason == ""))
+
+
+def _column(points: pd.DataFrame) -> Column:
+    height, velocity, error = (points[name].to_numpy() for name in ("height", "u", "standard_error"))
+    return Column(height, velocity, error, float(points["depth"].iloc[0]))
+
+
+def _profile(points: pd.DataFrame) -> dict[str, object]:
+    """One row of Observations.profiles from all points of one vertical; a dead one is averaged too, to be shown."""
+    first, wet = points.iloc[0], points[points["height"].gt(0.0) & points["height"].le(points["depth"])]
+    used = bool(points["used"].any())
+    row = {name: first[name] for name in ("experiment", "section", "x", "y", "bed", "depth", "plants", "device")}
+    row |= {"points": len(wet), "used": used, "reason": "" if used else first["reason"], "law": "none"}
+    row |= dict.fromkeys(
+        ("linear", "linear_error", "fitted", "fitted_error", "within", "slope", "top", "scatter"), np.nan
+    )
+    if wet.empty:
+        return row
+    column = _column(wet)
+    fit = fit_two_layers(column) if first["plants"] else fit_log_law(column)
+    linear, linear_error = linear_average(column, fit.scatter if fit else 1.0)
+    row |= {"linear": linear, "linear_error": linear_error}
+    if fit is None:
+        return row | {"fitted": linear, "fitted_error": linear_error, "law": "linear"}
+    fitted, fitted_error = fit.average(column.depth)
+    law = "two layers" if first["plants"] else "log law"
+    curve = {"within": fit.within, "slope": fit.slope, "top": fit.top, "scatter": fit.scatter}
+    return row | curve | {"fitted": fitted, "fitted_error": fitted_error, "law": law}
+
+
+def _discharge(section: CrossSection, columns: list[Column], good: pd.DataFrame, error: float) -> dict[str, Discharge]:
+    """By both rules, from the verticals that are used; `error` is of one vertical among its neighbours [m/s]."""
+    position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
+    grid = grid_weights(section, position, columns, GRID_STEP)
+    paper = sum(float(weights @ column.velocity) for weights, column in zip(grid, columns, strict=True))
+    errors = [
+        factor * float(np.linalg.norm(weights * column.standard_error))
+        for weights, column, factor in zip(grid, columns, scatter, strict=True)
+    ]
+    area = conveyance_weights(section, position, good["depth"].to_numpy())
+    profile = float(area @ good["fitted"].to_numpy())
+    spacing = error * float(np.linalg.norm(area))
+    return {
+        "paper": combine(paper, float(np.linalg.norm(errors)), spacing, abs(paper - profile) / float(np.sqrt(3.0))),
+        "profile": combine(profile, float(np.linalg.norm(area * good["fitted_error"].to_numpy())), spacing, 0.0),
+    }

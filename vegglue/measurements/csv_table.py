@@ -1,0 +1,85 @@
+"""Measured tables: CSV files read strictly, every fault named with its file and row."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vegglue.errors import InputError
+
+
+def read_table(
+    path: Path, names: Sequence[str], numbers: Sequence[str], optional: Sequence[str] = (), labels: Sequence[str] = ()
+) -> pd.DataFrame:
+    """Columns of a CSV: `names` as text, `numbers` as float64; where present, `optional` numbers and `labels` as text.
+
+    Other columns are left out. The index is the row in the file, whose heading is row 1. Raises InputError naming file
+    and row for a file that cannot be read, a missing column, and a missing, non-numeric or infinite value.
+    """
+    try:
+        raw = pd.read_csv(path, dtype=str, keep_default_na=False, skip_blank_lines=False, index_col=False)
+    except (OSError, ValueError, pd.errors.ParserWarning) as error:  # pandas' own errors are ValueErrors
+        why = " ".join(str(error).split())
+        raise InputError(
+            f"{shown_name(path)}: expected a CSV table in UTF-8, which cannot be read ({why}); check it."
+        ) from None
+    raw.columns = raw.columns.str.strip()
+    missing = [column for column in (*names, *numbers) if column not in raw.columns]
+    if missing:
+        raise InputError(
+            f"{shown_name(path)}, row 1: expected the columns {', '.join((*names, *numbers))}, got "
+            f"{', '.join(raw.columns)} without {', '.join(missing)}; rename or add what is missing."
+        )
+    raw.index = pd.RangeIndex(2, len(raw) + 2)
+    if raw.empty:
+        raise InputError(f"{shown_name(path)}: expected rows below the heading, got none.")
+    texts = [*names, *(column for column in labels if column in raw.columns)]
+    values = [*numbers, *(column for column in optional if column in raw.columns)]
+    return pd.DataFrame(
+        {column: _texts(path, raw[column]) for column in texts}
+        | {column: _numbers(path, raw[column]) for column in values}
+    )
+
+
+def shown_name(path: Path) -> str:
+    """The path as sentences name it: relative to where the user stands."""
+    return os.path.relpath(path)
+
+
+def refuse_rows(path: Path, wrong: pd.Series, complaint: str) -> None:
+    """Raise InputError naming the file and the first row where `wrong` (rows,) is true."""
+    if wrong.any():
+        raise InputError(f"{shown_name(path)}, row {wrong.idxmax()}: {complaint}.")
+
+
+def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Raise InputError when two rows agree in all these columns."""
+    repeated = table.duplicated(list(columns))
+    if repeated.any():
+        row = repeated.idxmax()
+        same = (table.loc[: row - 1, list(columns)] == table.loc[row, list(columns)]).all(axis=1).idxmax()
+        raise InputError(
+            f"{shown_name(path)}, row {row}: expected {', '.join(columns)} to differ from every other row, got those "
+            f"of row {same} again; take one of the two out."
+        )
+
+
+def _texts(path: Path, column: "pd.Series[str]") -> "pd.Series[str]":
+    text = column.str.strip()
+    if (text == "").any():
+        raise InputError(
+            f"{shown_name(path)}, row {(text == '').idxmax()}: expected a name in column {column.name}, got nothing."
+        )
+    return text
+
+
+def _numbers(path: Path, column: "pd.Series[str]") -> "pd.Series[float]":
+    values = pd.to_numeric(column.str.strip(), errors="coerce").astype(float)
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        row = wrong.idxmax()
+        got = f"expected a number in column {column.name}, got {column[row]!r}"
+        raise InputError(f"{shown_name(path)}, row {row}: {got}; mend or remove the row.")
+    return values

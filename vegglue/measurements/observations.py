@@ -1,0 +1,171 @@
+"""What was measured: ADV points, depth-averaged velocities and gauge levels, as one table of stations."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vegglue.case.messages import nearest
+from vegglue.case.schema import Case, Observation
+from vegglue.errors import InputError
+from vegglue.measurements.adv_section import Section, average_of, read_section
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.measurements.section_discharge import Discharge
+from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
+
+STATION_COLUMNS = (
+    "experiment",
+    "kind",
+    "section",
+    "x",
+    "y",
+    "value",
+    "standard_error",
+    "used",
+    "reason",
+    "depth",
+    "device",
+)
+Key = tuple[str, str]  # experiment, section
+
+
+@dataclass(frozen=True)
+class Observations:
+    """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
+
+    table: one row per station, columns STATION; `value` is a depth-averaged velocity along x [m/s] or a level [m];
+    standard_error and depth are NaN when unknown. Rows with used = False say why in `reason` (their value may be NaN).
+    points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the
+    bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
+    profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
+    and linear_error (the paper's rule), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
+    scatter (see profile.ProfileFit; NaN without a fit), used, reason.
+    discharge: by (experiment, section), then by rule, `paper` and `profile`.
+    neighbour_error: by (experiment, section), the error of one vertical as its neighbours tell it [m/s]. Larger than
+    the error of its own points, it holds what these do not show (position, stems); part of standard_error in table.
+    canopy_height: by (experiment, section), where verticals stand inside plants.
+    """
+
+    table: pd.DataFrame
+    points: pd.DataFrame
+    profiles: pd.DataFrame
+    discharge: dict[Key, dict[str, Discharge]]
+    neighbour_error: dict[Key, float]
+    canopy_height: dict[Key, CanopyHeight]
+
+
+def read_observations(case: Case) -> Observations:
+    """Read every file the case names, judge the quality, average over the depth.
+
+    Raises InputError, naming file and row, for what cannot be read, is missing, repeated, or no number; a vertical or
+    point that can be read but not trusted stays, with used = False and the reason.
+    """
+    sections: dict[Key, Section] = {}
+    stations = []
+    for observation in case.observations:
+        if observation.kind == "adv":
+            key = (str(observation.experiment), str(observation.section))
+            if key in sections:
+                raise InputError(
+                    f"{shown_name(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
+                    f"observations of it; take one out of the case."
+                )
+            sections[key] = read_section(case, observation)
+            stations.append(_averaged(sections[key], observation))
+        else:
+            stations.append(_read_stations(case, observation))
+    table = _joined(stations)
+    _refuse_unknown_places(case, table)
+    return Observations(
+        table=table,
+        points=_joined([section.points for section in sections.values()]),
+        profiles=_joined([section.profiles for section in sections.values()]),
+        discharge={key: section.discharge for key, section in sections.items()},
+        neighbour_error={key: section.neighbour_error for key, section in sections.items()},
+        canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
+    )
+
+
+def _refuse_unknown_places(case: Case, table: pd.DataFrame) -> None:
+    """Refuse sections and devices that an effect is limited to and nobody measured at."""
+    for name, working in case.effects.items():
+        for column, words in (("section", working.sections), ("device", working.devices)):
+            known = [str(word) for word in table[column].unique() if word]
+            for word in words:
+                if word not in known:
+                    raise InputError(
+                        f"{shown_name(case.source)}: `effects.{name}.{column}s` names the {column} `{word}`, of which "
+                        f"there are no measurements: {nearest(word, known)}"
+                    )
+
+
+def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
+    """The curve of one row of Observations.profiles, for drawing; None without a fit. Its covariance is NaN."""
+    if not np.isfinite(profile["top"]):
+        return None
+    return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])
+
+
+def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(STATION_COLUMNS))
+
+
+def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
+    """Stations from the verticals of a section, by the rule the case has chosen.
+
+    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0) with s the error told by the neighbours: points cannot show
+    that their vertical stands beside a stem, or a hand's breadth off. An error given in the case replaces this.
+    """
+    profiles = section.profiles
+    value, own = average_of(profiles, str(observation.average))
+    hidden = np.nan_to_num(section.neighbour_error**2 - (own[profiles["used"]] ** 2).mean())
+    error = np.hypot(own, np.sqrt(max(hidden, 0.0)))
+    if observation.standard_error is not None:
+        error = pd.Series(observation.standard_error, index=profiles.index)
+    return profiles.assign(kind="velocity", value=value, standard_error=error)[list(STATION_COLUMNS)]
+
+
+def _read_stations(case: Case, observation: Observation) -> pd.DataFrame:
+    """Depth-averaged velocities (x, y, u[, u_se]) or gauge levels (x, y, level[, level_se]); an error of 0 is unknown.
+
+    An `experiment` or `section` in the case chooses the rows with that name, or names all rows of a file without it.
+    """
+    path, value = observation.file, {"velocity": "u", "level": "level"}[observation.kind]
+    given = {"experiment": observation.experiment, "section": observation.section}
+    if observation.kind == "level" and observation.section is None:
+        given["section"] = ""
+    needed = [name for name, text in given.items() if text is None]
+    rows = read_table(path, needed, ("x", "y", value), (f"{value}_se",), [name for name in given if name not in needed])
+    for name, text in given.items():
+        rows = _chosen(path, rows, name, text)
+    unknown = ~rows["experiment"].isin(list(case.experiments))
+    refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
+    refuse_repeated(path, rows, ("experiment", "section", "x", "y"))
+    error = rows.get(f"{value}_se", pd.Series(observation.standard_error or 0.0, index=rows.index))
+    refuse_rows(path, error < 0.0, f"expected {value}_se of at least 0; mend it or leave the column out")
+    stations = rows.rename(columns={value: "value"}).assign(
+        kind=observation.kind,
+        x=rows["x"] + observation.offset.x,
+        y=rows["y"] + observation.offset.y,
+        standard_error=error.mask(error == 0.0),
+        used=True,
+        reason="",
+        depth=np.nan,
+        device="",
+    )
+    return stations[list(STATION_COLUMNS)]
+
+
+def _chosen(path: Path, rows: pd.DataFrame, name: str, text: str | None) -> pd.DataFrame:
+    if text is None or (text == "" and name in rows):
+        return rows
+    if name not in rows:
+        return rows.assign(**{name: text})
+    chosen = rows[rows[name] == text]
+    if chosen.empty:
+        raise InputError(
+            f"{shown_name(path)}: expected rows with {name} {text!r}, got only {', '.join(rows[name].unique())}; "
+            f"correct `{name}` in the observation."
+        )
+    return chosen

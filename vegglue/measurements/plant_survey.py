@@ -1,0 +1,128 @@
+"""The plant survey to the rigid-cylinder estimate of phi, with its uncertainty by Monte Carlo."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.schema import Survey
+from vegglue.errors import InputError
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+
+SURVEYED = (
+    "willow_height",
+    "stem_height",
+    "undergrowth_height",
+    "stem_diameter",
+    "stem_diameter_with_debris",
+    "undergrowth_diameter",
+    "branch_diameter",
+    "stems",
+    "branches_per_stem",
+)
+DRAG_COEFFICIENT = 1.0  # the paper's choice for submerged plants, after Wunder et al. (2011)
+
+
+@dataclass(frozen=True)
+class SurveyedQuantity:
+    """One row of the survey: mean, standard deviation between plants (0 if unknown) and number of plants, in SI."""
+
+    mean: float
+    standard_deviation: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class RigidCylinder:
+    """phi [-] of a stand of rigid cylinders: its draws and what they amount to.
+
+    `parts` are the means of stems, branches and undergrowth [-]; `assumption` says what was not surveyed.
+    """
+
+    draws: Array
+    parts: dict[str, float]
+    assumption: str
+
+    @property
+    def mean(self) -> float:
+        """Mean of the draws [-]."""
+        return float(self.draws.mean())
+
+    @property
+    def standard_deviation(self) -> float:
+        """Standard deviation of the draws [-]."""
+        return float(self.draws.std())
+
+    def quantile(self, probability: float) -> float:
+        """phi [-] which the draws stay below with this probability."""
+        return float(np.quantile(self.draws, probability))
+
+
+def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
+    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV, by quantity; one row for each of QUANTITIES.
+
+    Raises InputError naming the file and row for what is missing, unknown, repeated, or not positive.
+    """
+    rows = read_table(path, ("quantity",), ("mean", "standard_deviation", "samples"))
+    known = ", ".join(SURVEYED)
+    refuse_rows(path, ~rows["quantity"].isin(SURVEYED), f"expected one of the quantities {known}")
+    refuse_repeated(path, rows, ("quantity",))
+    refuse_rows(path, rows["mean"] <= 0.0, "expected a mean above 0; mend the row")
+    refuse_rows(path, rows["standard_deviation"] < 0.0, "expected a standard deviation of at least 0; mend the row")
+    refuse_rows(path, rows["samples"] < 1.0, "expected at least 1 sample; mend the row")
+    missing = [name for name in SURVEYED if name not in set(rows["quantity"])]
+    if missing:
+        raise InputError(
+            f"{shown_name(path)}: expected a row for each of {known}, got none for {', '.join(missing)}; add it."
+        )
+    columns = (rows["quantity"], rows["mean"], rows["standard_deviation"], rows["samples"])
+    return {
+        name: SurveyedQuantity(mean, error, int(samples)) for name, mean, error, samples in zip(*columns, strict=True)
+    }
+
+
+def rigid_cylinder(
+    survey: dict[str, SurveyedQuantity], choice: Survey, draws: int = 20000, seed: int = 1
+) -> RigidCylinder:
+    """phi = C_d m (D_s h_s + b D_b (h_w - h_s)) min(h_d / h_w, 1) + C_d m_u D_u min(h_u, h_d).
+
+    m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the willow height h_w, bent rigidly
+    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_w; upright when
+    `choice.deflected_height` is not given), and m_u stems of undergrowth of diameter D_u and height h_u, which stay
+    upright [m]; C_d = 1. No foliage.
+
+    Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
+    positive. `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the paper's +-
+    must be), `mean` uses the error of the mean over the sampled plants. The density m_u was not surveyed: it is
+    log-uniform between `choice.undergrowth_density` [1/m2], an assumption of the user; without it, no undergrowth.
+
+    Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
+    bending after Verschoren et al. (2016).
+    """
+    generator = np.random.default_rng(seed)
+    drawn = {name: _draw(survey[name], choice.spread, draws, generator) for name in SURVEYED}
+    height, stem_height = drawn["willow_height"], np.minimum(drawn["stem_height"], drawn["willow_height"])
+    deflected = np.full(draws, choice.deflected_height or np.inf)
+    bent = DRAG_COEFFICIENT * drawn["stems"] * np.minimum(deflected / height, 1.0)
+    diameter = drawn["stem_diameter_with_debris" if choice.debris else "stem_diameter"]
+    stems = bent * diameter * stem_height
+    branches = bent * drawn["branches_per_stem"] * drawn["branch_diameter"] * (height - stem_height)
+    low, high = choice.undergrowth_density or (0.0, 0.0)
+    density = np.exp(generator.uniform(np.log(low), np.log(high), draws)) if high > 0.0 else np.zeros(draws)
+    covered = np.minimum(drawn["undergrowth_height"], deflected)
+    undergrowth = DRAG_COEFFICIENT * density * drawn["undergrowth_diameter"] * covered
+    parts = {"stems": stems, "branches": branches, "undergrowth": undergrowth}
+    assumed = f"is assumed log-uniform between {low:g} and {high:g} stems/m2."
+    assumption = f"The density of the undergrowth was not surveyed and {assumed}" if high > 0.0 else "No undergrowth."
+    return RigidCylinder(
+        stems + branches + undergrowth, {name: float(part.mean()) for name, part in parts.items()}, assumption
+    )
+
+
+def _draw(quantity: SurveyedQuantity, spread: str, draws: int, generator: np.random.Generator) -> Array:
+    """Lognormal draws with the mean and standard deviation of the quantity."""
+    error = quantity.standard_deviation / (math.sqrt(quantity.samples) if spread == "mean" else 1.0)
+    variance = math.log1p((error / quantity.mean) ** 2)
+    return generator.lognormal(math.log(quantity.mean) - variance / 2.0, math.sqrt(variance), draws)

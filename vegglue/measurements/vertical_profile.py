@@ -1,0 +1,179 @@
+"""One vertical: from point velocities to a depth average, its standard error, and the height of the canopy.
+
+Heights count from the bed [m]; arrays have shape (points,), sorted upwards. Everything here is a pure function.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array
+
+FEWEST_POINTS = 4  # two or three numbers are fitted: below this nothing is left to tell how well
+CLEAR = 3.0  # a rise of the velocity with height counts from this many standard errors
+
+
+@dataclass(frozen=True)
+class Column:
+    """One vertical: heights above the bed [m], velocities [m/s], their standard errors [m/s], water depth [m]."""
+
+    height: Array
+    velocity: Array
+    standard_error: Array
+    depth: float
+
+
+@dataclass(frozen=True)
+class ProfileFit:
+    """u(z) = within + slope ln(max(z / top, 1)); within and slope [m/s], top [m].
+
+    Without plants within = 0, top is the roughness height z_0; inside plants top is the canopy height.
+    `covariance` (3, 3) is of (within, slope, top), already scaled by `scatter`: the root of the reduced chi-square
+    where that is above 1, that is, how much more the points scatter about the profile than sampling explains.
+    """
+
+    within: float
+    slope: float
+    top: float
+    covariance: Array
+    scatter: float
+
+    def velocity(self, height: Array) -> Array:
+        """u(z) = within + slope ln(max(z / top, 1)); height (n,) [m] -> (n,) [m/s]."""
+        return self.within + self.slope * np.log(np.maximum(height / self.top, 1.0))
+
+    def average(self, depth: float) -> tuple[float, float]:
+        """U = within + slope (ln(h / top) - 1 + top / h), the integral of u(z) from the bed to the surface over h.
+
+        depth h [m] -> U and its standard error [m/s]; the slope drops out where the top is above the water.
+        """
+        ratio = max(depth / self.top, 1.0)
+        share = np.log(ratio) - 1.0 + 1.0 / ratio
+        gradient = np.array([1.0, share, self.slope * (1.0 / depth - 1.0 / self.top) if ratio > 1.0 else 0.0])
+        return float(self.within + self.slope * share), float(np.sqrt(gradient @ self.covariance @ gradient))
+
+
+@dataclass(frozen=True)
+class CanopyHeight:
+    """Deflected canopy height above the bed and its standard error [m]; both NaN, with a reason, when none shows."""
+
+    value: float
+    standard_error: float
+    columns: int
+    reason: str
+
+
+def sampling_error(deviation: Array, duration: Array, time_scale: Array | float) -> Array:
+    """se = sqrt(2 T_I / T) s, the error of a mean over T of a record with deviation s and integral time scale T_I.
+
+    deviation s [m/s], duration T [s], time_scale T_I [s] -> [m/s]; never above s.
+    Source: Lenschow, Mann and Kristensen (1994), doi 10.1175/1520-0426(1994)011<0661:HLILEW>2.0.CO;2.
+    """
+    return deviation * np.sqrt(np.minimum(2.0 * np.asarray(time_scale) / duration, 1.0))
+
+
+def linear_weights(height: Array, levels: Array) -> Array:
+    """w (levels, points) with u(levels) = w u: linear between points, zero at the bed, constant above the highest."""
+    nodes = np.concatenate([[0.0], height])
+    return np.column_stack([np.interp(levels, nodes, np.concatenate([[0.0], unit])) for unit in np.eye(len(height))])
+
+
+def average_weights(height: Array, depth: float) -> Array:
+    """w (points,) with U = w u: the profile of `linear_weights` integrated from bed to surface over the depth [-]."""
+    half = np.diff(np.concatenate([[0.0], height, [max(depth, height[-1])]])) / 2.0
+    weights = half[:-1] + half[1:]
+    weights[-1] += half[-1]  # above the highest point there is no second point to share with
+    return weights / max(depth, height[-1])
+
+
+def linear_average(column: Column, scatter: float = 1.0) -> tuple[float, float]:
+    """U = sum(w u) and se = scatter sqrt(sum((w se)^2)) with the weights of `average_weights` [m/s]."""
+    weights = average_weights(column.height, column.depth)
+    return float(weights @ column.velocity), float(scatter * np.linalg.norm(weights * column.standard_error))
+
+
+def fit_log_law(column: Column) -> ProfileFit | None:
+    """u = (u* / kappa) ln(z / z_0) above z_0, zero below: water without plants; None when the points show no such rise.
+
+    Weighted least squares; z_0 on a grid of 600 values, the slope exactly.
+    """
+    tops = np.geomspace(1e-6 * column.depth, 0.9 * column.height[-1], 600)
+    return _fit(column, tops, _through_zero, within_free=False)
+
+
+def fit_two_layers(column: Column) -> ProfileFit | None:
+    """u = u_v below the canopy height k, u_v + (u* / kappa) ln(z / k) above; None when the points show no canopy top.
+
+    The velocity profile behind the resistance formula of Baptist et al. (2007), doi 10.1080/00221686.2007.9521778.
+    """
+    if len(column.height) < FEWEST_POINTS:
+        return None
+    return _fit(column, np.linspace(column.height[1], column.height[-2], 600), _with_offset, within_free=True)
+
+
+def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
+    """k = argmin of the summed chi2(k): the one canopy height [m] shared by all verticals inside a stand.
+
+    u_v and u* are free in every vertical. Standard error: half the width of chi2(k) <= chi2_min + s^2, where s^2 is the
+    reduced chi-square (at least 1), so that scatter between stems and verticals counts.
+    """
+    columns = [column for column in columns if len(column.height) >= FEWEST_POINTS]
+    if not columns:
+        return CanopyHeight(np.nan, np.nan, 0, "no vertical inside the plants has enough points")
+    lowest = max(column.height[1] for column in columns)
+    highest = min(column.height[-2] for column in columns)
+    tops = np.arange(lowest, highest, 0.001)
+    misfit = np.sum([_with_offset(column, tops)[2] for column in columns], axis=0)
+    uniform = sum(_with_offset(column, np.array([np.inf]))[2][0] for column in columns)
+    best = int(np.argmin(misfit))
+    freedom = sum(len(column.height) for column in columns) - 2 * len(columns) - 1
+    unit = max(misfit[best] / freedom, 1.0)
+    if uniform - misfit[best] < CLEAR**2 * unit * len(columns):
+        return CanopyHeight(np.nan, np.nan, len(columns), "the verticals show no canopy top: not or just submerged")
+    inside = tops[misfit <= misfit[best] + unit]
+    return CanopyHeight(float(tops[best]), float(inside[-1] - inside[0]) / 2.0 + 0.0005, len(columns), "")
+
+
+LeastSquares = tuple[Array, Array, Array]  # within, slope, chi-square for each given top, each (tops,)
+
+
+def _rise(column: Column, tops: Array) -> Array:
+    return np.log(np.maximum(column.height / tops[:, None], 1.0))
+
+
+def _through_zero(column: Column, tops: Array) -> LeastSquares:
+    rise, weight = _rise(column, tops), column.standard_error**-2
+    slope = (rise * weight) @ column.velocity / np.maximum((rise**2) @ weight, 1e-300)
+    misfit = ((column.velocity - slope[:, None] * rise) ** 2) @ weight
+    return np.zeros(len(tops)), slope, misfit
+
+
+def _with_offset(column: Column, tops: Array) -> LeastSquares:
+    rise, weight = _rise(column, tops), column.standard_error**-2
+    share = weight / weight.sum()
+    mean_rise, mean_velocity = rise @ share, column.velocity @ share
+    rise_off, velocity_off = rise - mean_rise[:, None], column.velocity - mean_velocity
+    slope = (rise_off * weight) @ velocity_off / np.maximum((rise_off**2) @ weight, 1e-300)
+    misfit = ((velocity_off - slope[:, None] * rise_off) ** 2) @ weight
+    return mean_velocity - slope * mean_rise, slope, misfit
+
+
+def _fit(
+    column: Column, tops: Array, solve: Callable[[Column, Array], LeastSquares], within_free: bool
+) -> ProfileFit | None:
+    if len(column.height) < FEWEST_POINTS:
+        return None
+    withins, slopes, misfits = solve(column, tops)
+    best = int(np.argmin(misfits))
+    within, slope, top = float(withins[best]), float(slopes[best]), float(tops[best])
+    free = [0, 1, 2] if within_free else [1, 2]
+    scatter = float(np.sqrt(max(misfits[best] / (len(column.height) - len(free)), 1.0)))
+    rise = np.log(np.maximum(column.height / top, 1.0))
+    jacobian = np.column_stack([np.ones_like(rise), rise, np.where(rise > 0.0, -slope / top, 0.0)])[:, free]
+    jacobian = jacobian / column.standard_error[:, None]
+    covariance = np.zeros((3, 3))
+    covariance[np.ix_(free, free)] = np.linalg.pinv(jacobian.T @ jacobian) * scatter**2
+    if slope < CLEAR * np.sqrt(covariance[1, 1]):
+        return None
+    return ProfileFit(within, slope, top, covariance, scatter)

@@ -1,0 +1,209 @@
+"""Figures of a diagnosis: which there are, captions that state the finding, and all of it on one screen."""
+
+import html
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure, FigureBase, SubFigure
+
+from vegglue.case.schema import Case
+from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones, paint_places, paint_zones
+from vegglue.figures.plan_view import Outline
+from vegglue.figures.style import Picture, save, styled
+from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
+from vegglue.figures.typography import count, fixed, short
+from vegglue.report.diagnosis_words import added, error_of, first_score, last_score, ranked, standing_of
+from vegglue.report.run import Run, picture
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.screening.score_test import alike_groups
+from vegglue.site.polygons import corners_of
+
+# Effects drawn at once, and sections side by side.
+SECTIONS_DRAWN, PANELS_ACROSS = 16, 4
+
+
+def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
+    """All figures of a diagnosis, written to run.folder/figures: those as wide as the page, and the others."""
+    wide = [*_suspects(run, diagnosis), *_profiles(run, diagnosis), *_places(run, diagnosis)]
+    return {"wide": wide, "narrow": [*_zones(run, diagnosis), *_alike(run, diagnosis), *_gauges(run, diagnosis)]}
+
+
+def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
+    """Write the whole diagnosis as one screen, PNG or SVG by the ending of `path`."""
+    save(draw_diagnosis(diagnosis, _outlines(case)), path, dots_per_inch=130)
+
+
+def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str, path: Path) -> None:
+    """Write what one unit of an effect changes at the stations, trace (station,); PNG or SVG by its ending."""
+    save(draw_fingerprint(trace, station, unit), path)
+
+
+@styled
+def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
+    """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
+    figure = Figure(figsize=(14, 8.6), layout="constrained")
+    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict}. {diagnosis.sentence}", 150)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+    upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
+    suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
+    scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
+    paint_suspects(scores, visible, _table(diagnosis), diagnosis.threshold)
+    paint_alike(alike.subplots(), diagnosis.cosine_names, diagnosis.cosine)
+    if len(diagnosis.zones):
+        paint_zones(zones.subplots(), diagnosis.zones)
+    if diagnosis.map_x.size:
+        place = lower.subplots()
+        paint_places(place, *_map(diagnosis), patches, _stations(diagnosis))
+    return figure
+
+
+def _split(figure: FigureBase, rows: int, columns: int, **ratios: Any) -> list[SubFigure]:
+    return list(np.ravel(np.array(figure.subfigures(rows, columns, **ratios), object)))
+
+
+def _table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """The strongest suspects and every one that is accepted or a rival, the strongest first."""
+    order = sorted(ranked(diagnosis), key=lambda one: -abs(np.nan_to_num(first_score(diagnosis, one))))
+    drawn = [one for k, one in enumerate(order) if k < SECTIONS_DRAWN or one.name in diagnosis.set]
+    rows = [
+        {"name": one.name, "status": standing_of(diagnosis, one), "first": first_score(diagnosis, one),
+         "left": last_score(diagnosis, one), "visibility": one.visibility}
+        for one in drawn
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=["name", "status", "first", "left", "visibility"])
+
+
+def _with_predictions(diagnosis: Diagnosis) -> pd.DataFrame:
+    return diagnosis.station.assign(
+        prediction_first=diagnosis.prediction_first, prediction=diagnosis.prediction, error=diagnosis.error
+    )
+
+
+def _stations(diagnosis: Diagnosis) -> np.ndarray:
+    return diagnosis.station[["x", "y"]].drop_duplicates().to_numpy(float)
+
+
+def _map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
+    where = diagnosis.where
+    found = None if where is None else (where.x, where.y)
+    return diagnosis.map_x, diagnosis.map_y, diagnosis.map_score, found
+
+
+def _outlines(case: Case) -> list[Outline]:
+    return [Outline(patch.name, corners_of(patch)) for patch in case.plants.patches]
+
+
+def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    table = _table(diagnosis)
+    if table.empty:
+        return
+    out = sum(abs(first_score(diagnosis, one)) > diagnosis.threshold for one in diagnosis.suspects)
+    left = [last_score(diagnosis, one) for one in diagnosis.suspects]
+    caption = (
+        f"<b>Suspects.</b> Of {count(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
+        f"errors alone seldom do ({fixed(diagnosis.threshold, 1)} standard errors, dashed)"
+    )
+    if diagnosis.steps:
+        still = int(np.sum(np.abs(np.nan_to_num(left)) > diagnosis.threshold))
+        after = f"{still} still {'does' if still == 1 else 'do'}" if still else "none does any more"
+        caption += f"; with {html.escape(added(diagnosis))} added, {after} (rings)"
+    caption += ". Visibility: the share of its trace that no change of the calibrated parameters can mimic."
+    alt = "Effects ranked by score: " + ", ".join(
+        f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
+    )
+    yield picture(run, draw_suspects(table, diagnosis.threshold), "missing-suspects", caption, alt)
+
+
+def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    stations = _with_predictions(diagnosis)
+    velocity = stations[stations["kind"] == "velocity"]
+    sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
+    names = added(diagnosis)
+    before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
+    told = f"The model misses the velocities by {short(after, 2)} m/s (root mean square)"
+    if names:
+        told = f"With {html.escape(names)} the error falls from {short(before, 2)} to {short(after, 2)} m/s"
+    for start in range(0, len(sections), PANELS_ACROSS):
+        shown = stations[stations["section"].isin(sections[start : start + PANELS_ACROSS])]
+        part = f"sections {sections[start]} to {sections[min(start + PANELS_ACROSS, len(sections)) - 1]}"
+        caption = (
+            f"<b>Where it fails, {html.escape(part)}.</b> {told}. Below each section what is left, in standard errors; "
+            f"shaded: what errors alone seldom leave."
+        )
+        figure = draw_profiles(shown, names, diagnosis.flagged)
+        yield picture(
+            run, figure, f"missing-profiles-{start // PANELS_ACROSS + 1}", caption, f"Velocities of {part}. {told}."
+        )
+
+
+def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    stations = _with_predictions(diagnosis)
+    if not (stations["kind"] == "level").any():
+        return
+    before, after = (
+        1000 * error_of(diagnosis, each, "level") for each in (diagnosis.prediction_first, diagnosis.prediction)
+    )
+    told = f"{short(after, 2)} mm"
+    if diagnosis.steps:
+        told = f"{short(before, 2)} mm before (hollow) and {told} with {html.escape(added(diagnosis))} (full)"
+    caption = f"<b>Gauges.</b> The model misses the levels by {told} (root mean square)."
+    yield picture(run, draw_gauges(stations, added(diagnosis)), "missing-gauges", caption, f"Gauges: {told}.")
+
+
+def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    if not diagnosis.map_x.size:
+        return
+    where = diagnosis.where
+    if where is not None:
+        given = f"With {html.escape(added(diagnosis))} in the model, a" if diagnosis.steps else "A"
+        told = (
+            f"{given} spot of drag at x = {fixed(where.x, 1)} m, y = {fixed(where.y, 1)} m would explain most "
+            f"({fixed(abs(where.score), 1)} standard errors); {html.escape(', '.join(where.experiments))} point at it"
+        )
+    elif diagnosis.steps:
+        told = f"Before {html.escape(added(diagnosis))} is added; no place explains as much as that does"
+    else:
+        told = "No place stands out more than errors alone make it"
+    caption = (
+        f"<b>Where a spot of drag would help</b>, y stretched. {told}. Green: patches; dots: stations; full lines: "
+        "more drag would help, dashed: less."
+    )
+    figure = draw_places(*_map(diagnosis), _outlines(run.case), _stations(diagnosis))
+    yield picture(run, figure, "missing-places", caption, f"Plan of the channel. {told}.")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    zones = diagnosis.zones
+    if zones.empty:
+        return
+    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
+    worst = zones.iloc[int(np.argmax(size))]
+    told = (
+        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(float(size.max()), 1)} standard "
+        "errors, where errors alone make 1"
+    )
+    caption = (
+        f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(told)}. Small: the mean in its "
+        "own standard errors; squares are full where more was measured than modelled, hollow where less."
+    )
+    yield picture(run, draw_zones(zones), "missing-zones", caption, f"Misfit by section and zone. {told}.")
+
+
+def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    if len(diagnosis.cosine_names) < 2:
+        return
+    families = [group for group in alike_groups(diagnosis.cosine_names, diagnosis.cosine) if len(group) > 1]
+    told = "No two of the strongest suspects leave the same trace"
+    if families:
+        told = f"These data cannot tell apart {'; nor '.join(_listed(group) for group in families)}"
+    caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(told)}."
+    figure = draw_alike(diagnosis.cosine_names, diagnosis.cosine)
+    yield picture(run, figure, "missing-alike", caption, f"Cosines between traces of effects. {told}.")

@@ -1,0 +1,75 @@
+"""Figures of a run that show the flow of the median parameters; captions state the finding."""
+
+import html
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from vegglue.figures.plan_view import Gauges, Outline, draw_plan, draw_reach, wet_window
+from vegglue.figures.style import Picture
+from vegglue.figures.typography import fixed, short
+from vegglue.flow.sensor import FlowFields
+from vegglue.report.run import Run, picture, planted
+from vegglue.site.polygons import corners_of
+
+REACH_MARGIN = 8.0  # m, shown beyond the outermost patch and station
+
+
+def plans(run: Run, experiment: str) -> Iterator[Picture]:
+    """The reach of patches and stations at true scale, and the whole channel."""
+    flow, table = run.flow[experiment], run.observations.table
+    rows = table[table["experiment"] == experiment]
+    stations = rows[["x", "y"]].drop_duplicates().to_numpy(float)
+    patches = _outlines(run, experiment)
+    places = np.concatenate([stations[:, 0], *[outline.corners[:, 0] for outline in patches]])
+    if len(places):
+        start, end = places.min() - REACH_MARGIN, places.max() + REACH_MARGIN
+        reach = max(float(flow.x[0]), start), min(float(flow.x[-1]), end)
+        figure = draw_reach(flow, wet_window(flow, reach), patches, stations)
+        alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
+        yield picture(run, figure, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
+    figure = draw_plan(flow, patches, stations, _gauges(run, rows[rows["kind"] == "level"]))
+    alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
+    yield picture(run, figure, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
+
+
+def _outlines(run: Run, experiment: str) -> list[Outline]:
+    present = np.unique(run.site.patch[planted(run, experiment)])
+    patches = [run.case.plants.patches[index] for index in present]
+    return [Outline(patch.name, corners_of(patch)) for patch in patches]
+
+
+def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str:
+    flow, plants = run.flow[experiment], planted(run, experiment)
+    speed = np.hypot(flow.u, flow.v)
+    inside = ((flow.x >= reach[0]) & (flow.x <= reach[1]))[:, None] & np.isfinite(speed)
+    moves = ""
+    ground = np.isin(run.site.friction_class, np.unique(run.site.friction_class[plants]))
+    if (plants & inside).any():
+        among, beside = speed[plants & inside].mean(), speed[~plants & inside & ground].mean()
+        moves = (
+            f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
+        )
+    return (
+        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, at true scale, median "
+        f"parameters.{moves} Between two streamlines flows a tenth of the discharge; dots are stations."
+    )
+
+
+def _channel_caption(flow: FlowFields, experiment: str) -> str:
+    wet = np.isfinite(flow.depth).any(axis=1)
+    level, depth = np.nanmean(flow.level[wet], axis=1), np.nanmax(flow.depth[wet], axis=1)
+    return (
+        f"<b>The whole channel, experiment {html.escape(experiment)}</b> (y stretched): the water level falls "
+        f"{fixed(level[0] - level[-1], 2)} m over {np.ptp(flow.x[wet]):.0f} m, the greatest depth goes from "
+        f"{fixed(depth[0], 2)} to {fixed(depth[-1], 2)} m."
+    )
+
+
+def _gauges(run: Run, levels: pd.DataFrame) -> Gauges | None:
+    if levels.empty:
+        return None
+    low, high = run.posterior.model_band[[0, -1]][:, levels.index.to_numpy()]
+    x, value, error = (levels[column].to_numpy(float) for column in ("x", "value", "standard_error"))
+    return Gauges(x, value, error, low, high)

@@ -1,0 +1,145 @@
+"""The first lines of the page: one verdict, a few numbers, and the words that other parts of the page share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from vegglue.case.schema import Case
+from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
+from vegglue.inference.likelihood import root_mean_square
+from vegglue.report.posterior_words import CLAIMED_FROM, how_known
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+from vegglue.solver.status import FAILED
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """One number of the summary (HTML): what it is, the number, what to think of it."""
+
+    name: str
+    value: str
+    remark: str
+
+
+def verdict_of(case: Case, posterior: Posterior) -> str:
+    """The one sentence on top: what is known now, and how well the model does."""
+    if posterior.effective_size < CLAIMED_FROM:
+        size = max(posterior.effective_size, 1.0)
+        few = f"the weights are worth {size:.0f} of {posterior.members:,} members, too few to say what is identified"
+        return f"A first look only: {few}. {_how_well(posterior)}"
+    known = [name for name in posterior.parameters if posterior.identified[name]]
+    unknown = [name for name in posterior.parameters if not posterior.identified[name]]
+    by = f"by these {count(posterior.used, 'station')}"
+    sentence = f"{_in_a_list(case, known)} {_are(known)} identified {by}" if known else f"Nothing is identified {by}"
+    if unknown:
+        sentence += f"; {_in_a_list(case, unknown)} {_are(unknown)} not"
+    return f"{sentence}. {_how_well(posterior)}"
+
+
+def _how_well(posterior: Posterior) -> str:
+    kind = next(iter(posterior.rmse))
+    error, miss = measurement_error(posterior, kind), posterior.rmse[kind]
+    missed = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
+    if not np.isfinite(error):
+        return f"{missed}; their own error is not known."
+    if unexplained_error(posterior, kind, miss):
+        return f"{missed}, {short(miss / error, 2)} times their own error."
+    return f"{missed}, as much as their own error of {with_unit(error, kind)} explains."
+
+
+def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
+    """Four to six numbers for the first screen."""
+    parameters = [
+        KeyNumber(symbol(case, name), estimate(posterior, name), _remark(posterior, name))
+        for name in posterior.parameters[:4]
+    ]
+    kind = next(iter(posterior.sigma))
+    error = measurement_error(posterior, kind)
+    against = f"measurement error {with_unit(error, kind)}" if np.isfinite(error) else "measurement error unknown"
+    sigma = KeyNumber(f"residual <var>σ</var> ({kind})", with_unit(posterior.sigma[kind], kind), against)
+    size = KeyNumber("effective members", f"{posterior.effective_size:,.0f}", f"of {posterior.members:,}")
+    return [*parameters, sigma, size]
+
+
+def _remark(posterior: Posterior, name: str) -> str:
+    side = pressed_side(posterior, name)
+    if side:
+        return f"presses against its {side} bound"
+    return f"{how_known(posterior, name)}: {percent(posterior.width_ratio[name])} of the prior width"
+
+
+def _in_a_list(case: Case, names: list[str]) -> str:
+    symbols = [symbol(case, name) for name in names]
+    return symbols[0] if len(symbols) == 1 else f"{', '.join(symbols[:-1])} and {symbols[-1]}"
+
+
+def _are(names: list[str]) -> str:
+    return "is" if len(names) == 1 else "are"
+
+
+# Chance below which a misfit is no chance any more.
+SELDOM = 1e-3
+
+
+def symbol(case: Case, name: str) -> str:
+    """How a parameter is written on the page."""
+    return symbol_html(case.parameters[name].symbol or name)
+
+
+def as_power(posterior: Posterior, name: str) -> bool:
+    """Whether a parameter is told as a power of ten: looked at in log10, over more than a decade of its prior."""
+    low, high = posterior.prior_quantiles[name][[0, -1]]
+    return name in posterior.log10_median and high > 10 * low
+
+
+def estimate(posterior: Posterior, name: str) -> str:
+    """Median ± standard deviation, as a power of ten where as_power says so (HTML, with unit)."""
+    unit = unit_html(posterior.unit[name])
+    unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
+    if as_power(posterior, name):
+        power = plus_minus(posterior.log10_median[name], posterior.log10_sd[name])
+        return f"10<sup>{power}</sup>{unit}"
+    return plus_minus(posterior.median[name], posterior.sd[name]) + unit
+
+
+def plant_parameter(case: Case) -> str | None:
+    """The parameter that is phi of a stand growing in a patch, if there is one."""
+    stands = [case.plants.stands[patch.stand] for patch in case.plants.patches]
+    return next((stand.phi for stand in stands if isinstance(stand.phi, str)), None)
+
+
+def measurement_error(posterior: Posterior, kind: str) -> float:
+    """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
+    station = posterior.station
+    error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
+    return root_mean_square(error)
+
+
+def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
+    """Whether a root mean square misfit is larger than the errors of its stations allow, by chance once in 1,000.
+
+    Where the posterior knows how its errors hang together, its own chance of the misfit counts as well.
+    """
+    used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
+    count = max(int(used.sum()), 1)
+    error, refinement = measurement_error(posterior, kind), posterior.refinement
+    doubted = refinement is not None and refinement.errors == "stated" and refinement.p_misfit < SELDOM
+    return miss > error * float(np.sqrt(scipy.stats.chi2.isf(SELDOM, count) / count)) or (doubted and miss > error)
+
+
+def pressed_side(posterior: Posterior, name: str) -> str:
+    """'upper' or 'lower', the bound of its prior a parameter presses against, or ''."""
+    low, high = posterior.bound_hit[name]
+    return "upper" if high else "lower" if low else ""
+
+
+def with_unit(value: float, kind: str) -> str:
+    """A residual or error of a kind of measurement with its unit."""
+    return f"{short(value, 2)}{NARROW}{'m' if kind == 'level' else 'm/s'}"
+
+
+def largest_mass_error(ensemble: Ensemble) -> float:
+    """Largest |Q/Q_in - 1| of the solved members [-]."""
+    return float(np.max(ensemble.mass_error[ensemble.status != FAILED]))

@@ -1,0 +1,190 @@
+"""Figures of a run that show measurements: sections, residuals, verticals, discharge; captions state the finding."""
+
+import html
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from vegglue.figures.measured import (
+    Bands,
+    SectionDrawing,
+    Vertical,
+    draw_canopy_profiles,
+    draw_discharge,
+    draw_quantiles,
+    draw_residuals,
+    draw_section,
+    draw_verticals,
+)
+from vegglue.figures.style import Picture
+from vegglue.figures.typography import NARROW, count, fixed, plus_minus, short
+from vegglue.inference.glue import member_weights
+from vegglue.inference.likelihood import fit_members
+from vegglue.inference.weighted_statistics import weighted_quantile
+from vegglue.measurements.observations import fitted_curve
+from vegglue.report.key_numbers import measurement_error
+from vegglue.report.run import Run, patches_drawn, picture, zones
+from vegglue.results.posterior import Posterior
+
+
+def sections(run: Run) -> Iterator[Picture]:
+    """Measured against modelled across each section of each experiment (the paper's Fig. 7)."""
+    velocity = run.observations.table[run.observations.table["kind"] == "velocity"]
+    for (experiment, section), rows in velocity.groupby(["experiment", "section"], sort=False):
+        yield _section(run, str(experiment), str(section), rows)
+
+
+def _bands(posterior: Posterior, rows: NDArray[np.intp]) -> Bands:
+    model, total = posterior.model_band[:, rows], posterior.total_band[:, rows]
+    return Bands(model[2], (model[1], model[3]), (model[0], model[4]), (total[0], total[4]))
+
+
+def _section(run: Run, experiment: str, section: str, rows: pd.DataFrame) -> Picture:
+    index = rows.index.to_numpy()
+    bands = _bands(run.posterior, index)
+    below = _below(run, experiment, float(rows["x"].mean()))
+    figure = draw_section(rows.reset_index(drop=True), bands, below)
+    used = rows["used"].to_numpy(bool)
+    value = rows["value"].to_numpy()
+    inside = [
+        int(np.sum(used & (value >= low) & (value <= high)))
+        for low, high in (bands.model_50, bands.model_95, bands.total_95)
+    ]
+    worst = int(np.argmax(np.where(used, np.abs(run.posterior.residual[index]), -1)))
+    caption = (
+        f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>, x = {rows['x'].mean():g} m. "
+        f"Of {count(int(used.sum()), 'station')} used, {inside[0]} lie in the 50{NARROW}% and {inside[1]} in the "
+        f"95{NARROW}% range of the model, {inside[2]} in that with residual error (dashed). Largest departure "
+        f"{fixed(run.posterior.residual[index][worst], 3)} m/s at y = {rows['y'].iloc[worst]:g} m."
+    )
+    alt = f"Velocity across section {section} of {experiment}: measured points over the modelled 50 and 95 % bands."
+    return picture(run, figure, f"section-{experiment}-{section}", caption, alt)
+
+
+def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
+    if experiment not in run.flow:
+        return None
+    flow = run.flow[experiment]
+    column = int(np.argmin(np.abs(flow.x - x)))
+    plants, canopy = patches_drawn(run, experiment), np.full(len(flow.y), np.nan)
+    here = plants.column == column
+    canopy[plants.row[here]] = flow.bed[column, plants.row[here]] + plants.canopy_height[here, 0]
+    return SectionDrawing(flow.y, flow.bed[column], canopy, flow.level[column])
+
+
+def residuals(run: Run) -> Iterator[Picture]:
+    """Residuals of each kind by zone, velocities across and levels along the channel, and against normal quantiles."""
+    table, posterior = run.observations.table, run.posterior
+    used = table["used"].to_numpy(bool)
+    zone = np.array(zones(run))
+    for kind in posterior.sigma:
+        rows = np.flatnonzero(used & (table["kind"] == kind).to_numpy())
+        residual, where = posterior.residual[rows], zone[rows]
+        means = {str(name): residual[where == name] for name in dict.fromkeys(where)}
+        told = "; ".join(
+            f"{html.escape(name)} {fixed(part.mean(), 3)} ± {fixed(part.std(), 3)}" for name, part in means.items()
+        )
+        unit, axis = ("m", "x") if kind == "level" else ("m/s", "y")
+        figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit)
+        caption = f"Measured minus median prediction, {kind}, by zone (mean ± spread, {unit}): {told}."
+        yield picture(run, figure, f"residuals-{kind}", caption, f"Residuals of {kind} along {axis}, by zone. {told}")
+        score = residual / posterior.noise[rows]
+        worst = int(np.argmax(np.abs(score)))
+        names = [
+            f"{table['section'][row] or table['experiment'][row]}, {axis} = {table[axis][row]:g} m" for row in rows
+        ]
+        caption = (
+            f"Residuals of {kind} over the error assumed, σ = {short(posterior.sigma[kind], 2)} {unit}: "
+            f"the largest is {fixed(score[worst], 1)} at {html.escape(names[worst])}."
+        )
+        known = measurement_error(posterior, kind)
+        if np.isfinite(known) and posterior.sigma_rule != "known":
+            caption += f" The standard errors of the data are {short(known, 2)} {unit}."
+        figure = draw_quantiles(score, names)
+        yield picture(
+            run, figure, f"quantiles-{kind}", caption, f"Ordered residuals of {kind} against normal quantiles."
+        )
+
+
+def verticals(run: Run) -> Iterator[Picture]:
+    """All verticals of each ADV section, and those inside plants with the canopy height (the paper's Fig. 3)."""
+    observations = run.observations
+    if observations.profiles.empty:
+        return
+    for key, rows in observations.profiles.groupby(["experiment", "section"], sort=False):
+        experiment, section = map(str, key)
+        points = observations.points
+        here = points[(points["experiment"] == experiment) & (points["section"] == section)]
+        drawn = [_vertical(row, here[here["y"] == row["y"]]) for _, row in rows.iterrows()]
+        found = observations.canopy_height.get((experiment, section))
+        canopy = (found.value, found.standard_error) if found is not None and np.isfinite(found.value) else None
+        name = f"{experiment}-{section}"
+        where = f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>"
+        inside = [vertical for vertical in drawn if vertical.planted]
+        caption = f"{where}: {count(len(here), 'point')} in {count(len(rows), 'vertical')}, each drawn where it stands, with the profile fitted to it; z in the datum of the file."  # noqa: E501
+        alt = f"Point velocities over height in the verticals of section {section}."
+        yield picture(run, draw_verticals(drawn, canopy, _stretch(drawn)), f"verticals-{name}", caption, alt)
+        if inside:
+            height = f"The canopy reads {plus_minus(*canopy)} m high" if canopy else "No canopy top shows"
+            caption = (
+                f"{where}, inside the plants at y = {', '.join(f'{vertical.y:g}' for vertical in inside)} m. {height}."
+            )
+            figure = draw_canopy_profiles(inside, canopy)
+            yield picture(run, figure, f"canopy-{name}", caption, "Velocity against height inside the plants.")
+
+
+def _vertical(profile: pd.Series, points: pd.DataFrame) -> Vertical:
+    fit = fitted_curve(profile)
+    height = points["height"].to_numpy()
+    curve = np.linspace(0.0, profile["depth"], 60) if fit is not None else height
+    velocity = fit.velocity(curve) if fit is not None else points["u"].to_numpy()
+    used = points["used"].to_numpy(bool)
+    return Vertical(
+        profile["y"],
+        profile["bed"],
+        profile["depth"],
+        bool(profile["plants"]),
+        height,
+        points["u"].to_numpy(),
+        used,
+        curve,
+        velocity,
+    )
+
+
+def _stretch(verticals: list[Vertical]) -> float:
+    """Metres drawn for 1 m/s: the fastest point reaches one and a half distances between verticals."""
+    y = np.sort([vertical.y for vertical in verticals])
+    spacing = float(np.median(np.diff(y))) if len(y) > 1 else 1.0
+    return 1.5 * spacing / max(float(vertical.velocity.max()) for vertical in verticals)
+
+
+def weights_of_ensemble(run: Run) -> np.ndarray:
+    """Of the members that were simulated, also where the posterior was drawn anew."""
+    if run.posterior.method == "glue":
+        return run.posterior.weights
+    fit = fit_members(run.ensemble, run.posterior.station, run.posterior.sigma_rule)
+    return member_weights(fit, "gaussian", -np.inf)
+
+
+def discharges(run: Run) -> Iterator[Picture]:
+    """Discharge by each rule beside what the model let through, for each ADV section."""
+    sections = [name for name, _ in run.ensemble.sections]
+    for (experiment, section), rules in run.observations.discharge.items():
+        if section not in sections:
+            continue
+        through = run.ensemble.section_flow[:, run.ensemble.experiments.index(experiment), sections.index(section)]
+        spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])
+        names = {"paper": "paper’s rule", "profile": "profile fit"}
+        rows = [(names.get(rule, rule), found.value, found.standard_error) for rule, found in rules.items()]
+        told = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)
+        figure = draw_discharge(rows, (float(spread[0]), float(spread[1]), float(spread[2])))
+        caption = (
+            f"<b>Discharge through {html.escape(section)}, experiment {html.escape(experiment)}</b>: {told}; "
+            f"the model lets {fixed(spread[1], 2)} m³/s through."
+        )
+        yield picture(
+            run, figure, f"discharge-{experiment}-{section}", caption, f"Discharge through {section}: {told}."
+        )

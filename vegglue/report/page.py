@@ -1,0 +1,93 @@
+"""One run as one page: a self-contained HTML file that needs no network, and the figures beside it as files."""
+
+import os
+from pathlib import Path
+
+import jinja2
+
+from vegglue.case.resolved_config import resolved_yaml
+from vegglue.case.schema import Case
+from vegglue.errors import StorageError
+from vegglue.figures.style import palette_css
+from vegglue.flow.sensor import FlowFields
+from vegglue.measurements.observations import Observations
+from vegglue.measurements.plant_survey import RigidCylinder
+from vegglue.report.diagnosis_pictures import diagnosis_pictures
+from vegglue.report.diagnosis_words import diagnosis_in_words
+from vegglue.report.findings import findings
+from vegglue.report.key_numbers import key_numbers, verdict_of
+from vegglue.report.pictures import pictures
+from vegglue.report.run import Run, is_synthetic
+from vegglue.report.tables import facts, failures, health, members, other_rows, parameter_rows, station_rows
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+from vegglue.site.gridded_site import build_site
+
+
+def write_report(
+    run: Path,
+    case: Case,
+    observations: Observations,
+    ensemble: Ensemble,
+    posterior: Posterior,
+    flow: dict[str, FlowFields],
+    survey: RigidCylinder | None,
+    diagnosis: Diagnosis | None,
+) -> Path:
+    """Write run/report.html and run/figures/*.svg and *.png; returns the page.
+
+    flow: the member of the median parameters, by experiment; what is not given is left out of the page.
+    survey: the rigid-cylinder estimate of plant drag, where there is one; diagnosis: of this very case, if any.
+    Errors: StorageError when a file cannot be written.
+    """
+    everything = Run(run, case, build_site(case), observations, ensemble, posterior, flow, survey, diagnosis)
+    path = run / "report.html"
+    try:
+        page = render(everything)
+        path.with_name("report.html.new").write_text(page, encoding="utf-8")
+        os.replace(path.with_name("report.html.new"), path)
+    except OSError as error:
+        raise StorageError(f"{path}: the report cannot be written ({error}); make room and run it again.") from error
+    return path
+
+
+def render(run: Run) -> str:
+    """The whole page as text; writes the figures as files on the way."""
+    light, dark = palette_css()
+    stations = station_rows(run)
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            light=light,
+            dark=dark,
+            case=run.case,
+            synthetic=is_synthetic(run.case),
+            verdict=verdict_of(run.case, run.posterior),
+            numbers=key_numbers(run.case, run.posterior),
+            findings=findings(run),
+            missing=None if run.diagnosis is None else diagnosis_in_words(run.diagnosis),
+            missing_pictures={} if run.diagnosis is None else diagnosis_pictures(run, run.diagnosis),
+            parameters=parameter_rows(run),
+            others=other_rows(run),
+            pictures=pictures(run),
+            stations=stations,
+            flagged=[row for row in stations if row.reason],
+            members=members(run.ensemble),
+            failures=failures(run.ensemble),
+            health=list(health(run)),
+            facts=list(facts(run)),
+            config=resolved_yaml(run.case),
+        )
+    )
+
+
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

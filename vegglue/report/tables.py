@@ -1,0 +1,257 @@
+"""The tables of a report: parameters beside the values of others, stations, health of the run, how it was made."""
+
+import html
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
+from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, symbol
+from vegglue.report.posterior_words import how_known
+from vegglue.report.run import Run, zones
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import CorrectedCanopy
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
+
+SHORTLY = {"identified": "yes", "not identified": "no"}
+STATUS = {
+    SOLVED_BY_NEWTON: "solved by Newton's method",
+    SOLVED_BY_MARCHING: "solved by marching in time",
+    FAILED: "failed",
+}
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What another study has, our difference from it, what a synthetic record was made with, and the same (HTML)."""
+
+    study: str = "–"
+    from_study: str = "–"
+    known: str = "–"
+    from_known: str = "–"
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One line of the table of parameters (HTML)."""
+
+    symbol: str
+    meaning: str
+    prior: str
+    posterior: str
+    span: str
+    known: str
+    beside: _Beside
+
+
+@dataclass(frozen=True)
+class OtherRow:
+    """One line more of the table of parameters (text)."""
+
+    symbol: str
+    meaning: str
+    value: str
+    unit: str
+    study: str
+
+
+@dataclass(frozen=True)
+class StationRow:
+    """One line of the table of stations (text)."""
+
+    experiment: str
+    section: str
+    kind: str
+    x: str
+    y: str
+    zone: str
+    measured: str
+    modelled: str
+    residual: str
+    score: str
+    reason: str
+
+
+def parameter_rows(run: Run) -> list[ParameterRow]:
+    """One row for each parameter, and one for a phi corrected to another canopy height, which then is compared."""
+    posterior, canopy = run.posterior, run.posterior.canopy
+    rows = []
+    for name in posterior.parameters:
+        logarithmic = as_power(posterior, name)
+        centre = posterior.log10_median[name] if logarithmic else posterior.median[name]
+        sd = posterior.log10_sd[name] if logarithmic else posterior.sd[name]
+        beside = _Beside() if canopy and canopy.parameter == name else _beside(run, name, centre, sd)
+        rows.append(_parameter_row(run, name, beside))
+    if canopy is not None:
+        beside = _beside(run, canopy.parameter, canopy.log10_median, canopy.log10_sd)
+        rows.append(_corrected_row(run.case, canopy, beside))
+    return rows
+
+
+def _parameter_row(run: Run, name: str, beside: _Beside) -> ParameterRow:
+    posterior = run.posterior
+    low, high = posterior.quantiles[name][[0, -1]]
+    bound = " and ".join(side for side, hit in zip(("lower", "upper"), posterior.bound_hit[name], strict=True) if hit)
+    answer = how_known(posterior, name)
+    known = f"{SHORTLY.get(answer, answer)}, {percent(posterior.width_ratio[name])}"
+    return ParameterRow(
+        symbol(run.case, name),
+        html.escape(run.case.parameters[name].meaning),
+        _prior(run, name),
+        estimate(posterior, name),
+        f"{short(low)} to {short(high)}",
+        known + (f", at {bound} bound" if bound else ""),
+        beside,
+    )
+
+
+def _corrected_row(case: Case, canopy: CorrectedCanopy, beside: _Beside) -> ParameterRow:
+    low, high = canopy.quantiles[[0, -1]]
+    return ParameterRow(
+        symbol(case, canopy.parameter),
+        f"corrected from a canopy of {canopy.from_height:g} m to one of {canopy.to_height:g} m",
+        "",
+        f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>",
+        f"{short(low)} to {short(high)}",
+        "",
+        beside,
+    )
+
+
+def _prior(run: Run, name: str) -> str:
+    prior, (low, high) = run.case.parameters[name], run.posterior.bounds[name]
+    words = {"uniform": "uniform", "loguniform": "log-uniform", "normal": "normal", "lognormal": "log-normal"}
+    if prior.distribution in ("uniform", "loguniform"):
+        return f"{words[prior.distribution]}, {as_given(low)} to {as_given(high)}"
+    low, high = run.posterior.prior_quantiles[name][[0, -1]]
+    return f"{words[prior.distribution]}, 95{NARROW}% in {short(low)} to {short(high)}"
+
+
+def _stated(run: Run, name: str) -> tuple[float, float] | None:
+    """Median and standard deviation another study gives, on the scale the parameter is looked at."""
+    table = run.case.reference.table if run.case.reference else {}
+    stated = table.get(f"log10_{name}" if as_power(run.posterior, name) else name)
+    return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
+
+
+def _beside(run: Run, name: str, centre: float, sd: float) -> _Beside:
+    """What others have for a parameter, and how far off `centre` ± `sd` lies (log10 where it is looked at so).
+
+    From another study in the standard deviations of both together; from known values in our own and in the study's.
+    """
+    logarithmic = as_power(run.posterior, name)
+    stated, known = _stated(run, name), (run.case.reference.made_with if run.case.reference else {}).get(name)
+    study = from_study = known_value = from_known = "–"
+    if stated is not None:
+        study = f"10<sup>{as_given(*stated)}</sup>" if logarithmic else as_given(*stated)
+        from_study = f"{fixed((centre - stated[0]) / np.hypot(sd, np.nan_to_num(stated[1])), 1)} sd"
+    if known is not None:
+        off = centre - (np.log10(known) if logarithmic else known)
+        known_value, from_known = as_given(known), f"{fixed(off / sd, 1)} sd"
+        if stated is not None and np.isfinite(stated[1]):
+            from_known += f" ({fixed(off / stated[1], 1)} of the study’s)"
+    return _Beside(study, from_study, known_value, from_known)
+
+
+def other_rows(run: Run) -> list[OtherRow]:
+    """What is no parameter but stands in the same table of the other study: sigma of each kind, number of stations."""
+    stated = run.case.reference.table if run.case.reference else {}
+    study = {key: as_given(value) for key, value in stated.items() if isinstance(value, float)}
+    rows = [
+        OtherRow("σ", f"residual, {kind}", short(value, 2), "m" if kind == "level" else "m/s", study.get("sigma", "–"))
+        for kind, value in run.posterior.sigma.items()
+    ]
+    return [*rows, OtherRow("n", "stations used", str(run.posterior.used), "", study.get("n", "–"))]
+
+
+def station_rows(run: Run) -> list[StationRow]:
+    """All stations, used or not, in the order of the table of observations."""
+    table = run.observations.table.assign(zone=zones(run))
+    return [_station_row(run, index, row) for index, (_, row) in enumerate(table.iterrows())]
+
+
+def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
+    posterior = run.posterior
+    low, middle, high = posterior.model_band[[0, 2, -1], index]
+    measured = f"{fixed(row['value'], 3)} ± {fixed(row['standard_error'], 3)}"
+    return StationRow(
+        str(row["experiment"]),
+        str(row["section"]) or "–",
+        str(row["kind"]),
+        fixed(row["x"], 1),
+        fixed(row["y"], 2),
+        str(row["zone"]),
+        measured,
+        f"{fixed(middle, 3)} ({fixed(low, 3)} to {fixed(high, 3)})",
+        fixed(posterior.residual[index], 3),
+        fixed(posterior.residual[index] / posterior.noise[index], 1),
+        str(row["reason"]),
+    )
+
+
+def members(ensemble: Ensemble) -> list[tuple[str, int, str]]:
+    """How many members ended how, and their share."""
+    counts = [(word, int(np.sum(ensemble.status == number))) for number, word in STATUS.items()]
+    return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
+
+
+def failures(ensemble: Ensemble) -> list[tuple[str, int]]:
+    """The reasons of failed members with their counts, the most frequent first."""
+    reasons = pd.Series(ensemble.reason[ensemble.status == FAILED].astype(str))
+    return [(str(reason), int(number)) for reason, number in reasons.value_counts().items()]
+
+
+def health(run: Run) -> Iterator[tuple[str, str]]:
+    """What tells whether the numbers are to be trusted: a name and a value each."""
+    ensemble, posterior = run.ensemble, run.posterior
+    solved = ensemble.status != FAILED
+    yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
+    yield "effective members", f"{posterior.effective_size:,.0f} of {posterior.members:,}"
+    yield "largest weight", percent(posterior.largest_weight)
+    yield "tail of the weights, k̂", f"{fixed(posterior.pareto_k, 2)} (to be trusted below 0.7)"
+    yield (
+        "iterations of a solved member",
+        f"{np.median(ensemble.iterations[solved]):.0f} (most {ensemble.iterations.max()})",
+    )
+    seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
+    yield "processor time", f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member"
+    for name in posterior.parameters:
+        low, high = posterior.bound_mass[name]
+        yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
+
+
+def _duration(seconds: float) -> str:
+    return (
+        f"{seconds:.0f} s"
+        if seconds < 120
+        else f"{seconds / 60:.0f} min"
+        if seconds < 7200
+        else f"{seconds / 3600:.1f} h"
+    )
+
+
+def facts(run: Run) -> Iterator[tuple[str, str]]:
+    """What the run depends on: a name and a value each."""
+    numerics, infer = run.case.numerics, run.case.infer
+    yield "config", run.case.source.name
+    yield "hash of config and data", case_hash(run.case)[:16]
+    yield "seed", str(run.ensemble.seed)
+    yield "vegglue", run.ensemble.version
+    yield "Python", platform.python_version()
+    yield (
+        "grid",
+        f"{len(run.site.grid.x)} × {len(run.site.grid.y)} cells of {run.site.grid.dx:g} m × {run.site.grid.dy:g} m",
+    )
+    yield (
+        "likelihood",
+        f"{infer.likelihood}, sigma {infer.sigma}, {run.posterior.method}"
+        + (f", members with an efficiency of at least {infer.behavioural:g}" if infer.behavioural is not None else ""),
+    )
+    yield "plants taller than the water is deep", "φ as it is" if numerics.emergent == "constant" else "φ h / h_d"
+    yield "shear acts over", "its point's depth" if numerics.shear_depth is None else "the smallest depth around it"
+    yield "least 12 h / k_s in the bank law", f"{numerics.bank_argument_minimum:g}"

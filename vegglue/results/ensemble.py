@@ -1,0 +1,102 @@
+"""The ensemble: what every member predicted at every station, and how it was solved."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+
+from vegglue.results.fields import FieldWindow
+from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
+from vegglue.solver.status import NOT_YET
+
+VALUE_UNIT = "m/s for velocity, m for level"
+STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is known of an ensemble before its first member is solved."""
+
+    parameters: Mapping[str, np.ndarray]  # (member,) each
+    units: Mapping[str, str]  # of the parameters
+    station: pd.DataFrame  # all rows of observations.table
+    experiments: tuple[str, ...]
+    sections: tuple[tuple[str, float], ...]  # name, x [m]
+    chunks: int  # how many fixed sets of members the run is cut into
+    cut: str  # hash of these sets
+    config: str  # resolved YAML
+    config_hash: str
+    seed: int
+    version: str
+    window: FieldWindow | None = None  # where fields are kept
+
+    @property
+    def members(self) -> int:
+        return len(next(iter(self.parameters.values())))
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """All members of a finished run, failed ones included."""
+
+    parameters: dict[str, np.ndarray]  # (member,) each
+    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]  # NaN for failed members
+    status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]  # one of the four numbers above
+    reason: Annotated[np.ndarray, Stored(("member",), fill=b"", type="S240")]  # '' or a sentence
+    iterations: Annotated[np.ndarray, Stored(("member",), fill=0, type=np.int32)]
+    mass_error: Annotated[np.ndarray, Stored(("member",))]  # largest |Q/Q_in - 1| over sections and experiments
+    seconds: Annotated[np.ndarray, Stored(("member",), "s")]
+    section_flow: Annotated[np.ndarray, Stored(("member", "experiment", "section"), "m3/s")]
+    station: pd.DataFrame
+    experiments: tuple[str, ...]
+    sections: tuple[tuple[str, float], ...]  # name, x [m]
+    config: str
+    config_hash: str
+    seed: int
+    version: str
+
+
+ROWS = stored_fields(Ensemble)  # what is stored of each member
+
+
+def unsolved(header: Header) -> dict[str, Group]:
+    """All groups of an ensemble file, every member 'not solved yet'."""
+    coordinates = {
+        "member": np.arange(header.members),
+        "station": np.arange(len(header.station)),
+        "experiment": np.array(header.experiments, object),
+        "section": np.array([name for name, _ in header.sections], object),
+    }
+    sizes = {dim: len(values) for dim, values in coordinates.items()}
+    rows = {name: _filled(row, sizes) for name, row in ROWS.items()}
+    rows["section_x"] = Variable(("section",), np.array([x for _, x in header.sections], float), "m")
+    parameters = {name: Variable(("member",), values, header.units[name]) for name, values in header.parameters.items()}
+    finished = {"finished": Variable(("chunk",), np.zeros(header.chunks, np.int8))}
+    return {
+        "members": Group(coordinates, rows),
+        "parameters": Group({"member": coordinates["member"]}, parameters),
+        "stations": table_group(header.station, "station", STATION_UNITS),
+        "progress": Group({"chunk": np.arange(header.chunks)}, finished),
+    }
+
+
+def _filled(row: Stored, sizes: Mapping[str, int]) -> Variable:
+    return Variable(row.dims, np.full([sizes[dim] for dim in row.dims], row.fill, row.type), row.unit)
+
+
+def ensemble_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Ensemble:
+    """The ensemble whose file has these groups and attributes."""
+    rows = groups["members"]
+    return Ensemble(
+        parameters={name: values for name, values in groups["parameters"].items() if name != "member"},
+        **{name: rows[name] for name in ROWS},
+        station=pd.DataFrame({name: values for name, values in groups["stations"].items() if name != "station"}),
+        experiments=tuple(rows["experiment"]),
+        sections=tuple(zip(rows["section"].tolist(), rows["section_x"].tolist(), strict=True)),
+        config=str(attributes["config"]),
+        config_hash=str(attributes["config_hash"]),
+        seed=int(attributes["seed"]),
+        version=str(attributes["version"]),
+    )

@@ -1,0 +1,121 @@
+"""Fields kept of every member in a window along x, enough to predict any measurement there without solving again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from vegglue.arrays import Array, Single
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.flow.sensor import between
+from vegglue.results.layout import Group, Stored, Variable, stored_fields
+from vegglue.site.grid import Grid
+
+Quantity = Literal["level", "u", "v"]
+DIMS = ("member", "experiment", "x", "y")
+COMPRESSED_AT_ONCE = 2**20  # [bytes]
+
+
+@dataclass(frozen=True)
+class FieldWindow:
+    """Columns of the grid around a range along x [m]; centres of their cells x (columns,) and y (ny,) [m]."""
+
+    range: tuple[float, float]
+    columns: slice
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Level and depth-averaged velocities at cell centres; NaN where a cell is dry throughout or a member failed."""
+
+    level: Annotated[Single, Stored(DIMS, "m")]
+    u: Annotated[Single, Stored(DIMS, "m/s")]
+    v: Annotated[Single, Stored(DIMS, "m/s")]
+    experiments: tuple[str, ...]
+    x: Array  # centres [m]
+    y: Array
+    range: tuple[float, float]  # along x, what can be predicted [m]
+    config_hash: str  # of the ensemble
+
+
+QUANTITIES = tuple(stored_fields(Fields))  # in the order in which sensor.read_sensors keeps them
+
+
+def window_of(case: Case, grid: Grid) -> FieldWindow | None:
+    """The cells whose centres surround the range the case asks for, None when it asks for none."""
+    if case.simulate.fields is None:
+        return None
+    low, high = case.simulate.fields.x
+    ends, _ = between(np.array([low, high]), grid.x[0], grid.dx, grid.x.size)
+    columns = slice(int(ends[0]), int(ends[1]) + 2)
+    return FieldWindow((low, high), columns, grid.x[columns], grid.y)
+
+
+def megabytes(case: Case, window: FieldWindow) -> float:
+    """members * experiments * 3 * columns * ny * 4 bytes, before compression [MB]."""
+    return case.simulate.members * len(case.experiments) * len(QUANTITIES) * window.x.size * window.y.size * 4e-6
+
+
+def excess(case: Case, grid: Grid) -> str | None:
+    """The sentence for a window larger than its budget, None when all is well."""
+    window = window_of(case, grid)
+    if window is None or (size := megabytes(case, window)) <= case.simulate.field_budget:
+        return None
+    columns = int(window.x.size * case.simulate.field_budget / size)
+    low, high = window.range
+    return (
+        f"`simulate.fields` keeps {size:.4g} MB of {case.simulate.members:,} members, more than the "
+        f"{case.simulate.field_budget:g} MB of `simulate.field_budget`: shorten its {high - low:g} m along x to "
+        f"{max(columns - 2, 0) * grid.dx:g} m, take fewer members, or raise the budget."
+    )
+
+
+def predict_at(fields: Fields, x: float, y: float, quantity: Quantity = "u") -> Array:
+    """A quantity at a point, bilinear between cell centres as sensors read it, (member, experiment) [m, m/s].
+
+    NaN where a cell that counts is dry throughout in that member. Errors: InputError for a point outside the window.
+    """
+    dx, dy = fields.x[1] - fields.x[0], fields.y[1] - fields.y[0]
+    (west, east), (south, north) = fields.range, (fields.y[0] - 0.5 * dy, fields.y[-1] + 0.5 * dy)
+    if not (west <= x <= east and south <= y <= north):
+        raise InputError(
+            f"x = {x:g}, y = {y:g} m is outside the fields that were kept, {west:g} to {east:g} m by {south:g} to "
+            f"{north:g} m: choose a point within, or a wider `simulate.fields`."
+        )
+    (i,), (along,) = between(np.array([x]), fields.x[0], dx, fields.x.size)
+    (j,), (across,) = between(np.array([y]), fields.y[0], dy, fields.y.size)
+    corners = getattr(fields, quantity)[:, :, i : i + 2, j : j + 2].astype(np.float64)
+    weight = np.outer((1.0 - along, along), (1.0 - across, across))
+    return np.where(weight > 0.0, weight * corners, 0.0).sum(axis=(2, 3))
+
+
+def fields_group(window: FieldWindow, experiments: tuple[str, ...], values: Single) -> Group:
+    """What fields.h5 holds, from values (member, experiment, quantity, x, y)."""
+    members, (columns, rows) = len(values), (window.x.size, window.y.size)
+    batch = min(members, max(1, COMPRESSED_AT_ONCE // (columns * rows * values.itemsize)))
+    coordinates = {
+        "member": np.arange(members), "experiment": np.array(experiments, object), "x": window.x, "y": window.y
+    }  # fmt: skip
+    variables = {
+        name: Variable(stored.dims, values[:, :, place], stored.unit, compressed=(batch, 1, columns, rows))
+        for place, (name, stored) in enumerate(stored_fields(Fields).items())
+    }
+    return Group(coordinates, variables, {"x": "m", "y": "m"})
+
+
+def fields_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Fields:
+    """The fields whose file has these groups and attributes."""
+    stored = groups["fields"]
+    west, east = attributes["range"]
+    return Fields(
+        **{name: stored[name] for name in QUANTITIES},
+        experiments=tuple(stored["experiment"]),
+        x=stored["x"],
+        y=stored["y"],
+        range=(float(west), float(east)),
+        config_hash=str(attributes["config_hash"]),
+    )

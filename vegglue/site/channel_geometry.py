@@ -1,0 +1,117 @@
+"""The lie of the land as effects see it: the channel axis and floor, the banks, and how far patches are."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.case.parameter_space import middle_value
+from vegglue.case.schema import Case, Experiment
+from vegglue.effects.surroundings import ChannelGeometry
+from vegglue.site.gridded_site import Site
+from vegglue.site.zones import beyond
+
+# Steeper across than this [-], a cell is no longer floor.
+BREAK = 0.2
+# Sites and sets of patches whose fields are kept: those of a model and of its coarser ones.
+KEPT = 8
+
+
+def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
+    """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
+    return _ground(site, patches_present(case, experiment))
+
+
+def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
+    """Which patches stand in an experiment."""
+    plants = case.experiments[experiment].plants
+    return tuple(
+        index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
+    )
+
+
+def half_width(site: Site) -> float:
+    """Half width of the floor [m], the median of its cross-sections."""
+    return float(np.median(_ground(site, ()).half_width))
+
+
+def cells_across(site: Site) -> float:
+    """How many cells lie across the floor."""
+    return 2.0 * half_width(site) / site.grid.dy
+
+
+@lru_cache(KEPT)  # every problem of every member asks for the same
+def _ground(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
+    grid, bed = site.grid, site.bed
+    side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
+    floor = ~beyond(side_slope > BREAK, bed)
+    axis, half_width = _extent(floor, grid.y, grid.dy)
+    patch = np.where(np.isin(site.patch, present), site.patch, -1)
+    front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
+    return ChannelGeometry(
+        x=grid.x[:, None, None],
+        y=grid.y[None, :, None],
+        dx=grid.dx,
+        dy=grid.dy,
+        bed=bed[..., None],
+        offset=((grid.y[None] - axis[:, None]) / half_width[:, None])[..., None],
+        half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
+        side_slope=side_slope[..., None],
+        bank=(~floor).astype(float)[..., None],
+        planted=(patch >= 0).astype(float)[..., None],
+        front=front[..., None],
+        edge=edge[..., None],
+        wake=wake[..., None],
+        patch=patch[..., None],
+    )
+
+
+def rows_of(ground: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
+    """Rows south..north-1 of it."""
+    return part_of(ground, slice(None), slice(south, north))
+
+
+def part_of(ground: ChannelGeometry, columns: slice, rows: slice) -> ChannelGeometry:
+    """Some columns and rows of it."""
+    cut = {
+        name: getattr(ground, name)[columns, rows]
+        for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
+    }
+    return ChannelGeometry(x=ground.x[columns], y=ground.y[:, rows], dx=ground.dx, dy=ground.dy, **cut)
+
+
+def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:
+    """Axis and half width of the floor of each cross-section [m]; at least one cell."""
+    first, last = floor.argmax(axis=1), floor.shape[1] - 1 - floor[:, ::-1].argmax(axis=1)
+    low, high = y[first] - 0.5 * dy, y[last] + 0.5 * dy
+    return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy)
+
+
+def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: float) -> tuple[Array, Array, Array]:
+    """Distances [m] from the front of a patch, from the nearest side of one, and downstream of one."""
+    front, edge, wake = (np.full(patch.shape, np.inf) for _ in range(3))
+    for index in np.unique(patch[patch >= 0]):
+        column, row = np.nonzero(patch == index)
+        west, east = x[column.min()] - 0.5 * dx, x[column.max()] + 0.5 * dx
+        south, north = y[row.min()] - 0.5 * dy, y[row.max()] + 0.5 * dy
+        front[column, row] = x[column] - west
+        beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
+        here = slice(column.min(), column.max() + 1)
+        edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
+        behind = np.where(x > east, x - east, np.inf)[:, None]
+        spans = ((y > south) & (y < north))[None]
+        wake = np.where(spans & (behind < wake), behind, wake)
+    return front, edge, wake
+
+
+def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
+    """h = max(z_out, z_floor(x) + z_out - z_floor(L)) - z_b, shape (nx, ny) [m]; negative where dry.
+
+    A water surface parallel to the floor, but nowhere below the outlet: a guess good enough to see what is odd, usually
+    too low where plants hold the water up.
+    """
+    outlet = middle_value(case, experiment.level)
+    floor = site.bed.min(axis=1)
+    level = np.maximum(outlet, floor + outlet - floor[-1])
+    return level[:, None] - site.bed

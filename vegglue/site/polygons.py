@@ -1,0 +1,42 @@
+"""Polygons: their corners and area, which cells lie within, and how far a point is from the outline."""
+
+import numpy as np
+
+from vegglue.arrays import Array, Mask
+from vegglue.case.parts import Polygon
+from vegglue.case.site_schema import Patch
+from vegglue.site.grid import Grid
+
+
+def corners_of(patch: Patch) -> Array:
+    """Corners of a patch in order, shape (corners, 2) [m]."""
+    if patch.polygon is not None:
+        return np.array(patch.polygon)
+    (west, east), (south, north) = patch.x or (0.0, 0.0), patch.y or (0.0, 0.0)
+    return np.array([[west, south], [east, south], [east, north], [west, north]])
+
+
+def distance_to_outline(outline: Array, x: float, y: float) -> float:
+    """d = min over sides of |p - (a + t (b - a))| with t in [0, 1] closest to p [m]."""
+    start, side = outline, np.roll(outline, -1, axis=0) - outline
+    from_start = np.array([x, y]) - start
+    along = np.clip((from_start * side).sum(axis=1) / (side**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(from_start - along[:, None] * side).T).min())
+
+
+def in_polygon(corners: Polygon, grid: Grid) -> Mask:
+    """Even-odd rule: a ray from each cell centre crosses the outline an odd number of times."""
+    inside = np.full((grid.x.size, grid.y.size), False)
+    y = grid.y[None, :]
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        if y0 == y1:
+            continue
+        crossing = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
+        inside ^= ((y0 <= y) != (y1 <= y)) & (grid.x[:, None] < crossing)
+    return inside
+
+
+def area_of(outline: Array) -> float:
+    """A = |sum of x_i y_i+1 - x_i+1 y_i| / 2 [m2]."""
+    x, y = outline.T
+    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

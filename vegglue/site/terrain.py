@@ -1,0 +1,167 @@
+"""Bed levels and classes from files: ESRI ASCII grids and scattered survey points, read off at cell centres."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import QhullError
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError
+from vegglue.site.grid import centres
+
+HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Values (nx, ny) at centres x (nx,) and y (ny,), both rising [m]; NaN where the file has no data."""
+
+    x: Array
+    y: Array
+    size: float
+    values: Array
+
+
+def read_raster(path: Path) -> Raster:
+    """An ESRI ASCII grid: six header lines, then rows from north (largest y) to south."""
+    lines = _text(path).splitlines()
+    header, first = _header(path, lines)
+    columns, rows, size = (
+        int(_need(path, header, "ncols")),
+        int(_need(path, header, "nrows")),
+        _need(path, header, "cellsize"),
+    )
+    values = _numbers(path, lines[first:], first, rows * columns).reshape(rows, columns)[::-1].T
+    values = np.where(values == header.get("nodata_value", -9999.0), np.nan, values)
+    x = centres(_corner(path, header, "x", size), size, columns)
+    y = centres(_corner(path, header, "y", size), size, rows)
+    return Raster(x, y, size, values)
+
+
+def levels_at(raster: Raster, x: Array, y: Array) -> Array:
+    """Bilinear between raster centres, constant in the outer half cell; NaN outside and next to missing data."""
+    i, weight_x = _between(raster.x, x)
+    j, weight_y = _between(raster.y, y)
+    level, share = np.zeros((x.size, y.size)), np.zeros((x.size, y.size))
+    for di, wx in ((0, 1.0 - weight_x), (1, weight_x)):
+        for dj, wy in ((0, 1.0 - weight_y), (1, weight_y)):
+            weight = wx[:, None] * wy[None, :]
+            corner = raster.values[np.ix_(np.minimum(i + di, raster.x.size - 1), np.minimum(j + dj, raster.y.size - 1))]
+            known = ~np.isnan(corner)
+            level += np.where(known, weight * np.where(known, corner, 0.0), 0.0)
+            share += np.where(known, weight, 0.0)
+    return np.where(_covered(raster, x, y) & (share > 1.0 - 1e-9), level, np.nan)
+
+
+def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
+    """The value of the raster cell each point lies in; NaN outside."""
+    i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
+    j = np.clip(np.rint((y - raster.y[0]) / raster.size).astype(int), 0, raster.y.size - 1)
+    return np.where(_covered(raster, x, y), raster.values[np.ix_(i, j)], np.nan)
+
+
+def survey_levels(path: Path, x: Array, y: Array) -> Array:
+    """Linear on the Delaunay triangles of surveyed points x,y,z [m]; shape (nx, ny), NaN outside their hull."""
+    points = read_points(path)
+    try:
+        surface = LinearNDInterpolator(points[:, :2], points[:, 2])
+    except (QhullError, ValueError):
+        raise InputError(
+            f"{path}: expected at least three points that are not on one line, got {len(points)}: add more."
+        ) from None
+    return np.asarray(surface(*np.meshgrid(x, y, indexing="ij")), dtype=np.float64)
+
+
+def read_points(path: Path) -> Array:
+    """The columns x, y, z of a CSV file, shape (points, 3) [m]."""
+    rows = csv.DictReader(line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
+    missing = [name for name in "xyz" if name not in (rows.fieldnames or ())]
+    if missing:
+        raise InputError(f"{path}: expected a header with the columns x, y and z, got {rows.fieldnames}.")
+    return np.array([[_number(path, i, row[name], name) for name in "xyz"] for i, row in enumerate(rows, 1)]).reshape(
+        -1, 3
+    )
+
+
+def _number(path: Path, row: int, text: str | None, name: str) -> float:
+    try:
+        number = float(text or "")
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{path}, data row {row}: column {name} expected a number in m, got {text!r}.")
+    return number
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text: {error}.") from None
+
+
+def _header(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
+    header: dict[str, float] = {}
+    for number, line in enumerate(lines):
+        words = line.split()
+        if not words or words[0].lower() not in HEADER:
+            return header, number
+        if len(words) != 2:
+            raise InputError(f"{path}, line {number + 1}: expected `{words[0]}` and one number, got {line!r}.")
+        header[words[0].lower()] = _number(path, number + 1, words[1], words[0])
+    return header, len(lines)
+
+
+def _need(path: Path, header: dict[str, float], key: str) -> float:
+    if header.get(key, 0.0) <= 0:
+        raise InputError(
+            f"{path}: expected an ESRI ASCII grid whose header has a `{key}` above 0, got {header or 'no header'}."
+        )
+    return header[key]
+
+
+def _corner(path: Path, header: dict[str, float], axis: str, size: float) -> float:
+    if f"{axis}llcorner" in header:
+        return header[f"{axis}llcorner"]
+    if f"{axis}llcenter" in header:
+        return header[f"{axis}llcenter"] - 0.5 * size
+    raise InputError(f"{path}: expected `{axis}llcorner` or `{axis}llcenter` in the header, got neither.")
+
+
+def _numbers(path: Path, lines: list[str], before: int, count: int) -> Array:
+    words = [(number, word) for number, line in enumerate(lines, before + 1) for word in line.split()]
+    if len(words) != count:
+        raise InputError(f"{path}: expected nrows x ncols = {count} values after the header, got {len(words)}.")
+    try:
+        return np.array([float(word) for _, word in words])
+    except ValueError:
+        number, word = next((number, word) for number, word in words if not _is_number(word))
+        raise InputError(f"{path}, line {number}: expected numbers, got {word!r}.") from None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _between(centres: Array, at: Array) -> tuple[NDArray[np.int64], Array]:
+    """Index of the centre before each point, and the weight of the one after it."""
+    inside = np.clip(at, centres[0], centres[-1])
+    index = np.clip(np.searchsorted(centres, inside, side="right") - 1, 0, max(centres.size - 2, 0))
+    step = centres[1] - centres[0] if centres.size > 1 else 1.0
+    return index, (inside - centres[index]) / step
+
+
+def _covered(raster: Raster, x: Array, y: Array) -> NDArray[np.bool_]:
+    half = 0.5 * raster.size
+    along = (x >= raster.x[0] - half) & (x <= raster.x[-1] + half)
+    across = (y >= raster.y[0] - half) & (y <= raster.y[-1] + half)
+    return along[:, None] & across[None, :]

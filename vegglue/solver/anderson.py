@@ -1,0 +1,65 @@
+"""Anderson's mixing of fixed-point steps f, lane by lane: x <- x + f - sum_d g_d s_d, with g the least squares of
+f - sum_d g_d t_d; t the change from one step to the next, s that change and the one of x. The least squares see one
+column in a few only, which lead to nearly the same weights with a fraction of the memory to read.
+
+Walker and Ni 2011, doi:10.1137/10078356X.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from vegglue.arrays import Array, Single
+from vegglue.solver import block_elimination
+
+MEMORY_DEPTH = 6
+
+
+class Memory:
+    """The last DEPTH changes of every lane's correction, for Anderson's mixing; filled in place, slot by slot."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.turns: Single = np.zeros((MEMORY_DEPTH, -(-shape[0] // block_elimination.SPARSE), *shape[1:]), np.float32)
+        self.sums: Single = np.zeros((MEMORY_DEPTH, *shape), np.float32)
+        self.gram = np.zeros((MEMORY_DEPTH, MEMORY_DEPTH, shape[-1]))
+        # The last step, and by how much it moved the state once mixed.
+        self.last: tuple[Single, Single] | None = None
+        # When each slot was filled and since when each lane has had its member, counted in steps.
+        self.filled, self.since, self.count = (
+            np.zeros(MEMORY_DEPTH, dtype=np.int64),
+            np.zeros(shape[-1], dtype=np.int64),
+            0,
+        )
+
+    def keep(self, lanes: np.ndarray) -> None:
+        """Some lanes only."""
+        self.turns, self.sums, self.gram = (kept(values, lanes) for values in (self.turns, self.sums, self.gram))
+        self.since = self.since[lanes]
+        if self.last is not None:
+            self.last = kept(self.last[0], lanes), kept(self.last[1], lanes)
+
+    def forget(self, lanes: np.ndarray) -> None:
+        """Lanes in which other members begin."""
+        self.gram[..., lanes], self.since[lanes] = 0.0, self.count
+
+    def next_state(self, state: Array, step: Single) -> None:
+        """x <- x + f, less what the memory knows to overshoot, in place."""
+        known = min(self.count, MEMORY_DEPTH)
+        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(known, step, *self.last)
+        self.last = step, block_elimination.mix(state, step, self.sums[:known], weights)
+        self.count += 1
+
+    def _weights(self, known: int, step: Single, last_step: Single, moved: Single) -> Array:
+        """g (slots, m) of what is known, its next slot filled."""
+        slot = (self.count - 1) % MEMORY_DEPTH
+        row, right = block_elimination.remember(self.turns[:known], self.sums, slot, moved, step, last_step)
+        self.filled[slot] = self.count
+        own = self.filled[:known, None] > self.since
+        row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
+        self.gram[slot, :known], self.gram[:known, slot] = row, row
+        return np.asarray(block_elimination.minimise(np.ascontiguousarray(self.gram[:known, :known]), right))
+
+
+def kept(values: Any, lanes: np.ndarray) -> Any:
+    """Some lanes of an array (.., m), in one piece of memory."""
+    return np.ascontiguousarray(values[..., lanes])

@@ -1,0 +1,156 @@
+"""The Jacobian as blocks of one column each, filled from differences of the residual, factored and solved along the
+channel.
+
+Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from
+downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the reach above
+it under a given level: no exchange of rows between blocks is needed. Also the loops of `anderson` over such states.
+"""
+
+import numpy as np
+
+from vegglue.compilation import compiled_exactly
+
+# An unknown moves the residuals of the columns from one upstream to two downstream of it, and two rows to either side;
+# unknowns this far apart may be disturbed together.
+ALONG_PERIOD, ROWS_REACH = 4, 2
+ACROSS_PERIOD = 2 * ROWS_REACH + 1
+# Of so many columns one tells Anderson's mixing how steps change.
+SPARSE = 4
+
+
+@compiled_exactly
+def collect(blocks, far, base, rates, colours, step):
+    """Spread the changes of the colours' lanes (kind, column, row) over the entries of the Jacobian they belong to.
+
+    blocks (nx, 3, n, n): columns i - 1, i, i + 1 of row block i; far (nx, n): the diagonal coupling to i - 2.
+    """
+    nx, _, ny = base.shape
+    for i in range(nx):
+        for lane in range(colours.shape[0]):
+            kind, first_column, first_row = colours[lane]
+            # The one column of this colour among those that move this block: i - 2 .. i + 1.
+            column = i + 1 - (i + 1 - first_column) % ALONG_PERIOD
+            if column < 0 or column >= nx:
+                continue
+            for row in range(first_row, ny, ACROSS_PERIOD):
+                source = kind * ny + row
+                if column == i - 2:
+                    far[i, source] = (rates[i, kind, row, lane] - base[i, kind, row]) / step
+                    continue
+                for e in range(3):
+                    for j in range(max(row - ROWS_REACH, 0), min(row + ROWS_REACH + 1, ny)):
+                        change = (rates[i, e, j, lane] - base[i, e, j]) / step
+                        blocks[i, column - i + 1, e * ny + j, source] = change
+
+
+@compiled_exactly
+def factor(blocks, far):
+    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i), so that solving is three products a
+    column.
+    """
+    nx, _, n, _ = blocks.shape
+    for i in range(nx):
+        if i > 1:
+            for r in range(n):
+                weight = far[i, r]
+                if weight != 0.0:
+                    for c in range(n):
+                        blocks[i, 0, r, c] -= weight * blocks[i - 2, 2, r, c]
+        if i > 0:
+            blocks[i, 1] -= np.dot(blocks[i, 0], blocks[i - 1, 2])
+        blocks[i, 1] = np.linalg.inv(blocks[i, 1])
+        if i < nx - 1:
+            blocks[i, 2] = np.dot(blocks[i, 1], blocks[i, 2])
+
+
+@compiled_exactly
+def solve(blocks, far, right):
+    """x with J x = right, in place; right (nx, n, m), m right-hand sides at once."""
+    nx, n, m = right.shape
+    for i in range(nx):
+        part = right[i]
+        if i > 1:
+            for r in range(n):
+                for k in range(m):
+                    part[r, k] -= far[i, r] * right[i - 2, r, k]
+        if i > 0:
+            part -= np.dot(blocks[i, 0], right[i - 1])
+        right[i] = np.dot(blocks[i, 1], part)
+    for i in range(nx - 2, -1, -1):
+        right[i] -= np.dot(blocks[i, 2], right[i + 1])
+
+
+@compiled_exactly
+def remember(turns, sums, slot, moved, step, last_step):
+    """Slot of the memory: t = f - f_last, s = t + (x - x_last), member by member; t of every SPARSE-th column only.
+
+    Returned: inner products per member of that turn with every turn, and of every turn with f, two arrays (depth, m).
+    """
+    depth, m = turns.shape[0], turns.shape[4]
+    _, nx, _, ny, _ = sums.shape
+    gram, right = np.zeros((depth, m)), np.zeros((depth, m))
+    for i in range(nx):
+        for e in range(3):
+            for j in range(ny):
+                for k in range(m):
+                    sums[slot, i, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k] + moved[i, e, j, k]
+                if i % SPARSE:
+                    continue
+                c = i // SPARSE
+                for k in range(m):
+                    turns[slot, c, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k]
+                for d in range(depth):
+                    for k in range(m):
+                        gram[d, k] += turns[slot, c, e, j, k] * turns[d, c, e, j, k]
+                        right[d, k] += turns[d, c, e, j, k] * step[i, e, j, k]
+    return gram, right
+
+
+@compiled_exactly
+def mix(state, step, sums, weights):
+    """Anderson's next state x + f - sum_d g_d s_d, in place; returned: by how much that differs (nx, 3, ny, m)."""
+    depth, nx, _, ny, m = sums.shape
+    moved = np.empty_like(step)
+    for i in range(nx):
+        for e in range(3):
+            for j in range(ny):
+                for k in range(m):
+                    moved[i, e, j, k] = step[i, e, j, k]
+                for d in range(depth):
+                    for k in range(m):
+                        moved[i, e, j, k] -= weights[d, k] * sums[d, i, e, j, k]
+                for k in range(m):
+                    state[i, e, j, k] += moved[i, e, j, k]
+    return moved
+
+
+@compiled_exactly
+def minimise(gram, right):
+    """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing."""
+    depth, _, m = gram.shape
+    weights = np.empty((depth, m))
+    for k in range(m):
+        matrix = np.empty((depth, depth))
+        for a in range(depth):
+            for b in range(depth):
+                matrix[a, b] = gram[a, b, k]
+            matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
+        weights[:, k] = np.linalg.solve(matrix, np.ascontiguousarray(right[:, k]))
+    return weights
+
+
+@compiled_exactly
+def solve_transposed(blocks, far, right):
+    """x with J' x = right, in place: the products of `solve`, transposed and in the opposite order."""
+    nx, n, m = right.shape
+    for i in range(1, nx):
+        right[i] -= np.dot(blocks[i - 1, 2].T, right[i - 1])
+    for i in range(nx - 1, -1, -1):
+        part = right[i]
+        if i < nx - 1:
+            part -= np.dot(blocks[i + 1, 0].T, right[i + 1])
+        if i < nx - 2:
+            for r in range(n):
+                for k in range(m):
+                    part[r, k] -= far[i + 2, r] * right[i + 2, r, k]
+        right[i] = np.dot(blocks[i, 1].T, part)

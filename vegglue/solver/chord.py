@@ -1,0 +1,181 @@
+"""Chord steps x <- x - M^-1 R(x) of many members with the factors M of one, accelerated by Anderson's mixing.
+
+Members pass through a few lanes that are computed side by side; as soon as some are done, others enter their lanes.
+Thin water is eased, see `easing`. A member is there when its correction, in m and m/s, is below the tolerance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array, Single
+from vegglue.flow.equations import carry_thin, eased, largest_correction, where_thin
+from vegglue.flow.problem import Problem, take
+from vegglue.solver.anderson import Memory, kept
+from vegglue.solver.jacobian import Factors
+
+# So many lanes are free before other members enter them.
+ENTER = 2
+# A step this long [m, m/s] leaves the range where the linearisation means anything.
+LONGEST_CORRECTION = 0.25
+
+
+@dataclass(frozen=True)
+class ChordSolution:
+    """States (nx, 3, ny, m), the least correction of each member [m/s, m], infinite if it strayed, iterations, and
+    who converged.
+    """
+
+    state: Array
+    correction: Array
+    iterations: np.ndarray
+    converged: np.ndarray
+
+
+StartsOf = Callable[[np.ndarray], Array]
+Deliver = Callable[[np.ndarray, ChordSolution], None]
+
+
+@dataclass
+class _Lanes:
+    """Members side by side, each in its lane (m,) until it ends: who they are, the part of the problem that is theirs,
+    their states (nx, 3, ny, m), where these were thin when any of them began, their steps, their least correction, and
+    which lanes are at work. What grows thin later counts in full, which is stricter.
+    """
+
+    problem: Problem
+    shared: Factors
+    member: NDArray[np.int64]
+    part: Problem
+    state: Array
+    thin: NDArray[np.bool_]
+    memory: Memory
+    age: np.ndarray
+    best: Array
+    running: np.ndarray
+
+    def step(self, tolerance: float, most: int) -> tuple[Single, np.ndarray, ChordSolution]:
+        """A chord step of all, the members that end with it, and how. They stay in their lanes until others enter."""
+        step = _step(self.part, self.state, self.thin, self.shared)
+        size = largest_correction(self.part, step, self.state, self.thin, self.shared.thick)
+        self.age[self.running] += 1
+        self.best[self.running] = np.minimum(self.best, size)[self.running]
+        strayed = self.running & ~(size < 4.0 * LONGEST_CORRECTION)
+        self.best[strayed] = np.inf
+        ended = strayed | self.running & ((size < tolerance) | (self.age >= most))
+        solution = ChordSolution(self._after(step, ended), self.best[ended], self.age[ended], size[ended] < tolerance)
+        self.running &= ~ended
+        # Those that ended must not spoil the arithmetic of others, nor those that strayed what the lane remembers.
+        step[..., ~self.running], self.state[..., strayed] = 0.0, 0.0
+        return step, self.member[ended], solution
+
+    def _after(self, step: Single, lanes: np.ndarray) -> Array:
+        """Where a step leads to, of some lanes."""
+        some = np.flatnonzero(lanes)
+        after = kept(self.state, some)
+        if some.size:
+            part = take(self.part, some)
+            self._carry(part, after)
+            after += step[..., some]
+            self._carry(part, after, back=True)
+        return after
+
+    def _carry(self, part: Problem, state: Array, back: bool = False) -> None:
+        """States to the unknowns of chord steps or back, in place."""
+        carry_thin(part, state, state, self.thin, self.shared.thick, back)
+
+    def move(self, step: Single) -> None:
+        """To the states that the step leads to, mixed."""
+        self._carry(self.part, self.state)
+        self.memory.next_state(self.state, step)
+        self._carry(self.part, self.state, back=True)
+
+    def enter(self, free: np.ndarray, entering: np.ndarray, start: Array) -> None:
+        """Members begin in free lanes."""
+        self.member[free], self.age[free], self.best[free], self.running[free] = entering, 0, np.inf, True
+        self.part = take(self.problem, self.member)
+        self.state[..., free] = start
+        # What lanes remember of faces that become thin only now is slightly off: it only guides steps.
+        self.thin |= where_thin(take(self.problem, entering), start, self.shared.thick)
+        self.memory.forget(free)
+
+    def narrow(self) -> None:
+        """Lanes at work only."""
+        keep = np.flatnonzero(self.running)
+        self.member, self.age = self.member[keep], self.age[keep]
+        self.best, self.running = self.best[keep], self.running[keep]
+        self.state, self.part = kept(self.state, keep), take(self.problem, self.member)
+        self.memory.keep(keep)
+
+
+def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors) -> _Lanes:
+    part, count = take(problem, members), members.size
+    return _Lanes(
+        problem=problem,
+        shared=shared,
+        member=members.copy(),
+        part=part,
+        state=np.array(start, order="C"),
+        thin=where_thin(part, start, shared.thick),
+        memory=Memory(start.shape),
+        age=np.zeros(count, dtype=np.int64),
+        best=np.full(count, np.inf),
+        running=np.ones(count, dtype=bool),
+    )
+
+
+def stream(
+    problem: Problem,
+    queue: np.ndarray,
+    starts_of: StartsOf,
+    shared: Factors,
+    tolerance: float,
+    most: int,
+    width: int,
+    deliver: Deliver,
+) -> None:
+    """Members of a queue through `width` lanes with one factorisation, each handed over as it ends.
+
+    starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do. A member ends when it converged,
+    strayed, or took `most` steps.
+    """
+    if not queue.size:
+        return
+    lanes, waiting = _begun(problem, queue[:width], starts_of(queue[:width]), shared), queue[width:]
+    while True:
+        step, members, ended = lanes.step(tolerance, most)
+        if members.size:
+            deliver(members, ended)
+        if not lanes.running.any() and not waiting.size:
+            return
+        lanes.move(step)
+        free = np.flatnonzero(~lanes.running)
+        if waiting.size and (free.size >= ENTER or not lanes.running.any()):
+            free, entering, waiting = free[: waiting.size], waiting[: free.size], waiting[free.size :]
+            lanes.enter(free, entering, starts_of(entering))
+        elif not waiting.size and 2 * lanes.running.sum() <= lanes.running.size:
+            lanes.narrow()
+
+
+def _step(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Single:
+    """The correction in the unknowns of chord steps."""
+    rates = eased(part, state, shared.slope)
+    carry_thin(part, rates, state, thin, shared.thick)
+    return shared.step(rates)
+
+
+def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> ChordSolution:
+    """All members at once from their starts; those that stall are left where they got to."""
+    members = np.arange(problem.members)
+    end = ChordSolution(
+        np.empty_like(start), np.empty(members.size), members.copy(), np.zeros(members.size, dtype=bool)
+    )
+
+    def note(some: np.ndarray, ended: ChordSolution) -> None:
+        end.state[..., some], end.correction[some] = ended.state, ended.correction
+        end.iterations[some], end.converged[some] = ended.iterations, ended.converged
+
+    stream(problem, members, lambda some: start[..., some], shared, tolerance, most, members.size, note)
+    return end

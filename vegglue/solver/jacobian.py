@@ -1,0 +1,78 @@
+"""The Jacobian of one member by coloured differences of its residual, and its factors, which serve neighbours too."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array, Single
+from vegglue.flow import thin_water
+from vegglue.flow.equations import residual, slope_of_friction, thickness
+from vegglue.flow.problem import Problem, take
+from vegglue.solver import block_elimination
+
+COLOUR_STEP = 1e-6
+# Disturbed together: 15, as many as there are colours in a quarter, take a quarter longer than 16.
+COLOUR_LANES = 16
+
+
+@dataclass(frozen=True)
+class Factors:
+    """The eliminated Jacobian of one member: J^-1 costs three products a column.
+
+    Beside it what chord steps need of the state it was made at, see `easing`: slopes of friction [1/s], depths of faces
+    [m] and how velocities answer to levels there [1/s].
+    """
+
+    columns: Single
+    far: Single
+    slope: Array
+    thick: Array
+    answer: Array
+
+    def solve(self, right: Array) -> Array:
+        """J^-1 right, (nx, 3, ny, m)."""
+        return solved(self.columns, self.far, right)
+
+    def step(self, rates: Array) -> Single:
+        """-J^-1 R in the unknowns of chord steps (nx, 3, ny, m): levels, velocities times rho where water is thin."""
+        nx, _, ny, m = rates.shape
+        work = np.multiply(rates, -1.0, dtype=np.float32, casting="same_kind")
+        block_elimination.solve(self.columns, self.far, work.reshape(nx, 3 * ny, m))
+        thin_water.tilt(work, self.answer)
+        return work
+
+
+def solved(columns: Single, far: Single, right: Array) -> Array:
+    """J^-1 right, (nx, 3, ny, m), of factors."""
+    nx, _, ny, m = right.shape
+    work = right.astype(np.float32).reshape(nx, 3 * ny, m)
+    block_elimination.solve(columns, far, work)
+    return work.reshape(right.shape).astype(np.float64)
+
+
+def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
+    """J = dR/dstate of one member by coloured differences: blocks (nx, 3, n, n) and far diagonal (nx, n), n = 3 ny.
+
+    Single precision is enough: the factors only lead to the root, the residual in double precision says where it is.
+    """
+    nx, _, ny, _ = state.shape
+    base = residual(problem, state)[..., 0]
+    columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
+    colours = np.array(list(np.ndindex(3, block_elimination.ALONG_PERIOD, block_elimination.ACROSS_PERIOD)))
+    many = take(problem, np.zeros(COLOUR_LANES, dtype=np.int64))
+    lanes = np.empty((nx, 3, ny, COLOUR_LANES))
+    for group in np.split(colours, range(COLOUR_LANES, len(colours), COLOUR_LANES)):
+        lanes[...] = state
+        for lane, (kind, column, row) in enumerate(group):
+            lanes[column :: block_elimination.ALONG_PERIOD, kind, row :: block_elimination.ACROSS_PERIOD, lane] += (
+                COLOUR_STEP
+            )
+        block_elimination.collect(columns, far, base, residual(many, lanes), group, COLOUR_STEP)
+    return columns, far
+
+
+def factors(problem: Problem, state: Array) -> Factors:
+    """Factors of J at one state."""
+    columns, far = jacobian(problem, state)
+    block_elimination.factor(columns, far)
+    return Factors(columns, far, slope_of_friction(problem, state), *thickness(problem, state))

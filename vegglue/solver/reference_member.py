@@ -1,0 +1,187 @@
+"""One member solved alone or beside another, with what neighbours need of it: factors, tangents, and the band they
+hold for.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.flow.backwater import backwater
+from vegglue.flow.equations import residual
+from vegglue.flow.problem import Problem, crop
+from vegglue.solver.chord import ChordSolution
+from vegglue.solver.jacobian import Factors, factors
+from vegglue.solver.march import settle
+from vegglue.solver.newton import CLOSE, finish, newton
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
+from vegglue.solver.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
+
+TANGENT_STEP = 1e-4
+ProblemOf = Callable[[Array], Problem]
+Attempt = tuple[ChordSolution, Factors | None, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class SolvedMember:
+    """A state (nx, 3, ny, 1) solved at one place of the unit cube, on the way to others roughly, and d state / d s_p
+    there.
+    """
+
+    place: Array
+    state: Array
+    slopes: tuple[Array, ...]
+
+    def predict(self, places: Array) -> Array:
+        """state + sum_p slope_p (s_p - place_p), (nx, 3, ny, m)."""
+        predicted = np.repeat(self.state, len(places), axis=3)
+        for p, slope in enumerate(self.slopes):
+            predicted += slope * (places[:, p] - self.place[p])
+        return predicted
+
+
+@dataclass(frozen=True)
+class ReferenceMember:
+    """A centre: its state (nx, 3, ny, 1) and, unless it had to be marched, what its neighbours need of it."""
+
+    state: Array
+    status: int
+    reason: str
+    iterations: int
+    known: SolvedMember | None
+    factors: Factors | None
+    band: tuple[int, int]
+
+
+def known_middle(problem_of: ProblemOf, parameters: int, tolerance: float) -> SolvedMember | None:
+    """The member in the middle of the prior, for all others to begin from; None if it has to be marched."""
+    middle = np.full(parameters, 0.5)
+    return solve_centre(problem_of, middle, None, tolerance).known
+
+
+def solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolerance: float) -> ReferenceMember:
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
+    problem = problem_of(place[None])
+    spent = 0
+    for start in [warm, None] if warm is not None else [None]:
+        solution, shared, band = settled(problem, start, tolerance)
+        spent += int(solution.iterations[0])
+        if shared is None:
+            continue
+        return _lead(problem_of, place, problem, band, solution.state, shared, spent)
+    return _marched(problem, spent, tolerance)
+
+
+def lead_at(problem_of: ProblemOf, place: Array, state: Array) -> ReferenceMember:
+    """What neighbours need of a solved state (nx, 3, ny, 1)."""
+    return _lead_in(problem_of, place, problem_of(place[None]), state)
+
+
+def _lead_in(problem_of: ProblemOf, place: Array, problem: Problem, state: Array) -> ReferenceMember:
+    band = wet_band(problem, state)
+    near = rows_inside(state, band)
+    return _lead(problem_of, place, problem, band, near, factors(crop(problem, *band), near), 0)
+
+
+def lead_beside(problem_of: ProblemOf, place: Array, lead: ReferenceMember, tolerance: float) -> ReferenceMember:
+    """A centre near another: with the factors of that one, if they reach, else on its own."""
+    assert lead.known is not None
+    assert lead.factors is not None
+    problem, start = problem_of(place[None]), lead.known.predict(place[None])
+    end = chord_in_band(problem, rows_inside(start, lead.band), lead.factors, lead.band, tolerance)
+    spent = int(end.iterations[0])
+    if end.converged[0]:
+        state = widen(end.state, problem.shape[1], lead.band)
+        return replace(_lead_in(problem_of, place, problem, state), state=state, iterations=spent)
+    alone = solve_centre(problem_of, place, start, tolerance)
+    return replace(alone, iterations=spent + alone.iterations)
+
+
+def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
+    """One member: its state in the band of rows that may be wet, the factors there, and that band.
+
+    warm (nx, 3, ny, 1): a state nearby to begin from, else a rough estimate is. Without factors, it has not converged.
+    """
+    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
+    if warm is not None:
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance)]
+    spent = 0
+    for attempt in attempts:
+        solution, shared, band = attempt()
+        spent += int(solution.iterations[0])
+        solution = replace(solution, iterations=np.array([spent]))
+        if solution.converged[0] and shared is not None:
+            return solution, shared, band
+    return solution, None, band
+
+
+def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
+    band = wet_band(problem, warm)
+    solution, shared = finish(crop(problem, *band), rows_inside(warm, band), tolerance)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _by_newton(problem: Problem, warm: Array, tolerance: float, most: int = 12, time_step: float = 200.0) -> Attempt:
+    band = wet_band(problem, warm)
+    part = crop(problem, *band)
+    near = newton(part, rows_inside(warm, band), CLOSE, most, time_step)
+    if not near.converged[0]:
+        return near, None, band
+    solution, shared = finish(part, near.state, tolerance)
+    solution = replace(solution, iterations=solution.iterations + near.iterations)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _from_cold(problem: Problem, tolerance: float) -> Attempt:
+    return _by_newton(problem, backwater(problem), tolerance, most=60, time_step=10.0)
+
+
+def _checked(
+    problem: Problem, solution: ChordSolution, shared: Factors | None, band: tuple[int, int], tolerance: float
+) -> Attempt:
+    """Solved again in a wider band if water came to stand at the edge of this one."""
+    part = crop(problem, *band)
+    if not (solution.converged[0] and overflows(part, solution.state, band, problem.shape[1])[0]):
+        return solution, shared, band
+    wider = widen(solution.state, problem.shape[1], band)
+    band = wet_band(problem, wider)
+    solution, shared = finish(crop(problem, *band), rows_inside(wider, band), tolerance)
+    return solution, shared, band
+
+
+def _lead(
+    problem_of: ProblemOf,
+    place: Array,
+    problem: Problem,
+    band: tuple[int, int],
+    state: Array,
+    shared: Factors,
+    spent: int,
+) -> ReferenceMember:
+    part, ny = crop(problem, *band), problem.shape[1]
+    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, state, shared))
+    wide = widen(state, ny, band)
+    return ReferenceMember(wide, SOLVED_BY_NEWTON, "", spent, SolvedMember(place, wide, slopes), shared, band)
+
+
+def _tangents(
+    problem_of: ProblemOf, place: Array, part: Problem, band: tuple[int, int], state: Array, shared: Factors
+) -> list[Array]:
+    """-J^-1 dR/ds_p by one-sided differences of the residual in s, good enough to start from."""
+    base = residual(part, state)
+    steps = np.where(place < 0.5, TANGENT_STEP, -TANGENT_STEP)
+    moved = crop(problem_of(place + np.diag(steps)), *band)
+    rates = residual(moved, np.repeat(state, place.size, axis=3))
+    tangents = -shared.solve((rates - base) / steps)
+    return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(place.size)]
+
+
+def _marched(problem: Problem, spent: int, tolerance: float) -> ReferenceMember:
+    """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
+    start = backwater(problem)
+    marched = settle(problem, start, tolerance)
+    status = SOLVED_BY_MARCHING if marched.steady else FAILED
+    reason = "" if marched.steady else f"no steady state: {marched.sentence}"
+    state = marched.state if marched.steady else np.full_like(start, np.nan)
+    return ReferenceMember(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))

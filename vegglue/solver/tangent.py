@@ -1,0 +1,80 @@
+"""Exact derivatives of a steady state: how it answers to any cause, and which force would move a prediction.
+
+    J dx = -dR        (tangent: one solve for each cause)
+    J' l = g          (adjoint: one solve for each prediction; l . dR is then -g . dx for every cause at once)
+
+J is the Jacobian at the steady state, known by differences of the residual itself, effects and boundary conditions
+included. Its single-precision factors, which may be those of a state nearby, are the preconditioner of generalised
+conjugate residuals (Eisenstat, Elman and Schultz 1983, doi:10.1137/0720023): where a cell is about to fall dry they can
+be so far off that mere repetition runs away.
+"""
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.flow.equations import residual
+from vegglue.flow.problem import Problem, take
+from vegglue.solver import block_elimination
+from vegglue.solver.jacobian import Factors
+
+# Step [m, m/s] of the central difference along a direction scaled to one.
+DIRECTION_STEP = 1e-5
+MOST_ROUNDS = 12
+# Causes answered together: what has been tried for each is kept.
+CAUSE_LANES = 16
+
+
+def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tolerance: float = 1e-7) -> Array:
+    """dx = -J^-1 dR, (nx, 3, ny, p), for causes dR (nx, 3, ny, p) at the steady state (nx, 3, ny, 1) of one member.
+
+    Each column is refined until its next correction is below `tolerance` of its largest entry.
+    """
+    answer = np.empty_like(causes)
+    for first in range(0, causes.shape[3], CAUSE_LANES):
+        lanes = slice(first, first + CAUSE_LANES)
+        answer[..., lanes] = _answer(problem, state, shared, np.ascontiguousarray(causes[..., lanes]), tolerance)
+    return answer
+
+
+def _answer(problem: Problem, state: Array, shared: Factors, causes: Array, tolerance: float) -> Array:
+    answer, left = np.zeros_like(causes), -causes
+    tried: list[tuple[Array, Array]] = []
+    for _ in range(MOST_ROUNDS):
+        step = shared.solve(left)
+        if (_largest(step) <= tolerance * _largest(answer)).all():
+            return answer + step
+        moved = jacobian_times(problem, state, step)
+        for earlier, its in tried:
+            share = _product(its, moved)
+            step, moved = step - share * earlier, moved - share * its
+        length = np.maximum(np.sqrt(_product(moved, moved)), 1e-300)
+        step, moved = step / length, moved / length
+        tried.append((step, moved))
+        gain = _product(moved, left)
+        answer, left = answer + gain * step, left - gain * moved
+    return answer
+
+
+def jacobian_times(problem: Problem, state: Array, direction: Array) -> Array:
+    """J direction, (nx, 3, ny, p), by central differences of the residual."""
+    scale = np.maximum(_largest(direction), 1e-300)
+    many = take(problem, np.zeros(direction.shape[3], dtype=np.int64))
+    ahead = residual(many, state + DIRECTION_STEP * direction / scale)
+    behind = residual(many, state - DIRECTION_STEP * direction / scale)
+    return (ahead - behind) * (scale / (2.0 * DIRECTION_STEP))
+
+
+def adjoints(shared: Factors, weights: Array) -> Array:
+    """l = J^-T g, (nx, 3, ny, p), for weights g = d(prediction)/d(state) (nx, 3, ny, p); single precision."""
+    nx, _, ny, p = weights.shape
+    work = weights.astype(np.float32).reshape(nx, 3 * ny, p)
+    block_elimination.solve_transposed(shared.columns, shared.far, work)
+    return work.reshape(weights.shape).astype(np.float64)
+
+
+def _product(one: Array, other: Array) -> Array:
+    return np.asarray(np.einsum("ikjp,ikjp->p", one, other))
+
+
+def _largest(values: Array) -> Array:
+    return np.abs(values).max(axis=(0, 1, 2))

@@ -1,0 +1,108 @@
+"""How well a diagnosis guessed what a twin hides."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.twins.twin import BAD_PROBE, Answer, Hidden
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One hidden thing against a diagnosis. named: the verdict is this effect alone; inside: it is in the set; open:
+    nothing stands out, and it is among what is not excluded.
+
+    amplitude: whether the 95 % interval holds the true one, None when it is not in the set; away: distance [m] of the
+    place that is pointed at from the true one, NaN without either; found: what counts as success for its kind.
+    """
+
+    hidden: Hidden
+    named: bool
+    inside: bool
+    open: bool
+    amplitude: bool | None
+    away: float
+    found: bool
+
+
+def marks(answer: Answer, diagnosis: Diagnosis) -> list[Mark]:
+    return [_mark(hidden, diagnosis) for hidden in answer.hidden]
+
+
+def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
+    if hidden.name == BAD_PROBE:
+        there = hidden.station in diagnosis.flagged
+        return Mark(hidden, False, there, False, None, float("nan"), there)
+    if not hidden.listed:
+        away = _away(hidden, diagnosis)
+        found = diagnosis.verdict == "none-of-these"
+        return Mark(hidden, False, False, False, None, away, found)
+    inside = hidden.name in diagnosis.set
+    named = diagnosis.verdict == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
+    still = hidden.name in [name for group in diagnosis.not_excluded for name in group]
+    amplitude = None
+    if inside:
+        low, high = next(one.interval95 for one in diagnosis.suspects if one.name == hidden.name)
+        amplitude = bool(low <= hidden.amplitude <= high)
+    return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
+
+
+def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
+    if diagnosis.where is None:
+        return float("nan")
+    return float(np.hypot(diagnosis.where.x - hidden.shapes["x"], diagnosis.where.y - hidden.shapes["y"]))
+
+
+def groups_of(diagnosis: Diagnosis) -> list[int]:
+    """Groups that the data cannot tell apart, counted for each step."""
+    return [len(step.groups) for step in diagnosis.steps]
+
+
+def in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
+    """The truth, and what the diagnosis made of it, one line each."""
+    errors = "errors as stated" if answer.scale == 1.0 else f"errors {answer.scale:g} times those stated"
+    if answer.correlation:
+        errors += f", neighbours correlated by {answer.correlation:g}"
+    parameters = ", ".join(f"{name} = {value:.4g}" for name, value in answer.parameters.items())
+    lines = [f"True parameters: {parameters}; {errors}."]
+    if not answer.hidden:
+        lines.append("Nothing was hidden.")
+        if diagnosis is not None:
+            right = "right" if diagnosis.verdict == "nothing-missing" else "a false alarm, or too shy"
+            lines.append(f"The diagnosis said {diagnosis.verdict}: {right}.")
+        return lines
+    if diagnosis is None:
+        return lines + [f"Hidden: {_truth(one)}." for one in answer.hidden]
+    return lines + [_told(mark, diagnosis) for mark in marks(answer, diagnosis)]
+
+
+def _truth(hidden: Hidden) -> str:
+    if hidden.name == BAD_PROBE:
+        return f"a bad probe at station {hidden.station}, {hidden.amplitude:+.3g} standard errors off"
+    shapes = "".join(f", {name} = {value:.3g}" for name, value in hidden.shapes.items())
+    return f"{hidden.name} of {hidden.amplitude:.4g}{shapes} (signal over noise {hidden.signal:.1f})"
+
+
+def _told(mark: Mark, diagnosis: Diagnosis) -> str:
+    truth = f"Hidden: {_truth(mark.hidden)}. "
+    if mark.hidden.name == BAD_PROBE:
+        return truth + ("It was set aside." if mark.found else "It was not noticed.")
+    if not mark.hidden.listed:
+        told = f"The verdict was {diagnosis.verdict}"
+        return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")
+    if mark.open:
+        return truth + f"The diagnosis said {diagnosis.verdict}, and lists it among what is not excluded."
+    if not mark.inside:
+        return truth + f"The diagnosis missed it; it said {diagnosis.verdict} {', '.join(diagnosis.set)}".rstrip() + "."
+    alone = "It was named alone" if mark.named else f"It is in the set, one of {groups_of(diagnosis)} group(s) by step"
+    told = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size."
+    others = _other_shapes(mark.hidden, diagnosis)
+    return f"{told} It was found with {others}, on which sizes depend." if others else told
+
+
+def _other_shapes(hidden: Hidden, diagnosis: Diagnosis) -> str:
+    """Settings of shape the effect was found with, where they differ from those of the truth by a twentieth or more."""
+    found = next(one.shapes for one in diagnosis.suspects if one.name == hidden.name)
+    others = [name for name, true in hidden.shapes.items() if not np.isclose(found.get(name, true), true, rtol=0.05)]
+    return " and ".join(f"{name} = {found[name]:.3g} instead of {hidden.shapes[name]:.3g}" for name in others)

@@ -1,0 +1,50 @@
+"""The folder of a twin: measurements, a config that extends the one it is a twin of, and the sealed answer."""
+
+import os
+from pathlib import Path
+
+import pandas as pd
+
+from vegglue.case.resolved_config import as_yaml
+from vegglue.case.schema import Case
+from vegglue.case.text_files import case_name, write_text
+from vegglue.errors import InputError
+
+SEAL = "answer.sealed"
+FILES = {"velocity": ("velocities.csv", "u"), "level": ("levels.csv", "level")}
+
+
+def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Path:
+    """Write all files and return the config. Errors: StorageError when the folder cannot be written."""
+    name = case_name(folder.resolve().name, "twin")
+    used = station[station["used"].to_numpy(bool)]
+    kinds = [kind for kind in FILES if (used["kind"] == kind).any()]
+    tree = {
+        "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
+        "name": name,
+        "title": f"Twin of {case.name}, something may be hidden (synthetic)",
+        "observations": [{"kind": kind, "file": FILES[kind][0]} for kind in kinds],
+        **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
+    }
+    note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
+    texts = {FILES[kind][0]: _stations(used, kind) for kind in kinds}
+    for file, text in (texts | {f"{name}.yaml": note + as_yaml(tree), SEAL: seal}).items():
+        write_text(folder / file, text, "give another folder by --to")
+    return folder / f"{name}.yaml"
+
+
+def _stations(used: pd.DataFrame, kind: str) -> str:
+    """The stations of a kind as a table."""
+    value = FILES[kind][1]
+    named = used[used["kind"] == kind].rename(columns={"value": value, "standard_error": f"{value}_se"})
+    columns = ["experiment", *(["section"] if kind == "velocity" else []), "x", "y", value, f"{value}_se"]
+    return str(named[columns].to_csv(index=False, float_format="%.5f"))
+
+
+def config_in(folder: Path) -> Path:
+    """The config that `write_twin` left there, beside its children maybe. Errors: InputError when it cannot be told."""
+    own = folder / f"{case_name(folder.resolve().name, 'twin')}.yaml"
+    found = [own] if own.is_file() else sorted(folder.glob("*.yaml"))
+    if len(found) != 1:
+        raise InputError(f"{folder}: expected one config, got {len(found)}; `vegglue twin --to {folder}` writes it.")
+    return found[0]

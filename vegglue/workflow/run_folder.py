@@ -1,0 +1,61 @@
+"""The folder of a run: the calibrated place that one command leaves for the next."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.parameter_space import z_at
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
+from vegglue.engine.linearised_model import Model, model_of
+from vegglue.measurements.observations import read_observations
+from vegglue.storage.hdf5 import read_posterior, stored_hash
+
+MAKE_ROOM = "make room and run it again"
+
+
+def folder_of(runs: Path, case: Case) -> Path:
+    """Where the results of a case lie; made if need be."""
+    folder = runs / case.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def model_in(case: Case) -> Model:
+    return model_of(case, read_observations(case))
+
+
+def validation_of(case: Case) -> Model | None:
+    """The case at the measurements that no calibration sees, if it names any."""
+    if case.validation is None:
+        return None
+    seen = {"experiments": case.validation.experiments, "observations": case.validation.observations}
+    there = case.model_copy(update=seen)
+    # An effect on a section or device that was calibrated to need not be in what was not.
+    return model_of(there, read_observations(there.model_copy(update={"effects": {}})))
+
+
+def known_place(case: Case, folder: Path) -> Array | None:
+    """The best place that an earlier command found for exactly this case, z (p,)."""
+    wanted = case_hash(case)
+    try:
+        found = json.loads((folder / "best.json").read_text(encoding="utf-8"))
+        if found["config_hash"] == wanted:
+            return z_at(case, {name: np.array([found["theta"][name]]) for name in case.parameters})[0]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    if stored_hash(folder / "posterior.h5") != wanted:
+        return None
+    posterior = read_posterior(folder / "posterior.h5", wanted)
+    best = slice(posterior.best, posterior.best + 1)
+    return z_at(case, {name: values[best] for name, values in posterior.theta.items()})[0]
+
+
+def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None:
+    """Keep the best place for the next command. Errors: StorageError."""
+    text = json.dumps({"config_hash": case_hash(case), "theta": {name: float(theta[name]) for name in case.parameters}})
+    write_text(folder / "best.json", text, MAKE_ROOM)
