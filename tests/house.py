@@ -1,4 +1,7 @@
-"""The package as it stands: its folders, what they import, how long things are. `python tests/house.py` prints it."""
+"""The package as it stands: its folders, what they import, how long things are.
+
+`python tests/house.py` prints it, and brings the table of ARCHITECTURE.md up to date.
+"""
 
 import ast
 import re
@@ -97,7 +100,15 @@ def page() -> str:
     return "\n".join(["| folder | what it is for | open first |", "|---|---|---|", *rows])
 
 
+def write_page() -> None:
+    """Put the table in its place in ARCHITECTURE.md."""
+    path = ROOT / "ARCHITECTURE.md"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r"\| folder \|.*?\n(?!\|)", page() + "\n", text, flags=re.DOTALL), encoding="utf-8")
+
+
 def main() -> None:
+    write_page()
     print(page())
     lengths = [len(path.read_text(encoding="utf-8").splitlines()) for path in FILES]
     sizes = sorted((size, f"{module_of(path)}.{name}") for path in FILES for name, size in functions(path))

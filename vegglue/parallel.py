@@ -7,12 +7,19 @@ import os
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
+from threading import Semaphore
 from typing import Any
 
 from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import threadpool_limits
+
+# Threads that may be begun beside those at work, in what is done within `at_most`.
+_SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
 
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
@@ -25,14 +32,59 @@ def in_order(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: i
     return list(_pool(jobs, "generator")(delayed(_alone)(work, task) for task in tasks))
 
 
-def in_threads(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> list[Any]:
-    """work(*task) for every task, in their order, by threads: for compiled work on large values that all share."""
-    threads = cpu_count() if jobs < 0 else jobs
+@contextmanager
+def at_most(jobs: int) -> Iterator[None]:
+    """So many threads at once in all that is done within; -1 for one on every core."""
+    token = _SPARE.set(Semaphore((cpu_count() if jobs < 0 else jobs) - 1))
+    try:
+        yield
+    finally:
+        _SPARE.reset(token)
+
+
+def in_threads(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]) -> list[Any]:
+    """work(*task) for every task, in their order, by threads: for compiled work on large values that all share.
+
+    Tasks that are split into tasks of their own share the threads that `at_most` allows, all cores without it.
+    """
+    spare = _SPARE.get()
+    if spare is None:
+        with at_most(-1):
+            return in_threads(work, tasks)
     with threadpool_limits(1):
-        if threads == 1:
-            return [work(*task) for task in tasks]
-        with ThreadPoolExecutor(threads) as pool:  # joblib's own would look for results every hundredth of a second
-            return list(pool.map(lambda task: work(*task), tasks))
+        return _shared_out(work, list(tasks), spare)
+
+
+def _shared_out(work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: Semaphore) -> list[Any]:
+    """Tasks taken one by one, by this thread and by as many others as are spare while some wait."""
+    waiting, found = deque(enumerate(tasks)), [None] * len(tasks)
+
+    def take_next() -> bool:
+        try:
+            position, task = waiting.popleft()
+        except IndexError:
+            return False
+        found[position] = work(*task)
+        return True
+
+    def by_another() -> None:
+        try:
+            while take_next():
+                pass
+        finally:
+            spare.release()
+
+    others: list[Future[None]] = []
+    with ThreadPoolExecutor(max(len(tasks), 1)) as pool:  # which begins a thread only when it is needed
+        while waiting:
+            for _ in range(len(waiting) - 1):
+                if not spare.acquire(blocking=False):
+                    break
+                others.append(pool.submit(copy_context().run, by_another))
+            take_next()
+    for one in others:
+        one.result()  # raises what a task raised
+    return found
 
 
 def alone() -> None:

@@ -12,7 +12,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.fit import MOST_STEPS, SETTLED, fit, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import FURTHEST
-from vegglue.engine.linearised_model import Point
+from vegglue.engine.interface import Point
 
 MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
                          "value": [1.1, 1.05, 0.3], "standard_error": 0.005, "used": True})  # fmt: skip

@@ -13,7 +13,8 @@ from vegglue.calibration.fit import Fitted, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import homogeneity, rung
-from vegglue.engine.linearised_model import Model, Point
+from vegglue.engine.interface import Model, Point
+from vegglue.engine.newton import NEWTON
 from vegglue.site.gridded_site import build_site
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
@@ -38,7 +39,7 @@ def at_best(values: Array, slope: Array) -> Baseline:
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ values / 0.01)
     point = Point(z, slope @ z, slope, {})
     fitted = Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), True)
-    return Baseline(Model(CASE, build_site(CASE), station), noise, fitted, None, None)
+    return Baseline(Model(CASE, build_site(CASE), station, NEWTON), noise, fitted, None, None)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 
 from vegglue.case.config import load_case
 from vegglue.diagnosis.diagnose import diagnose
-from vegglue.engine.linearised_model import Model
+from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.twins.twin import TwinBase, measured, true_place, twin_base
 from vegglue.workflow.run_folder import model_in

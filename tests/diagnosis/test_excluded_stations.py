@@ -16,7 +16,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.cli.loop_commands import compare_command
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
-from vegglue.engine.linearised_model import Model, Point
+from vegglue.engine.interface import Model, Point
 from vegglue.storage.hdf5 import write_diagnosis
 from vegglue.workflow import loop, run_folder
 

@@ -15,14 +15,15 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
-from vegglue.engine.forward_runs import predict
-from vegglue.engine.linearised_model import Point, linearise, model_of
+from vegglue.engine.interface import Point, linearise, predict
+from vegglue.engine.model import model_of
 from vegglue.ensemble.simulate import simulate
 from vegglue.errors import InputError
 from vegglue.inference.homogeneity import alike, only, told_by_data, transfer
 from vegglue.inference.map_and_errors import distinct, groundwork, starting_places, unexplained_residual
 from vegglue.inference.refine import log_posterior, refinable, refine
 from vegglue.measurements.observations import Observations, read_observations
+from vegglue.parallel import at_most
 from vegglue.report.homogeneity_words import homogeneity_in_words
 from vegglue.report.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
@@ -48,13 +49,14 @@ def reach(tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, Observations,
 @pytest.fixture(scope="module")
 def refined(reach: tuple[Case, Observations, Ensemble]) -> Posterior:
     case, observations, ensemble = reach
-    return refine(ensemble, case, observations, jobs=1)
+    with at_most(1):
+        return refine(ensemble, case, observations)
 
 
 @pytest.fixture(scope="module")
 def noise(reach: tuple[Case, Observations, Ensemble]) -> Noise:
     case, observations, ensemble = reach
-    return groundwork(model_of(case, observations), ensemble, "known", jobs=1).noise
+    return groundwork(model_of(case, observations), ensemble, "known").noise
 
 
 def test_a_thousand_effective_draws_around_the_truth(refined: Posterior) -> None:
@@ -95,7 +97,8 @@ def test_the_log_density_is_that_of_errors_and_prior(
 
 def test_numbers_do_not_depend_on_the_jobs(reach: tuple[Case, Observations, Ensemble], refined: Posterior) -> None:
     case, observations, ensemble = reach
-    again = refine(ensemble, case, observations, jobs=2)
+    with at_most(2):
+        again = refine(ensemble, case, observations)
     assert np.array_equal(again.weights, refined.weights)
     assert np.array_equal(again.prediction, refined.prediction)
     assert np.array_equal(again.predictive, refined.predictive)
@@ -137,7 +140,7 @@ def test_what_is_said(refined: Posterior) -> None:
 
 def test_errors_taken_from_the_residual_are_said_to_be(tmp_path: Path) -> None:
     case, observations, ensemble = made(tmp_path, (KNOWN[0], "simulate: {members: 64, seed: 7}"))
-    posterior = refine(ensemble, case, observations, jobs=1)
+    posterior = refine(ensemble, case, observations)
     assert posterior.refinement is not None
     assert posterior.refinement.errors == "estimated"
     left = posterior.best_residual
@@ -175,7 +178,7 @@ def test_missing_standard_errors_are_told(reach: tuple[Case, Observations, Ensem
     case, observations, ensemble = reach
     unknown = replace(observations, table=observations.table.assign(standard_error=math.nan))
     with pytest.raises(InputError, match="standard error above 0"):
-        refine(ensemble, case, unknown, jobs=1)
+        refine(ensemble, case, unknown)
 
 
 def test_far_places_are_solved_on_their_own(reach: tuple[Case, Observations, Ensemble]) -> None:
@@ -184,7 +187,7 @@ def test_far_places_are_solved_on_their_own(reach: tuple[Case, Observations, Ens
     point = linearise(model, np.zeros(2))
     assert point is not None
     z = z_at(case, ensemble.parameters)[:40]  # all over the prior
-    assert predict(model, [point], 1, z) == pytest.approx(ensemble.prediction[:40], abs=1e-4)
+    assert predict(model, [point], z) == pytest.approx(ensemble.prediction[:40], abs=1e-4)
 
 
 def test_starts_are_the_best_that_lie_apart(reach: tuple[Case, Observations, Ensemble]) -> None:
@@ -267,7 +270,7 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
     middle = linearise(model, np.zeros(2))
     assert middle is not None
     joint = fit(model, noise_of(table), middle).point
-    found = transfer(model, noise_of(table), joint, True, jobs=1)
+    found = transfer(model, noise_of(table), joint, True)
     assert found is not None
     assert list(found.experiments) == ["June", "July"]
     assert (found.p[0] < 1e-3) == moves
@@ -276,7 +279,7 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
     assert (found.p_all < 1e-3) == moves
     assert (found.scale, found.more) == (pytest.approx(1, abs=0.3), 1)
     twice = with_correlation(noise_of(table.assign(standard_error=0.005)), 0.0, 3.0)
-    again, free = (transfer(model, errors, joint, False, jobs=1) for errors in (twice, noise_of(table)))
+    again, free = (transfer(model, errors, joint, False) for errors in (twice, noise_of(table)))
     assert again is not None
     assert free is not None
     assert again.scale == pytest.approx(2 * free.scale, rel=0.05)  # its own, whatever the joint fit asked for

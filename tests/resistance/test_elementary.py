@@ -1,4 +1,4 @@
-"""Logarithm and cube root against those of numpy in extended precision, whose double ones are off by up to three units."""
+"""Logarithm and cube root against those of numpy in extended precision; its double ones err by up to three units."""
 
 import numpy as np
 

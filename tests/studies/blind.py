@@ -32,7 +32,7 @@ from vegglue.diagnosis.comparison import improvement, rung
 from vegglue.diagnosis.diagnose import diagnose
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding
 from vegglue.diagnosis.next_measurement import SEPARATES, worth_of_measurements
-from vegglue.engine.linearised_model import Model, linearise
+from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
 from vegglue.parallel import as_finished
 from vegglue.results.diagnosis import Diagnosis
@@ -139,7 +139,7 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     except InputError as error:
         return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)
-    found = diagnose(model, ground.here.z, jobs=1)
+    found = diagnose(model, ground.here.z)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
     if found.steps and trial.number % LOOKED_INTO == 0:
         record |= held_out(model, found)
@@ -222,7 +222,7 @@ def measured_again(
     values += error * np.random.default_rng((seed, 3)).standard_normal(len(more))
     station = pd.concat([model.station, more.assign(value=values, standard_error=error, used=True)], ignore_index=True)
     case = model.case.model_copy(update={"experiments": experiments})
-    again = diagnose(Model(case, model.site, station), base.fitted.point.z, jobs=1)
+    again = diagnose(replace(model, case=case, station=station), base.fitted.point.z)
     return {
         "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
         "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict, "set": again.set,
@@ -234,7 +234,7 @@ def _true_values(ground: TwinBase, answer: Answer, experiments: dict[str, Any], 
     case = ground.fine.case.model_copy(update={"experiments": experiments})
     for hidden in (one for one in answer.hidden if one.station < 0):
         case = case_hiding(case, candidate_of(ground.model, hidden.name), hidden)
-    point = linearise(Model(case, ground.fine.site, station.reset_index(drop=True)), ground.there.z)
+    point = linearise(replace(ground.fine, case=case, station=station.reset_index(drop=True)), ground.there.z)
     return None if point is None else point.prediction
 
 

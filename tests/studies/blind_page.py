@@ -219,8 +219,8 @@ at parameters 0.3 to 1 standard deviations off the centre of their priors, with 
 large as makes it visible at the ratio stated (length of its trace, whitened, after what calibration can mimic is
 taken off) on the true flow; shapes lie between the values that the search tries. A diagnosis took {seconds} s of
 one core (median). The truth differs from the model in its grid, parameters and errors, not in its equations: data
-of another code are diagnosed in `tests/end_to_end/test_open_cases.py`. The cells are those that `vegglue import` makes, 16
-across the floor. On cells twice as wide the difference between the grids alone made 14 alarms in 134 sets with
+of another code are diagnosed in `tests/end_to_end/test_open_cases.py`. The cells are those that `vegglue import` makes,
+16 across the floor. On cells twice as wide the difference between the grids alone made 14 alarms in 134 sets with
 correlated errors and nothing hidden (5 in 121 with the truth on the same grid), which is why the study was moved to
 these.
 
@@ -243,9 +243,9 @@ effect hidden at any ratio, these came true so often:
 What could be known at ratio 3? Somebody who knew that one effect is there, that its trace is exactly three standard
 errors long, and every trace without error, would have sets of at most three groups in {small95} of such data if
 each set is to hold the truth with a chance of 95 % ({inside95} do, since a set ends with the group that fills it),
-and in {small90} with one of 90 % ({inside90}). Simulated on the traces of this twin (`tests/studies/blind_informed.py`). It
-is no bound on the line above, which counts sets over all data: who gave short ones where they are likely right, and
-long ones elsewhere, could do better.
+and in {small90} with one of 90 % ({inside90}). Simulated on the traces of this twin
+(`tests/studies/blind_informed.py`). It is no bound on the line above, which counts sets over all data: who gave short
+ones where they are likely right, and long ones elsewhere, could do better.
 
 ![Shares and their intervals](blind-alarms.svg)
 

@@ -15,7 +15,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.comparison import held_out, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.engine.linearised_model import Model, linearise
+from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.spatial_scan import SPOT_RADIUS

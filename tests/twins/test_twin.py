@@ -13,7 +13,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.cli.main import main
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.engine.linearised_model import fingerprint
+from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Step, Where
 from vegglue.screening.candidates import with_effect
@@ -87,7 +87,7 @@ def test_a_linear_effect_has_the_size_of_its_fingerprint(ground: TwinBase) -> No
     _, answer = measured(ground, ["discharge_error[mid]"], 3.0, "white", 4)
     candidate = candidate_named(ground.model.case, ground.model.station, "discharge_error[mid]")
     case = with_effect(ground.model.case, candidate, {})
-    trace = fingerprint(ground.model, ground.here, [(case, candidate.parameter, candidate.effect.amplitude)])
+    trace = responses(ground.model, ground.here, [Cause(case, candidate.parameter, candidate.effect.amplitude)])
     noise = with_grid_error(noise_of(ground.model.station), ground.difference)
     white, slopes = noise.whiten(noise.used(trace)), noise.whiten(noise.used(ground.here.slope))
     length = project(slopes, white[:, 0], np.zeros(4), white).length[0]

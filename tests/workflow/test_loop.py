@@ -1,6 +1,7 @@
 """The loop through the command line: a folder becomes a case, a case a child, a hidden effect a name."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +9,14 @@ import numpy as np
 import pytest
 from reach import said_to, vegglue
 
-from vegglue.calibration.baseline import coarser
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.engine.linearised_model import linearise, model_of, predict_near
+from vegglue.engine.interface import linearise
+from vegglue.engine.model import coarser, model_of
+from vegglue.engine.newton import predict_near
 from vegglue.measurements.observations import read_observations
 from vegglue.screening.candidates import at_work, candidates_of, with_effect
 from vegglue.workflow.loop import write_child
@@ -156,7 +158,7 @@ def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
     truth = linearise(model, np.array([0.4, -0.3, 0.2, -0.5]))
     assert truth is not None
     exact = model.station.assign(value=truth.prediction)
-    made = type(model)(case, model.site, exact)
+    made = replace(model, station=exact)
     start = linearise(made, np.zeros(4))
     assert start is not None
     fitted = fit(made, noise_of(exact), start)

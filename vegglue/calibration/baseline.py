@@ -7,17 +7,13 @@ import scipy.stats
 from vegglue.arrays import Array
 from vegglue.calibration.fit import Fitted, fit, objective
 from vegglue.calibration.noise import Noise, noise_of, scattered, with_grid_error
-from vegglue.case.schema import Case
-from vegglue.engine.linearised_model import Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.site.channel_geometry import cells_across
-from vegglue.site.gridded_site import build_site
 
 # Places of the prior that are looked at on the coarse grid, and how many of them are followed downhill.
 LOOKED_AT, FOLLOWED = 8, 2
-FEWEST_CELLS = 6
-# Length over width of cells above which a coarser grid has wider ones only: across the flow is where the error is.
-LONG = 2.0
 # Cells across the floor below which a grid is no place to compare effects.
 ENOUGH_ACROSS = 7.0
 
@@ -34,18 +30,26 @@ class Baseline:
     coarse: Model | None
     on_coarse: Point | None
 
-    @property
-    def quick(self) -> tuple[Model, Noise, Point]:
-        """A model that is cheaper to fit, the noise it is fitted with, and a point to start from.
 
-        The coarse one, its measurements shifted by what the grid makes of the predictions here; or the model itself
-        when cells of twice the size are too coarse for the floor.
-        """
-        point = self.fitted.point
-        if self.coarse is None or self.on_coarse is None or cells_across(self.coarse.site) < ENOUGH_ACROSS:
-            return self.model, self.noise, point
-        shift = self.noise.used(point.prediction - self.on_coarse.prediction)
-        return self.coarse, replace(self.noise, value=self.noise.value - shift), self.on_coarse
+@dataclass(frozen=True)
+class SearchModel:
+    """What a search for missing effects fits again and again: a cheap model, its noise, and a point of it."""
+
+    model: Model
+    noise: Noise
+    point: Point
+
+
+def search_model(base: Baseline) -> SearchModel:
+    """The model on cells of twice the size, its measurements shifted by what the grid makes of the predictions.
+
+    The model itself when cells of twice the size are too coarse for the floor of the channel.
+    """
+    point = base.fitted.point
+    if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < ENOUGH_ACROSS:
+        return SearchModel(base.model, base.noise, point)
+    shift = base.noise.used(point.prediction - base.on_coarse.prediction)
+    return SearchModel(base.coarse, replace(base.noise, value=base.noise.value - shift), base.on_coarse)
 
 
 def baseline(model: Model, known: Array | None = None) -> Baseline:
@@ -96,20 +100,6 @@ def _refined(model: Model, noise: Noise, near: Point) -> Fitted:
 def grid_difference(point: Point, on_coarse: Point | None) -> Array:
     """What predictions (station,) change by on cells of twice the size; zero where the coarse flow finds no rest."""
     return point.prediction - (point if on_coarse is None else on_coarse).prediction
-
-
-def coarser(model: Model) -> Model | None:
-    """The model on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
-
-    None where their number is odd or would become too small.
-    """
-    grid = model.site.grid
-    along = 1 if grid.dx > LONG * grid.dy else 2
-    if grid.x.size % along or grid.y.size % 2 or min(grid.x.size / along, grid.y.size / 2) < FEWEST_CELLS:
-        return None
-    cell = (along * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])
-    case: Case = model.case.model_copy(update={"grid": model.case.grid.model_copy(update={"cell": cell})})
-    return Model(case, build_site(case), model.station)
 
 
 def _starts(model: Model, noise: Noise) -> list[Point]:

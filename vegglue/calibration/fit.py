@@ -10,7 +10,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.case.parameter_space import FURTHEST, theta_at
-from vegglue.engine.linearised_model import Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise
 
 # A step that promises less than this improvement of the misfit ends the search.
 SETTLED = 0.02

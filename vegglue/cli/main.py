@@ -24,7 +24,7 @@ from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
-from vegglue.parallel import alone
+from vegglue.parallel import alone, at_most
 from vegglue.progress import Progress
 from vegglue.report.page import write_report
 from vegglue.report.posterior_words import describe
@@ -128,7 +128,8 @@ def _inferred(case: Case, observations: Observations, ensemble: Ensemble, method
         )
     if (method or case.infer.method) == "glue" or not refinable(case):
         return glue(ensemble, case, observations)
-    return refine(ensemble, case, observations, jobs, lambda text: console.print(f"... {text}", style="dim"))
+    with at_most(jobs):
+        return refine(ensemble, case, observations, lambda text: console.print(f"... {text}", style="dim"))
 
 
 @app.command()

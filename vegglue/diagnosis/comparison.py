@@ -14,7 +14,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
-from vegglue.engine.linearised_model import Model, linearise
+from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import alike, told_by_data
 from vegglue.inference.likelihood import root_mean_square
 

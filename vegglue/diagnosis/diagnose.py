@@ -18,7 +18,7 @@ from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.refits import accepted, pruned, refits_of
 from vegglue.diagnosis.suspects import hiding, suspects_of
 from vegglue.diagnosis.verdict import Misfit, judged
-from vegglue.engine.linearised_model import Model
+from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.progress import Say
 from vegglue.results.diagnosis import ALARM, ALARM_OF_PLACES, Diagnosis, Step, Suspect, Where
@@ -38,7 +38,7 @@ BESIDE = 0.1
 CLEARLY = 3.0
 
 
-def diagnose(model: Model, known: Array | None = None, jobs: int = -1, say: Say = lambda text: None) -> Diagnosis:
+def diagnose(model: Model, known: Array | None = None, say: Say = lambda text: None) -> Diagnosis:
     """Find out what a calibrated model lacks. known (p,): a good place of the prior, if there is one.
 
     Errors: InputError when the model finds no flow, or a station has no standard error.
@@ -55,7 +55,7 @@ def diagnose(model: Model, known: Array | None = None, jobs: int = -1, say: Say 
         suspects = now | {name: one for name, one in suspects.items() if one.refitted or name not in now}
         if _alarm(seen, steps) != "effect" or len(steps) == ACCEPTED:
             break
-        refits = refits_of(seen, jobs, say)
+        refits = refits_of(seen, say)
         found = accepted(seen, refits, bool(steps), say)
         suspects |= {one.candidate.name: one.told(now[one.candidate.name]) for one in refits}
         if found is None:

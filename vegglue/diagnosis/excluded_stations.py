@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from vegglue.engine.linearised_model import Model
+from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
 
 # What makes a measurement the same in a case and in those that extend it.

@@ -6,7 +6,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.effects.surroundings import ChannelGeometry
-from vegglue.engine.linearised_model import Model, Point
+from vegglue.engine.interface import Model, Point
 from vegglue.site.channel_geometry import channel_geometry
 
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.

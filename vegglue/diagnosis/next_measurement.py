@@ -10,7 +10,7 @@ j may be the model without any effect: then D^2 says whether i would be seen at 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -18,8 +18,8 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
-from vegglue.engine.linearised_model import Model, fingerprint, linearise
-from vegglue.screening.candidates import Candidate, change_of
+from vegglue.engine.interface import Model, linearise, responses
+from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.site.gridded_site import build_site
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
@@ -80,10 +80,10 @@ def worth_of_measurements(
     else:
         return [[] for _ in questions]
     every = [rival for question in questions for rival in question]
-    changed = [change_of(wide.case, one, shapes) for one, shapes, _ in every]
+    changed = [cause_of(wide.case, one, shapes) for one, shapes, _ in every]
     errors = _errors(wide.station, noise)[:, None]
     slope = point.slope / errors
-    traces = fingerprint(wide, point, changed) / errors * np.array([gain for _, _, gain in every])
+    traces = responses(wide, point, changed) / errors * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
     known[: len(model.station)] = model.station["used"].to_numpy(bool)
     ends = np.cumsum([len(question) for question in questions])
@@ -113,7 +113,7 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
         plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment, setting))
         tables.append(table)
         count += len(table)
-    return Model(case, model.site, pd.concat(tables, ignore_index=True)), plans
+    return replace(model, case=case, station=pd.concat(tables, ignore_index=True)), plans
 
 
 def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:

@@ -9,12 +9,12 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, grid_difference
+from vegglue.calibration.baseline import Baseline, grid_difference, search_model
 from vegglue.calibration.fit import Fitted, chi2, fit, interval95, objective
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
-from vegglue.engine.linearised_model import Model, linearise
+from vegglue.engine.interface import Model, linearise
 from vegglue.parallel import in_threads
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening import score_test
@@ -46,11 +46,11 @@ class Refit:
         return replace(told, objective=self.fitted.objective)
 
 
-def refits_of(seen: Screening, jobs: int, say: Callable[[str], None]) -> list[Refit]:
+def refits_of(seen: Screening, say: Callable[[str], None]) -> list[Refit]:
     """The most suspect effects refitted, the best first; those that find no flow are left out."""
     tried = _handful(seen)
     say(f"refitting with {', '.join(seen.traces.candidates[j].name for j in tried)}")
-    found = in_threads(partial(_refit, seen), [(j,) for j in tried], jobs)
+    found = in_threads(partial(_refit, seen), [(j,) for j in tried])
     return sorted((one for one in found if one is not None), key=lambda one: one.fitted.objective)
 
 
@@ -62,8 +62,8 @@ def accepted(
     None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
     say nothing, or when no flow is found with it.
     """
-    _, noise, point = seen.base.quick
-    fall = [objective(noise, point) - one.fitted.objective for one in refits]
+    search = search_model(seen.base)
+    fall = [objective(search.noise, search.point) - one.fitted.objective for one in refits]
     if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
         return None
     best, chance, groups = refits[0], *_rivals(seen, refits, np.array(fall))
@@ -100,7 +100,8 @@ def _onward(seen: Screening, best: Refit) -> Baseline | None:
     model = _with(base.model, seen, best)
     if base.coarse is None:
         return Baseline(model, base.noise, best.fitted, None, None)
-    start = place if base.quick[0] is base.model else linearise(model, place.z, place) or linearise(model, place.z)
+    on_own_grid = search_model(base).model is base.model
+    start = place if on_own_grid else linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
         return None
     fitted, coarse = fit(model, base.noise, start), _with(base.coarse, seen, best)
@@ -123,12 +124,12 @@ def _handful(seen: Screening) -> list[int]:
 
 def _refit(seen: Screening, candidate: int) -> Refit | None:
     one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
-    quick, noise, point = seen.base.quick
-    model = replace(quick, case=with_effect(quick.case, one, seen.traces.settings[column]))
-    start = linearise(model, refit_start(seen, candidate, model.case), point)
+    search = search_model(seen.base)
+    model = replace(search.model, case=with_effect(search.model.case, one, seen.traces.settings[column]))
+    start = linearise(model, refit_start(seen, candidate, model.case), search.point)
     if start is None:
         return None
-    fitted = fit(model, noise, start, REFIT_STEPS)
+    fitted = fit(model, search.noise, start, REFIT_STEPS)
     amplitude, low, high = interval95(model, fitted, one.parameter)
     return Refit(one, column, fitted, amplitude, (low, high))
 

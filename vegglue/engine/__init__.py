@@ -1,5 +1,5 @@
-"""What inference and diagnosis ask of a flow model: predictions, slopes, answers to a cause, adjoints.
+"""What inference and diagnosis ask of a flow model, and the engines that answer: `newton`, and `marching` for tests.
 
 May import: effects, case, site, measurements, flow, solver.
-Open first: linearised_model.py, forward_runs.py.
+Open first: interface.py, newton.py.
 """

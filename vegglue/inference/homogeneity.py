@@ -18,7 +18,8 @@ from vegglue.calibration.fit import Fitted, covariance, fit
 from vegglue.calibration.noise import Noise, covariance_of, with_correlation
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
-from vegglue.engine.linearised_model import DIFFERENCE_STEP, Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.newton import DIFFERENCE_STEP
 from vegglue.inference.posterior_summary import on_flat_scale
 from vegglue.parallel import in_threads
 from vegglue.results.posterior import Transfer
@@ -27,7 +28,7 @@ from vegglue.results.posterior import Transfer
 SILENT = 0.5
 
 
-def transfer(model: Model, noise: Noise, joint: Point, stated: bool, jobs: int) -> Transfer | None:
+def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer | None:
     """Every experiment that has stations refitted alone, from the joint best place; None with fewer than two.
 
     stated: errors are known and only made larger, where the experiments alone ask for it; else their size is free.
@@ -38,7 +39,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool, jobs: int) 
         return None
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [only(model, noise, name) for name in here]
-    fits = in_threads(_alone, [(*part, joint) for part in parts], jobs)
+    fits = in_threads(_alone, [(*part, joint) for part in parts])
     scale = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
     for e, fitted in enumerate(fits):
@@ -117,7 +118,7 @@ def only(model: Model, noise: Noise, experiment: str) -> tuple[Model, Noise]:
         noise, rows=rows, value=noise.value[kept], error=noise.error[kept], apart=noise.apart[np.ix_(kept, kept)],
         grid=noise.grid[kept], lower=np.asarray(lower),
     )  # fmt: skip
-    return Model(case, model.site, model.station[here].reset_index(drop=True)), part
+    return replace(model, case=case, station=model.station[here].reset_index(drop=True)), part
 
 
 def _alone(own: Model, errors: Noise, joint: Point) -> Fitted | None:

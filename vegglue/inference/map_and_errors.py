@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, coarser, grid_difference
+from vegglue.calibration.baseline import Baseline, grid_difference
 from vegglue.calibration.fit import Fitted, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error
 from vegglue.case.parameter_space import z_at
-from vegglue.engine.linearised_model import Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
 from vegglue.parallel import in_threads
@@ -35,13 +36,13 @@ class Modes:
     starts: int
 
 
-def modes_of(model: Model, noise: Noise, ensemble: Ensemble, jobs: int) -> Modes:
+def modes_of(model: Model, noise: Noise, ensemble: Ensemble) -> Modes:
     """Errors: InputError when no flow is found from any of the members."""
     starts = starting_places(noise, z_at(model.case, ensemble.parameters), ensemble.prediction)
     coarse = coarser(model)
-    ends = _followed(coarse or model, noise, starts, jobs)
+    ends = _followed(coarse or model, noise, starts)
     if coarse is not None:
-        ends = _finished(model, coarse, noise, ends, jobs)
+        ends = _finished(model, coarse, noise, ends)
     if not ends:
         raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
     return Modes(tuple(ends), len(starts))
@@ -60,8 +61,8 @@ def starting_places(noise: Noise, z: Array, prediction: Array) -> Array:
     return np.asarray(z[chosen])
 
 
-def _followed(model: Model, noise: Noise, starts: Array, jobs: int) -> list[Fitted]:
-    return distinct([end for end in in_threads(_follow, [(model, noise, z) for z in starts], jobs) if end is not None])
+def _followed(model: Model, noise: Noise, starts: Array) -> list[Fitted]:
+    return distinct([end for end in in_threads(_follow, [(model, noise, z) for z in starts]) if end is not None])
 
 
 def _follow(model: Model, noise: Noise, z: Array) -> Fitted | None:
@@ -69,8 +70,8 @@ def _follow(model: Model, noise: Noise, z: Array) -> Fitted | None:
     return None if start is None else fit(model, noise, start)
 
 
-def _finished(model: Model, coarse: Model, noise: Noise, ends: list[Fitted], jobs: int) -> list[Fitted]:
-    finer = in_threads(_finish, [(model, coarse, noise, end) for end in ends], jobs)
+def _finished(model: Model, coarse: Model, noise: Noise, ends: list[Fitted]) -> list[Fitted]:
+    finer = in_threads(_finish, [(model, coarse, noise, end) for end in ends])
     return distinct([end for end in finer if end is not None])
 
 
@@ -120,7 +121,7 @@ class Groundwork:
     grid_known: bool
 
 
-def groundwork(model: Model, ensemble: Ensemble, rule: str, jobs: int) -> Groundwork:
+def groundwork(model: Model, ensemble: Ensemble, rule: str) -> Groundwork:
     """Best places from the best members; then the errors, and the best places under these.
 
     known: errors as stated and that of the grid, from the difference to cells of twice the size; best-member: errors
@@ -129,7 +130,7 @@ def groundwork(model: Model, ensemble: Ensemble, rule: str, jobs: int) -> Ground
     Errors: InputError when a standard error is missing (known) or no flow is found.
     """
     noise = _first_noise(model, ensemble, rule)
-    modes = modes_of(model, noise, ensemble, jobs)
+    modes = modes_of(model, noise, ensemble)
     fits, coarse = list(modes.fits), coarser(model)
     on_coarse = None if coarse is None else linearise(coarse, fits[0].point.z)
     if rule == "known":

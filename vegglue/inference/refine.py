@@ -17,8 +17,8 @@ from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
-from vegglue.engine.forward_runs import predict
-from vegglue.engine.linearised_model import model_of
+from vegglue.engine.interface import predict
+from vegglue.engine.model import model_of
 from vegglue.inference.canopy_correction import corrected_canopy
 from vegglue.inference.glue import check_stations
 from vegglue.inference.homogeneity import transfer
@@ -41,9 +41,7 @@ WANTED = 1000
 NO_CHANCE = 0.01
 
 
-def refine(
-    ensemble: Ensemble, case: Case, observations: Observations, jobs: int = -1, say: Say = lambda text: None
-) -> Posterior:
+def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say = lambda text: None) -> Posterior:
     """Draws worth WANTED of the posterior, or as many as some thousand runs give, with what they predict unseen.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
@@ -51,11 +49,11 @@ def refine(
     """
     check_stations(ensemble, observations.table)
     say("following the best members downhill")
-    base = groundwork(model_of(case, observations), ensemble, case.infer.sigma, jobs)
+    base = groundwork(model_of(case, observations), ensemble, case.infer.sigma)
     say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
-    run = partial(predict, base.model, [one.point for one in base.fits], jobs)
+    run = partial(predict, base.model, [one.point for one in base.fits])
     drawn = sample(run, partial(log_posterior, base.noise), mixture_around(base.fits), WANTED, case.simulate.seed)
-    moved = transfer(base.model, base.noise, base.fits[0].point, case.infer.sigma == "known", jobs)
+    moved = transfer(base.model, base.noise, base.fits[0].point, case.infer.sigma == "known")
     return _posterior(base, drawn, moved, ensemble)
 
 

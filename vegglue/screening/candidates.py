@@ -11,8 +11,9 @@ import pandas as pd
 from vegglue.case.case_effects import effect_of
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
-from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
+from vegglue.engine.interface import Cause
 
 # Combinations of shapes that a search tries at most.
 MOST_SHAPES = 12
@@ -109,9 +110,10 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
     )
 
 
-def change_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> tuple[Case, str, Amplitude]:
-    """What a fingerprint is asked of: the case with one effect more, the parameter that is added, its amplitude."""
-    return with_effect(case, candidate, shapes), candidate.parameter, candidate.effect.amplitude
+def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
+    """The case with one effect more, as a cause whose answer is the fingerprint of the effect."""
+    changed = with_effect(case, candidate, shapes)
+    return Cause(changed, candidate.parameter, candidate.effect.amplitude, candidate.experiments)
 
 
 def prior_of(effect: Effect) -> Parameter:

@@ -6,10 +6,10 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.effects.definition import Amplitude
-from vegglue.engine.linearised_model import Point, fingerprint
-from vegglue.screening.candidates import Candidate, candidates_of, change_of
+from vegglue.engine.interface import Point, responses
+from vegglue.screening.candidates import Candidate, candidates_of, cause_of
 from vegglue.screening.spatial_scan import Spots, spots_of
 from vegglue.site.channel_geometry import half_width
 
@@ -41,8 +41,9 @@ class Fingerprints:
 
 
 def fingerprints_of(base: Baseline) -> Fingerprints:
-    """Those of the quick model: they only have to point the right way. Spots are sized by the model itself."""
-    model, _, point = base.quick
+    """Those of the search model: they only have to point the right way. Spots are sized by the model itself."""
+    search = search_model(base)
+    model, point = search.model, search.point
     candidates = candidates_of(model.case, model.station)
     tried = [one.settings() for one in candidates]
     every = [(one, shapes) for one, settings in zip(candidates, tried, strict=True) for shapes in settings]
@@ -52,6 +53,6 @@ def fingerprints_of(base: Baseline) -> Fingerprints:
         columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
         settings=[shapes for _, shapes in every],
         amplitudes=[one.effect.amplitude for one, _ in every],
-        prints=fingerprint(model, point, [change_of(model.case, one, shapes) for one, shapes in every]),
+        prints=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
         spots=spots_of(model, point, half_width(base.model.site)),
     )

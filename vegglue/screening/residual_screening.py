@@ -6,7 +6,7 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.calibration.noise import Noise, drawn_errors, estimated
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
@@ -104,7 +104,7 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     The correlation of the errors is estimated first, with all that could be missing set aside. before: an earlier look,
     whose traces are taken if they are those of the same point.
     """
-    point = base.quick[2]
+    point = search_model(base).point
     traces = before.traces if before is not None and before.traces.point is point else fingerprints_of(base)
     slope, prints, spots = (base.noise.used(values) for values in (point.slope, traces.prints, traces.spots.traces))
     left, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.engine.linearised_model import Model, Point, force_response, problem_at
-from vegglue.flow.equations import faces
-from vegglue.solver.wet_band import widen
+from vegglue.engine.interface import Model, Point, flow_at_centres, force_response
 
 # Radius of the spot over the half width of the floor, and spacing of places over the radius.
 SPOT_RADIUS, SPOT_SPACING = 0.3, 1.0
@@ -37,12 +35,10 @@ def spots_of(model: Model, point: Point, half_width: float) -> Spots:
     along = np.exp(-(((grid.x[None] - x[:, None]) / radius) ** 2))
     across = np.exp(-(((grid.y[None] - y[:, None]) / radius) ** 2))
     traces = np.zeros((len(model.station), x.size, y.size))
-    for experiment, flow in point.flows.items():
-        now = faces(problem_at(model, experiment, point.z), widen(flow.state, grid.y.size, flow.band))
-        u = 0.5 * (now.u[1:] + now.u[:-1])[..., 0]
-        v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
-        wet |= now.cell[..., 0] > 0.05
-        pushed = -force_response(model, point, experiment) * (np.hypot(u, v) * u)
+    for experiment in point.flows:
+        flow = flow_at_centres(model, point, experiment)
+        wet |= flow.depth > 0.05
+        pushed = -force_response(model, point, experiment) * (np.hypot(flow.u, flow.v) * flow.u)
         traces[model.rows[experiment]] = np.einsum("ai,nij,bj->nab", along, pushed, across, optimize=True)
     there = along @ wet @ across.T > 0.5 * along.sum(axis=1)[:, None] * across.sum(axis=1)[None]
     a, b = np.nonzero(there)

@@ -19,16 +19,16 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import coarser
 from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_grid_error
 from vegglue.case.messages import nearest
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.engine.linearised_model import Model, Point, fingerprint, linearise
+from vegglue.engine.interface import Model, Point, linearise, responses
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, candidates_of, change_of, working_of
+from vegglue.screening.candidates import Candidate, candidates_of, cause_of, working_of
 from vegglue.site.gridded_site import build_site
 from vegglue.twins import unlisted_objects
 
@@ -130,7 +130,7 @@ def finer(model: Model) -> Model:
     lengths = (grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
     cell = tuple(length / round(FINER * round(length / size)) for length, size in zip(lengths, grid.cell, strict=True))
     case: Case = model.case.model_copy(update={"grid": grid.model_copy(update={"cell": cell})})
-    return Model(case, build_site(case), model.station)
+    return replace(model, case=case, site=build_site(case))
 
 
 def measured(ground: TwinBase, wanted: Sequence[str], snr: float, noise: str, seed: int) -> tuple[pd.DataFrame, Answer]:
@@ -259,8 +259,8 @@ def _first_size(ground: TwinBase, errors: Noise, candidate: Candidate, hidden: H
     """(snr / |S_perp|)^(1/power), to first order."""
     amplitude = candidate.effect.amplitude
     case = _knowing(ground.model.case, hidden)
-    changed = change_of(case, candidate, hidden.shapes)
-    trace = fingerprint(replace(ground.model, case=case), ground.here, [changed])
+    changed = cause_of(case, candidate, hidden.shapes)
+    trace = responses(replace(ground.model, case=case), ground.here, [changed])
     return amplitude.size(snr / max(_visible(ground, errors, trace[:, 0]), 1e-300))
 
 

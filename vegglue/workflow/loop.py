@@ -23,13 +23,14 @@ from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of
 from vegglue.diagnosis.refits import NEEDED
 from vegglue.diagnosis.suspects import SEEN_SURELY
 from vegglue.effects.definition import Effect
-from vegglue.engine.linearised_model import fingerprint
+from vegglue.engine.interface import responses
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
+from vegglue.parallel import at_most
 from vegglue.progress import Say
 from vegglue.report.diagnosis_pictures import save_diagnosis_figure
 from vegglue.results.diagnosis import Diagnosis, Suspect
-from vegglue.screening.candidates import Candidate, change_of, start_of
+from vegglue.screening.candidates import Candidate, cause_of, start_of
 from vegglue.storage.hdf5 import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.run_folder import MAKE_ROOM, known_place, model_in, remember_place, validation_of
 
@@ -55,7 +56,8 @@ def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
     kept = diagnosis_that_fits(path, wanted)
     if kept is not None:
         return kept
-    found = diagnose(model_in(case), known_place(case, folder), jobs, say)
+    with at_most(jobs):
+        found = diagnose(model_in(case), known_place(case, folder), say)
     write_diagnosis(path, found, resolved_yaml(case), wanted)
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.first_parameters)
@@ -172,8 +174,8 @@ def trace_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFr
     """
     base, one = calibrated(case, folder, excluded_by()), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
-    changed = change_of(base.model.case, one, shapes)
-    return fingerprint(base.model, base.fitted.point, [changed])[:, 0], base.model.station
+    changed = cause_of(base.model.case, one, shapes)
+    return responses(base.model, base.fitted.point, [changed])[:, 0], base.model.station
 
 
 def _rung(case: Case, folder: Path, aside: pd.DataFrame) -> Rung:

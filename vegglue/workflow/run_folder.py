@@ -11,7 +11,8 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.engine.linearised_model import Model, model_of
+from vegglue.engine.interface import Model
+from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
 from vegglue.storage.hdf5 import read_posterior, stored_hash
 

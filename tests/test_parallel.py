@@ -1,0 +1,45 @@
+"""Threads of tasks that are split again: never more at once than allowed, whatever the nesting, and none idle."""
+
+import threading
+import time
+
+import pytest
+
+from vegglue.parallel import at_most, in_threads
+
+
+def most_at_once(jobs: int) -> int:
+    """The largest number of innermost tasks that ran side by side, of three tasks cut into three each."""
+    now, most, lock = 0, 0, threading.Lock()
+
+    def work() -> None:
+        nonlocal now, most
+        with lock:
+            now += 1
+            most = max(most, now)
+        time.sleep(0.02)
+        with lock:
+            now -= 1
+
+    with at_most(jobs):
+        in_threads(lambda: in_threads(work, [()] * 3), [()] * 3)
+    return most
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_nested_tasks_keep_to_the_number_of_jobs(jobs: int) -> None:
+    assert most_at_once(jobs) == jobs
+
+
+def test_what_is_found_stands_in_the_order_of_the_tasks() -> None:
+    def late(number: int) -> int:
+        time.sleep(0.01 * (5 - number))
+        return number
+
+    with at_most(3):
+        assert in_threads(late, [(number,) for number in range(5)]) == list(range(5))
+
+
+def test_what_a_task_raises_is_raised() -> None:
+    with at_most(2), pytest.raises(ZeroDivisionError):
+        in_threads(lambda number: 1 / number, [(1,), (0,), (2,)])

@@ -1,0 +1,123 @@
+"""What inference and diagnosis ask of a flow engine, and nothing else of it.
+
+A model is a function from z (p,) to predictions (n,) at stations. Points z are places of the prior in which every
+parameter is standard normal, z = Phi^-1(F(theta)), so that the misfit of the prior is |z|^2.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.case.schema import Case
+from vegglue.effects.definition import Amplitude
+from vegglue.site.gridded_site import Site
+
+
+@dataclass(frozen=True)
+class Point:
+    """A model linearised at z (p,): predictions (n,) [m/s or m] and slopes d prediction / dz (n, p).
+
+    flows: by experiment, what the engine keeps of the flow there; nobody else looks into it.
+    """
+
+    z: Array
+    prediction: Array
+    slope: Array
+    flows: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A change whose response is asked for: a case with one parameter more, which does nothing at `amplitude.off`.
+
+    experiments: where it acts, empty for all of them.
+    """
+
+    case: Case
+    parameter: str
+    amplitude: Amplitude
+    experiments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CentreFlow:
+    """The flow of one experiment at cell centres, (nx, ny): depth [m], u along x and v across [m/s]."""
+
+    depth: Array
+    u: Array
+    v: Array
+
+
+@dataclass(frozen=True)
+class Engine:
+    """How a flow is computed. A new engine is one value of this kind, see `newton` and `marching`.
+
+    linearise(model, z, near): the model and its slopes at z (p,), or None where no steady flow is found; near: a point
+        to start from, of this model or of one on cells of twice the size.
+    predict(model, points, z): predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
+    responses(model, point, causes): d prediction / d (amplitude - off)^power at off, (n, causes).
+    force_response(model, point, experiment): d prediction / d f_x [m/s per m/s2] of the stations of an experiment, for
+        a force along x in each cell, (n, nx, ny).
+    flow_at_centres(model, point, experiment): depth and velocities of a point.
+    """
+
+    name: str
+    linearise: Callable[["Model", Array, Point | None], Point | None]
+    predict: Callable[["Model", Sequence[Point], Array], Array]
+    responses: Callable[["Model", Point, Sequence[Cause]], Array]
+    force_response: Callable[["Model", Point, str], Array]
+    flow_at_centres: Callable[["Model", Point, str], CentreFlow]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A case on its grid, read at stations by an engine: a function from z (p,) to predictions (n,)."""
+
+    case: Case
+    site: Site
+    station: pd.DataFrame
+    engine: Engine
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.case.parameters)
+
+    @cached_property
+    def rows(self) -> dict[str, np.ndarray]:
+        """Which stations stand in each experiment."""
+        names = self.station["experiment"].to_numpy()
+        return {experiment: np.flatnonzero(names == experiment) for experiment in self.case.experiments}
+
+    def station_of(self, experiment: str) -> pd.DataFrame:
+        """The stations of one experiment."""
+        return self.station.iloc[self.rows[experiment]]
+
+
+def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None:
+    """Predictions and slopes at z (p,); None when a flow finds no rest. near: a point to start from."""
+    return model.engine.linearise(model, z, near)
+
+
+def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
+    """Predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known already."""
+    return model.engine.predict(model, points, z)
+
+
+def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+    """d prediction / d (amplitude - off)^power at off, (n, causes): the fingerprints of causes at a point."""
+    return model.engine.responses(model, point, causes)
+
+
+def force_response(model: Model, point: Point, experiment: str) -> Array:
+    """d prediction / d f_x (n, nx, ny) [m/s per m/s2] of an experiment's stations, for a force along x in each cell."""
+    return model.engine.force_response(model, point, experiment)
+
+
+def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
+    """Depth and velocities at cell centres of one experiment at a point."""
+    return model.engine.flow_at_centres(model, point, experiment)

@@ -1,0 +1,193 @@
+"""The package's own engine: steady states by Newton and chord steps, with exact slopes and adjoints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.parameter_space import theta_at
+from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point
+from vegglue.engine.newton_runs import predict_members
+from vegglue.flow.equations import faces, residual
+from vegglue.flow.problem import ALONG, Problem, crop
+from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.sensor import read_sensors, reading_weights
+from vegglue.parallel import in_threads
+from vegglue.solver.jacobian import Factors
+from vegglue.solver.prolongation import on_grid
+from vegglue.solver.reference_member import settled
+from vegglue.solver.tangent import adjoints, tangents
+from vegglue.solver.wet_band import chord_in_band, widen
+
+# Step of differences in z, small against the prior and large against rounding.
+DIFFERENCE_STEP = 1e-3
+# Relative exactness of tangents.
+EXACT = 1e-5
+# Members solved side by side from one point.
+LANES_FROM_A_POINT = 16
+
+
+@dataclass(frozen=True)
+class SteadyFlow:
+    """One experiment at a point: its state (nx, 3, wet rows, 1) in a band of all `rows`, factors of its Jacobian, and
+    slopes d state / dz_j (nx, 3, wet rows, p).
+    """
+
+    state: Array
+    band: tuple[int, int]
+    rows: int
+    factors: Factors
+    slopes: Array
+
+
+def linearised(model: Model, z: Array, near: Point | None) -> Point | None:
+    """See `Engine.linearise`; experiments side by side."""
+    prediction, slope = np.full(len(model.station), np.nan), np.full((len(model.station), z.size), np.nan)
+    flows = {}
+    tasks = [(model, experiment, z, near) for experiment in model.case.experiments]
+    for experiment, flow in zip(model.case.experiments, in_threads(_flow, tasks), strict=True):
+        if flow is None:
+            return None
+        flows[experiment] = flow
+        rows = model.rows[experiment]
+        prediction[rows], slope[rows] = _read_slopes(model, experiment, z, flow)
+    return Point(z, prediction, slope, flows)
+
+
+def predict_near(model: Model, point: Point, z: Array) -> Array:
+    """Predictions (m, n) at z (m, p) around a point, with its factors; NaN rows where they do not lead there."""
+    found = np.full((len(z), len(model.station)), np.nan)
+    for first in range(0, len(z), LANES_FROM_A_POINT):
+        part = slice(first, min(first + LANES_FROM_A_POINT, len(z)))
+        found[part] = _few_near(model, point, z[part])
+    return found
+
+
+def _few_near(model: Model, point: Point, z: Array) -> Array:
+    found = np.full((len(z), len(model.station)), np.nan)
+    for experiment, flow in point.flows.items():
+        rows = model.rows[experiment]
+        problem = problem_at(model, experiment, z)
+        start = flow.state + flow.slopes @ (z - point.z).T
+        solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
+        found[:, rows] = _read(model, experiment, problem, solution.state, flow.band)
+        found[~solution.converged] = np.nan
+    return found
+
+
+def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+    """See `Engine.responses`; one tangent for each cause, experiments side by side."""
+    found = np.zeros((len(model.station), len(causes)))
+    tasks = [(model, point, experiment, causes) for experiment in point.flows]
+    for experiment, part in zip(point.flows, in_threads(_responses_in, tasks), strict=True):
+        found[model.rows[experiment]] = part
+    return found
+
+
+def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
+    """Responses in one experiment, (stations of it, causes); zero for what does not act in it."""
+    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
+    found = np.zeros((rows.size, len(causes)))
+    here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
+    if not here:
+        return found
+    base = crop(problem_at(model, experiment, point.z), *flow.band)
+    calm = residual(base, flow.state)
+    built, changes = [], np.empty((*flow.state.shape[:3], len(here)))
+    for lane, j in enumerate(here):
+        amplitude = causes[j].amplitude
+        gain, value = amplitude.small**amplitude.power, np.array([amplitude.off + amplitude.small])
+        problem = build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: value})
+        changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
+        built.append((problem, gain))
+    moved = tangents(base, flow.state, flow.factors, changes, EXACT)
+    for lane, j in enumerate(here):
+        problem, gain = built[lane]
+        state = flow.state + gain * moved[..., lane : lane + 1]
+        now = _read(model, experiment, problem, state, flow.band)[0]
+        found[:, j] = (now - point.prediction[rows]) / gain
+    return found
+
+
+def response_by_adjoints(model: Model, point: Point, experiment: str) -> Array:
+    """See `Engine.force_response`; in single precision, one solve for each station."""
+    flow = point.flows[experiment]
+    rows = model.rows[experiment]
+    weights = reading_weights(model.station_of(experiment), model.site.grid)[:, :, slice(*flow.band)]
+    sensitivity = adjoints(flow.factors, weights)[:, ALONG]
+    of_faces = np.moveaxis(sensitivity, -1, 0)
+    # A force in a cell pushes the faces on both sides of it by half; R_u falls by what pushes.
+    cells = 0.5 * of_faces
+    cells[:, 1:] += 0.5 * of_faces[:, :-1]
+    wide = np.zeros((rows.size, model.site.grid.x.size, model.site.grid.y.size))
+    wide[:, :, flow.band[0] : flow.band[1]] = cells
+    return wide
+
+
+def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
+    """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
+    flow = point.flows[experiment]
+    now = faces(problem_at(model, experiment, point.z), widen(flow.state, model.site.grid.y.size, flow.band))
+    u = 0.5 * (now.u[1:] + now.u[:-1])[..., 0]
+    v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
+    return CentreFlow(now.cell[..., 0], u, v)
+
+
+def problem_at(model: Model, experiment: str, z: Array) -> Problem:
+    """The flow problem of one experiment at z, (p,) or (m, p)."""
+    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
+
+
+def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> SteadyFlow | None:
+    problem = problem_at(model, experiment, z)
+    warm = None if near is None else _warm(near, near.flows[experiment], z, problem.shape)
+    solution, factors, band = settled(problem, warm, model.case.numerics.tolerance)
+    if factors is None:
+        return None
+    part = crop(problem, *band)
+    slopes = tangents(part, solution.state, factors, _causes(model, experiment, z, solution.state, band), EXACT)
+    return SteadyFlow(solution.state, band, problem.shape[1], factors, slopes)
+
+
+def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> Array:
+    """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be."""
+    warm = widen(before.state, before.rows, before.band)
+    if before.slopes.shape[3] == z.size:
+        warm = warm + widen(before.slopes @ (z - near.z)[:, None], before.rows, before.band)
+    return on_grid(warm, shape)
+
+
+def _causes(model: Model, experiment: str, z: Array, state: Array, band: tuple[int, int]) -> Array:
+    """dR/dz_j (nx, 3, rows, p) by central differences."""
+    steps = DIFFERENCE_STEP * np.eye(z.size)
+    ahead = crop(problem_at(model, experiment, z + steps), *band)
+    behind = crop(problem_at(model, experiment, z - steps), *band)
+    many = np.repeat(state, z.size, axis=3)
+    return (residual(ahead, many) - residual(behind, many)) / (2.0 * DIFFERENCE_STEP)
+
+
+def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
+    """Predictions (m, stations of the experiment) of states in a band."""
+    wide = widen(state, model.site.grid.y.size, band)
+    return read_sensors(problem, wide, model.site.grid, model.station_of(experiment), ()).prediction
+
+
+def _read_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> tuple[Array, Array]:
+    read = partial(_read, model, experiment, band=flow.band)
+    steps = DIFFERENCE_STEP * np.eye(z.size)
+    here = read(problem_at(model, experiment, z), flow.state)[0]
+    ahead = read(problem_at(model, experiment, z + steps), flow.state + DIFFERENCE_STEP * flow.slopes)
+    behind = read(problem_at(model, experiment, z - steps), flow.state - DIFFERENCE_STEP * flow.slopes)
+    return here, (ahead - behind).T / (2.0 * DIFFERENCE_STEP)
+
+
+NEWTON = Engine(
+    name="newton",
+    linearise=linearised,
+    predict=partial(predict_members, predict_near),
+    responses=responses_by_tangents,
+    force_response=response_by_adjoints,
+    flow_at_centres=centre_flow,
+)
