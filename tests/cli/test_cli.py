@@ -53,9 +53,9 @@ def test_the_line_finds_what_the_measurements_were_made_with(finished: Finished)
     assert len(ensemble.status) == MEMBERS
     assert ensemble.mass_error.max() < 1e-6
     np.testing.assert_allclose(ensemble.section_flow, 2.0, rtol=1e-6)
-    assert posterior.median["n_b"] == pytest.approx(TRUE_N_B, abs=0.01)
-    assert 3 < posterior.median["phi"] < 20
-    assert posterior.rmse["velocity"] < 0.02
+    assert posterior.marginals.median["n_b"] == pytest.approx(TRUE_N_B, abs=0.01)
+    assert 3 < posterior.marginals.median["phi"] < 20
+    assert posterior.fit.rmse["velocity"] < 0.02
 
 
 def test_every_result_carries_the_case_it_was_made_from(finished: Finished, tmp_path: Path) -> None:

@@ -1,13 +1,14 @@
 """GLUE against a linear model with Gaussian errors, whose posterior is known in closed form."""
 
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from posteriors import changed
 
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import CanopyCorrection, Case
@@ -103,19 +104,22 @@ def toy() -> Posterior:
 def test_moments_are_those_of_the_closed_form(toy: Posterior) -> None:
     mean, covariance = closed_form(measured())
     sd = np.sqrt(np.diag(covariance))
-    got = np.array([toy.median["a"], toy.median["b"], toy.log10_median["c"]])
-    spread = np.array([toy.sd["a"], toy.sd["b"], toy.log10_sd["c"]])
-    error = 1 / math.sqrt(toy.effective_size)  # of a mean, in standard deviations; a median has 1.25 times that
+    got = np.array([toy.marginals.median["a"], toy.marginals.median["b"], toy.marginals.log10_median["c"]])
+    spread = np.array([toy.marginals.sd["a"], toy.marginals.sd["b"], toy.marginals.log10_sd["c"]])
+    # Of a mean, in standard deviations; a median has 1.25 times that.
+    error = 1 / math.sqrt(toy.weighting.effective_size)
     assert np.all(np.abs(got - mean) < 3 * 1.25 * error * sd)
     assert np.all(np.abs(spread / sd - 1) < 3 * error / math.sqrt(2))
     normal = np.array([-1.95996, -0.67449, 0, 0.67449, 1.95996])
-    assert toy.quantiles["a"] == pytest.approx(mean[0] + sd[0] * normal, abs=5 * error * sd[0])
+    assert toy.marginals.quantiles["a"] == pytest.approx(mean[0] + sd[0] * normal, abs=5 * error * sd[0])
 
 
 def test_correlation_is_that_of_the_closed_form(toy: Posterior) -> None:
     covariance = closed_form(measured())[1]
     sd = np.sqrt(np.diag(covariance))
-    assert toy.correlation == pytest.approx(covariance / np.outer(sd, sd), abs=3 / math.sqrt(toy.effective_size))
+    assert toy.marginals.correlation == pytest.approx(
+        covariance / np.outer(sd, sd), abs=3 / math.sqrt(toy.weighting.effective_size)
+    )
 
 
 def test_effective_size_of_independent_parameters() -> None:
@@ -123,99 +127,101 @@ def test_effective_size_of_independent_parameters() -> None:
     design = SIGMA * np.diag(1 / sd)
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
     expected = MEMBERS * np.prod(2 * math.sqrt(math.pi) * sd / np.array([1.0, 1.0, 2.0]))
-    assert posterior.effective_size == pytest.approx(expected, rel=0.05)
+    assert posterior.weighting.effective_size == pytest.approx(expected, rel=0.05)
 
 
 def test_model_band_is_that_of_the_closed_form_and_total_adds_the_error(toy: Posterior) -> None:
     mean, covariance = closed_form(measured())
     sd = np.sqrt(np.diag(DESIGN @ covariance @ DESIGN.T))
-    tolerance = 5 * sd.max() / math.sqrt(toy.effective_size)
+    tolerance = 5 * sd.max() / math.sqrt(toy.weighting.effective_size)
     for level, normal in zip(LEVELS, (-1.95996, -0.67449, 0.0, 0.67449, 1.95996), strict=True):
         row = LEVELS.index(level)
-        assert toy.model_band[row] == pytest.approx(DESIGN @ mean + normal * sd, abs=tolerance)
-        assert toy.total_band[row] == pytest.approx(DESIGN @ mean + normal * np.hypot(sd, SIGMA), abs=tolerance)
+        assert toy.predicted.model_band[row] == pytest.approx(DESIGN @ mean + normal * sd, abs=tolerance)
+        assert toy.predicted.total_band[row] == pytest.approx(
+            DESIGN @ mean + normal * np.hypot(sd, SIGMA), abs=tolerance
+        )
 
 
 def test_draws_and_predictive_agree_with_the_weights(toy: Posterior) -> None:
-    mean = float(np.sum(toy.weights * toy.theta["a"]))
-    assert toy.theta["a"][toy.draws].mean() == pytest.approx(mean, abs=0.1 * toy.sd["a"])
-    spread = toy.predictive.reshape(-1, len(DESIGN)).std(axis=0)
-    assert spread == pytest.approx((toy.total_band[-1] - toy.total_band[0]) / 3.92, rel=0.06)
+    mean = float(np.sum(toy.sample.weights * toy.sample.theta["a"]))
+    assert toy.sample.theta["a"][toy.predicted.draws].mean() == pytest.approx(mean, abs=0.1 * toy.marginals.sd["a"])
+    spread = toy.predicted.predictive.reshape(-1, len(DESIGN)).std(axis=0)
+    assert spread == pytest.approx((toy.predicted.total_band[-1] - toy.predicted.total_band[0]) / 3.92, rel=0.06)
 
 
 def test_same_input_gives_the_same_numbers(toy: Posterior) -> None:
     again = infer(stations(measured(), SIGMA), sigma="known")
-    assert np.array_equal(again.predictive, toy.predictive)
-    assert np.array_equal(again.draws, toy.draws)
+    assert np.array_equal(again.predicted.predictive, toy.predicted.predictive)
+    assert np.array_equal(again.predicted.draws, toy.predicted.draws)
 
 
 def test_sigma_is_the_residual_of_the_best_member() -> None:
     table = stations(measured())
     posterior = infer(table)
-    square = np.mean((table["value"].to_numpy() - posterior.prediction) ** 2, axis=1)
-    assert posterior.best == np.argmin(square)
-    assert posterior.sigma == {"velocity": pytest.approx(math.sqrt(square.min()))}
-    assert posterior.best_rmse == posterior.sigma
-    ratio = posterior.weights[10] / posterior.weights[posterior.best]
+    square = np.mean((table["value"].to_numpy() - posterior.sample.prediction) ** 2, axis=1)
+    assert posterior.sample.best == np.argmin(square)
+    assert posterior.fit.sigma == {"velocity": pytest.approx(math.sqrt(square.min()))}
+    assert posterior.fit.best_rmse == posterior.fit.sigma
+    ratio = posterior.sample.weights[10] / posterior.sample.weights[posterior.sample.best]
     assert ratio == pytest.approx(math.exp(-0.5 * len(table) * (square[10] / square.min() - 1)))
-    assert math.isnan(posterior.chi2)
+    assert math.isnan(posterior.fit.chi2)
 
 
 def test_each_kind_of_measurement_has_its_own_sigma() -> None:
     table = stations(measured(), kind=["velocity", "velocity", "velocity", "level", "level"])
     posterior = infer(table)
-    residual = table["value"].to_numpy() - posterior.prediction[posterior.best]
-    assert posterior.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(residual[:3] ** 2)))
-    assert posterior.sigma["level"] == pytest.approx(math.sqrt(np.mean(residual[3:] ** 2)))
-    assert posterior.noise.tolist() == [posterior.sigma["velocity"]] * 3 + [posterior.sigma["level"]] * 2
+    residual = table["value"].to_numpy() - posterior.sample.prediction[posterior.sample.best]
+    assert posterior.fit.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(residual[:3] ** 2)))
+    assert posterior.fit.sigma["level"] == pytest.approx(math.sqrt(np.mean(residual[3:] ** 2)))
+    assert posterior.fit.noise.tolist() == [posterior.fit.sigma["velocity"]] * 3 + [posterior.fit.sigma["level"]] * 2
 
 
 def test_unused_stations_have_bands_but_no_say(toy: Posterior) -> None:
     table = pd.concat([stations(measured(), SIGMA), stations(np.array([99.0]), SIGMA)], ignore_index=True)
     table["used"] = [True] * 5 + [False]
     posterior = infer(table, np.vstack([DESIGN, [1, 0, 0]]), sigma="known")
-    assert posterior.weights == pytest.approx(toy.weights)
-    assert posterior.used == 5
-    assert posterior.model_band[2, 5] == pytest.approx(posterior.median["a"])
-    assert np.isnan(posterior.log_likelihood[:, 5]).all()
+    assert posterior.sample.weights == pytest.approx(toy.sample.weights)
+    assert posterior.fit.used == 5
+    assert posterior.predicted.model_band[2, 5] == pytest.approx(posterior.marginals.median["a"])
+    assert np.isnan(posterior.sample.log_likelihood[:, 5]).all()
 
 
 def test_failed_members_have_no_weight_and_are_counted() -> None:
     whole = infer(stations(measured(), SIGMA), sigma="known")
-    posterior = infer(stations(measured(), SIGMA), failed=(whole.best, 11), sigma="known")
-    assert (posterior.failed, posterior.members) == (2, MEMBERS)
-    assert posterior.weights[[whole.best, 11]].tolist() == [0, 0]
-    assert posterior.weights.sum() == pytest.approx(1)
-    assert np.isfinite(posterior.model_band).all()
+    posterior = infer(stations(measured(), SIGMA), failed=(whole.sample.best, 11), sigma="known")
+    assert (posterior.sample.failed, posterior.sample.members) == (2, MEMBERS)
+    assert posterior.sample.weights[[whole.sample.best, 11]].tolist() == [0, 0]
+    assert posterior.sample.weights.sum() == pytest.approx(1)
+    assert np.isfinite(posterior.predicted.model_band).all()
     assert "2 of them failed" in describe(posterior)[0]
 
 
 def test_chi2_against_known_errors() -> None:
     table = stations(measured(), SIGMA)
     posterior = infer(table, sigma="known")
-    residual = table["value"].to_numpy() - posterior.prediction[posterior.best]
-    assert posterior.chi2 == pytest.approx(np.sum((residual / SIGMA) ** 2))
+    residual = table["value"].to_numpy() - posterior.sample.prediction[posterior.sample.best]
+    assert posterior.fit.chi2 == pytest.approx(np.sum((residual / SIGMA) ** 2))
 
 
 def test_efficiency_as_weight_and_threshold() -> None:
     table = stations(measured())
     posterior = infer(table, likelihood="nse", behavioural=0.7)
     value = table["value"].to_numpy()
-    efficiency = 1 - np.sum((value - posterior.prediction) ** 2, axis=1) / np.sum((value - value.mean()) ** 2)
+    efficiency = 1 - np.sum((value - posterior.sample.prediction) ** 2, axis=1) / np.sum((value - value.mean()) ** 2)
     expected = np.where(efficiency >= 0.7, efficiency, 0)
-    assert posterior.efficiency == pytest.approx(efficiency)
-    assert posterior.weights == pytest.approx(expected / expected.sum())
-    assert posterior.weighed == np.sum(efficiency >= 0.7)
-    assert infer(table, likelihood="nse").weights.min() == 0
+    assert posterior.sample.efficiency == pytest.approx(efficiency)
+    assert posterior.sample.weights == pytest.approx(expected / expected.sum())
+    assert posterior.weighting.weighed == np.sum(efficiency >= 0.7)
+    assert infer(table, likelihood="nse").sample.weights.min() == 0
 
 
 def test_inverse_error_variance_as_weight() -> None:
     table = stations(measured())
     posterior = infer(table, likelihood="inverse-variance", behavioural=0.5)
-    square = np.sum((table["value"].to_numpy() - posterior.prediction) ** 2, axis=1)
-    kept = posterior.efficiency >= 0.5
-    assert posterior.weights[kept] == pytest.approx(1 / square[kept] / np.sum(1 / square[kept]))
-    assert not posterior.weights[~kept].any()
+    square = np.sum((table["value"].to_numpy() - posterior.sample.prediction) ** 2, axis=1)
+    kept = posterior.sample.efficiency >= 0.5
+    assert posterior.sample.weights[kept] == pytest.approx(1 / square[kept] / np.sum(1 / square[kept]))
+    assert not posterior.sample.weights[~kept].any()
 
 
 def test_threshold_out_of_reach_is_told() -> None:
@@ -256,9 +262,9 @@ def test_nothing_to_weigh_is_told() -> None:
 def test_insensitive_parameter_is_not_identified_and_hits_no_bound() -> None:
     design = DESIGN * [1, 1, 0]
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
-    assert posterior.identified == {"a": True, "b": True, "c": False}
-    assert posterior.width_ratio["c"] == pytest.approx(1, abs=0.1)
-    assert not posterior.bound_hit["c"].any()
+    assert posterior.marginals.identified == {"a": True, "b": True, "c": False}
+    assert posterior.marginals.width_ratio["c"] == pytest.approx(1, abs=0.1)
+    assert not posterior.marginals.bound_hit["c"].any()
     assert any(sentence.startswith("c is not identified") for sentence in describe(posterior))
 
 
@@ -267,8 +273,8 @@ def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
     for seed in range(20):
         value = DESIGN @ TRUTH + SIGMA * np.random.default_rng(seed).standard_normal(len(DESIGN))
         posterior = infer(stations(value * [1, 1, 1, 0, 0]), DESIGN * [1, 1, 0], members=150)
-        near += int(np.sum(posterior.bound_mass["c"] > 0.05))
-        hits += int(np.sum(posterior.bound_hit["c"]))
+        near += int(np.sum(posterior.marginals.bound_mass["c"] > 0.05))
+        hits += int(np.sum(posterior.marginals.bound_hit["c"]))
     assert near > 0  # some 15 effective members: chance alone puts more than 0.05 there, or this test shows nothing
     assert hits == 0
 
@@ -277,9 +283,10 @@ def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
 def test_parameter_at_a_bound_is_named(true_a: float, side: int, word: str) -> None:
     design = SIGMA * np.diag(1 / np.array([0.05, 0.1, 0.2]))
     posterior = infer(stations(design @ [true_a, 0.5, 0.0], SIGMA), design, sigma="known")
-    assert posterior.bound_hit["a"].tolist() == [side == 0, side == 1]
-    assert posterior.bound_mass["a"][side] == pytest.approx(2 * 0.1554, abs=0.05)  # 2 (Phi(0.4) - 1/2), half a normal
-    assert not posterior.bound_hit["b"].any()
+    assert posterior.marginals.bound_hit["a"].tolist() == [side == 0, side == 1]
+    half_a_normal = 2 * 0.1554  # 2 (Phi(0.4) - 1/2)
+    assert posterior.marginals.bound_mass["a"][side] == pytest.approx(half_a_normal, abs=0.05)
+    assert not posterior.marginals.bound_hit["b"].any()
     assert any(f"a presses against the {word} bound" in sentence for sentence in describe(posterior))
 
 
@@ -287,13 +294,13 @@ def test_parameter_settled_near_a_bound_is_no_hit() -> None:
     """Three standard deviations off a bound, all of it within 2 % of the prior's range of that bound."""
     design = SIGMA * np.diag(1 / np.array([0.003, 0.4, 0.4]))
     posterior = infer(stations(design @ [0.009, 0.5, 0.0], SIGMA), design, members=8192, sigma="known")
-    assert posterior.bound_mass["a"][0] > 0.95
-    assert not posterior.bound_hit["a"].any()
+    assert posterior.marginals.bound_mass["a"][0] > 0.95
+    assert not posterior.marginals.bound_hit["a"].any()
 
 
 def test_few_effective_members_claim_no_posterior(toy: Posterior) -> None:
     few = infer(stations(measured(), SIGMA), members=512, sigma="known")
-    assert few.effective_size < 100 < toy.effective_size
+    assert few.weighting.effective_size < 100 < toy.weighting.effective_size
     assert any("no posterior is claimed" in sentence for sentence in describe(few))
     assert not any("no posterior is claimed" in sentence for sentence in describe(toy))
 
@@ -301,9 +308,9 @@ def test_few_effective_members_claim_no_posterior(toy: Posterior) -> None:
 def test_strong_correlation_is_named() -> None:
     design = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.1], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3]])
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
-    assert posterior.correlation[0, 1] < -0.7
+    assert posterior.marginals.correlation[0, 1] < -0.7
     assert any("a and b are correlated (-0" in sentence for sentence in describe(posterior))
-    few = replace(posterior, effective_size=2.0)
+    few = changed(posterior, effective_size=2.0)
     assert not any("are correlated (" in sentence for sentence in describe(few)), "any two members are"
 
 
@@ -334,7 +341,7 @@ def test_canopy_correction_stands_beside_the_raw_median() -> None:
     table = stations(measured(), SIGMA)
     posterior = glue(an_ensemble(case, table), case, observed(table))
     assert posterior.canopy is not None
-    raw = posterior.median["c"]
+    raw = posterior.marginals.median["c"]
     expected = correct_phi_for_canopy(np.array([raw]), 0.8, 1.06, 1.36, 60.0)[0]
     assert posterior.canopy.median == pytest.approx(expected, rel=1e-3)
     assert 10**posterior.canopy.log10_median == pytest.approx(expected, rel=1e-3)

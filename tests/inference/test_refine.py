@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
+from posteriors import assert_same
 from reach import COARSE, said_to, write_reach
 
 from vegglue.calibration.fit import Fitted, fit
@@ -60,38 +61,38 @@ def noise(reach: tuple[Case, Observations, Ensemble]) -> Noise:
 
 
 def test_a_thousand_effective_draws_around_the_truth(refined: Posterior) -> None:
-    assert refined.method == "refine"
-    assert refined.effective_size >= 1000
-    assert refined.failed == 0
-    assert refined.pareto_k < 0.7
-    assert refined.weights.sum() == pytest.approx(1)
+    assert refined.settings.method == "refine"
+    assert refined.weighting.effective_size >= 1000
+    assert refined.sample.failed == 0
+    assert refined.weighting.pareto_k < 0.7
+    assert refined.sample.weights.sum() == pytest.approx(1)
     for name, truth in (("n_b", 0.05), ("phi", 8.0)):
-        low, high = refined.quantiles[name][[0, -1]]
+        low, high = refined.marginals.quantiles[name][[0, -1]]
         assert low < truth * 1.1
         assert high > truth * 0.9
-        assert refined.identified[name]
+        assert refined.marginals.identified[name]
 
 
 def test_draws_are_runs_of_the_model(reach: tuple[Case, Observations, Ensemble], refined: Posterior) -> None:
     case, observations, _ = reach
     model = model_of(case, observations)
-    some = [refined.best, 5, 200]
-    z = z_at(case, {name: values[some] for name, values in refined.theta.items()})
+    some = [refined.sample.best, 5, 200]
+    z = z_at(case, {name: values[some] for name, values in refined.sample.theta.items()})
     for row, member in zip(z, some, strict=True):
         alone = linearise(model, row)
         assert alone is not None
-        assert refined.prediction[member] == pytest.approx(alone.prediction, abs=1e-5)
+        assert refined.sample.prediction[member] == pytest.approx(alone.prediction, abs=1e-5)
 
 
 def test_the_log_density_is_that_of_errors_and_prior(
     reach: tuple[Case, Observations, Ensemble], refined: Posterior, noise: Noise
 ) -> None:
     assert refined.refinement is not None
-    assert np.sqrt(np.mean(noise.grid**2)) == pytest.approx(refined.refinement.grid_error)
-    z = z_at(reach[0], refined.theta)[:50]
+    assert np.sqrt(np.mean(noise.grid**2)) == pytest.approx(refined.refinement.error_model.grid_error)
+    z = z_at(reach[0], refined.sample.theta)[:50]
     errors = scipy.stats.multivariate_normal(np.zeros(15), covariance_of(noise))
-    expected = errors.logpdf(noise.value - refined.prediction[:50]) + scipy.stats.norm.logpdf(z).sum(axis=1)
-    found = refined.refinement.log_density[:50]
+    expected = errors.logpdf(noise.value - refined.sample.prediction[:50]) + scipy.stats.norm.logpdf(z).sum(axis=1)
+    found = refined.refinement.draws.log_density[:50]
     assert found - found[0] == pytest.approx(expected - expected[0], abs=1e-6)
 
 
@@ -99,19 +100,17 @@ def test_numbers_do_not_depend_on_the_jobs(reach: tuple[Case, Observations, Ense
     case, observations, ensemble = reach
     with at_most(2):
         again = refine(ensemble, case, observations)
-    assert np.array_equal(again.weights, refined.weights)
-    assert np.array_equal(again.prediction, refined.prediction)
-    assert np.array_equal(again.predictive, refined.predictive)
+    assert np.array_equal(again.sample.weights, refined.sample.weights)
+    assert np.array_equal(again.sample.prediction, refined.sample.prediction)
+    assert np.array_equal(again.predicted.predictive, refined.predicted.predictive)
 
 
 def test_everything_comes_back_from_the_file(refined: Posterior, tmp_path: Path) -> None:
     write_posterior(tmp_path / "posterior.h5", refined, "name: brook", "0" * 64)
     back = read_posterior(tmp_path / "posterior.h5", "0" * 64)
     assert back.refinement is not None
-    assert refined.refinement is not None
-    for name in ("worth", "mode_theta", "score", "left_out_score", "log_density"):
-        assert np.array_equal(getattr(back.refinement, name), getattr(refined.refinement, name), equal_nan=True)
-    assert list(back.refinement.left_out) == ["June above", "June patch", "June below"]
+    assert_same(back, refined)
+    assert list(back.refinement.groups.left_out) == ["June above", "June patch", "June below"]
     assert describe(back) == describe(refined)
 
 
@@ -121,12 +120,14 @@ def test_arviz_reads_draws_likelihood_and_prior(refined: Posterior, tmp_path: Pa
     arviz = pytest.importorskip("arviz")
     write_posterior(tmp_path / "posterior.h5", refined, "name: brook", "0" * 64)
     data = arviz.from_netcdf(tmp_path / "posterior.h5")
-    assert float(data.posterior["n_b"].mean()) == pytest.approx(float(refined.weights @ refined.theta["n_b"]), rel=0.01)
+    assert float(data.posterior["n_b"].mean()) == pytest.approx(
+        float(refined.sample.weights @ refined.sample.theta["n_b"]), rel=0.01
+    )
     assert float(data.prior["n_b"].std()) == pytest.approx(0.08 / math.sqrt(12), rel=0.1)
     assert float(data.posterior["n_b"].std()) < 0.2 * float(data.prior["n_b"].std())
     scored = arviz.loo(data, var_name="measured")
     assert refined.refinement is not None
-    assert float(scored.elpd_loo) == pytest.approx(refined.refinement.elpd, abs=0.3)
+    assert float(scored.elpd_loo) == pytest.approx(refined.refinement.leave_one_out.elpd, abs=0.3)
     data.close()
 
 
@@ -142,9 +143,9 @@ def test_errors_taken_from_the_residual_are_said_to_be(tmp_path: Path) -> None:
     case, observations, ensemble = made(tmp_path, (KNOWN[0], "simulate: {members: 64, seed: 7}"))
     posterior = refine(ensemble, case, observations)
     assert posterior.refinement is not None
-    assert posterior.refinement.errors == "estimated"
-    left = posterior.best_residual
-    assert posterior.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(left**2) * 15 / 13), rel=0.05)
+    assert posterior.refinement.error_model.errors == "estimated"
+    left = posterior.fit.best_residual
+    assert posterior.fit.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(left**2) * 15 / 13), rel=0.05)
     said = " ".join(describe(posterior))
     assert "estimated from what the best place leaves" in said
     assert "degrees of freedom" not in said
@@ -165,10 +166,10 @@ def test_the_method_can_be_chosen(
     assert said_to(monkeypatch, capsys, "simulate", config, "--jobs", 1) == (0, "")
     for method in ("refine", "glue"):
         assert said_to(monkeypatch, capsys, "infer", config, "--method", method, "--jobs", 1) == (0, "")
-        assert read_posterior(tmp_path / "runs/brook/posterior.h5").method == method
+        assert read_posterior(tmp_path / "runs/brook/posterior.h5").settings.method == method
     config.write_text(config.read_text(encoding="utf-8") + "infer: {likelihood: nse}\n", encoding="utf-8")
     assert said_to(monkeypatch, capsys, "infer", config, "--jobs", 1) == (0, "")
-    assert read_posterior(tmp_path / "runs/brook/posterior.h5").method == "glue"
+    assert read_posterior(tmp_path / "runs/brook/posterior.h5").settings.method == "glue"
     code, told = said_to(monkeypatch, capsys, "infer", config, "--method", "refine")
     assert code == 2
     assert "got an informal likelihood" in told
@@ -321,7 +322,7 @@ def test_a_long_markov_chain_finds_the_same(
     emcee = pytest.importorskip("emcee")
     case, observations, _ = reach
     model = model_of(case, observations)
-    best = z_at(case, {name: values[[refined.best]] for name, values in refined.theta.items()})[0]
+    best = z_at(case, {name: values[[refined.sample.best]] for name, values in refined.sample.theta.items()})[0]
     point = linearise(model, best)
     assert point is not None
     sampler = emcee.EnsembleSampler(
@@ -332,14 +333,14 @@ def test_a_long_markov_chain_finds_the_same(
     chain = theta_at(case, sampler.get_chain(discard=300, flat=True))
     independent = 1200 * 32 / sampler.get_autocorr_time(discard=300, tol=40).max()
     for name, values in chain.items():
-        error = refined.sd[name] * math.sqrt(1 / independent + 1 / refined.effective_size)
-        assert refined.weights @ refined.theta[name] == pytest.approx(values.mean(), abs=4 * error)
-        assert refined.sd[name] == pytest.approx(values.std(), rel=4 / math.sqrt(2 * min(independent, 1000)))
+        error = refined.marginals.sd[name] * math.sqrt(1 / independent + 1 / refined.weighting.effective_size)
+        assert refined.sample.weights @ refined.sample.theta[name] == pytest.approx(values.mean(), abs=4 * error)
+        assert refined.marginals.sd[name] == pytest.approx(values.std(), rel=4 / math.sqrt(2 * min(independent, 1000)))
 
 
 def test_priors_of_the_file_are_draws_from_the_prior(
     refined: Posterior, reach: tuple[Case, Observations, Ensemble]
 ) -> None:
     assert refined.refinement is not None
-    expected = sample_prior(reach[0].parameters, refined.members, 7)
-    assert np.array_equal(refined.refinement.prior_theta["phi"], expected["phi"])
+    expected = sample_prior(reach[0].parameters, refined.sample.members, 7)
+    assert np.array_equal(refined.refinement.draws.prior_theta["phi"], expected["phi"])

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_diagnosis
+from posteriors import changed
 
 from vegglue.case.config import load_case
 from vegglue.case.prior import sample_prior
@@ -240,15 +241,15 @@ def test_table_compares_with_the_study_and_with_known_values(d3a: tuple[Run, str
     run, _ = d3a
     posterior = run.posterior
     row = parameter_rows(run)[0]
-    off, sd = posterior.median["n_b"] - 0.098, posterior.sd["n_b"]
+    off, sd = posterior.marginals.median["n_b"] - 0.098, posterior.marginals.sd["n_b"]
     assert row.beside.study.replace("\u00a0", " ") == "0.098 ± 0.008"
     assert row.beside.from_study == f"{off / np.hypot(sd, 0.008):.1f} sd".replace("-", "−").replace("−0.0", "0.0")
     assert row.beside.from_known.startswith(f"{off / sd:.1f} sd".replace("-", "−").replace("−0.0", "0.0"))
     power = parameter_rows(run)[2]
-    off = posterior.log10_median["phi"] - np.log10(39.81)
+    off = posterior.marginals.log10_median["phi"] - np.log10(39.81)
     assert power.beside.study.replace("\u00a0", " ") == "10<sup>1.6 ± 0.2</sup>"
     assert power.beside.from_known.startswith(
-        f"{off / posterior.log10_sd['phi']:.1f} sd".replace("-", "−").replace("−0.0", "0.0")
+        f"{off / posterior.marginals.log10_sd['phi']:.1f} sd".replace("-", "−").replace("−0.0", "0.0")
     )
 
 
@@ -317,8 +318,8 @@ def test_without_a_diagnosis_the_report_says_how_to_get_one(toy: tuple[Run, str]
 
 
 def said(run: Run, subject: str, **changes: object) -> tuple[str, bool]:
-    changed = replace(run, posterior=replace(run.posterior, **changes))
-    found = [finding for finding in findings(changed) if finding.subject == subject]
+    other = replace(run, posterior=changed(run.posterior, **changes))
+    found = [finding for finding in findings(other) if finding.subject == subject]
     return " ".join(finding.text for finding in found).replace("\u202f", " "), any(finding.doubt for finding in found)
 
 
@@ -329,21 +330,21 @@ def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
     assert "It is not identified: the 95 % range is still 96 % as wide as before the measurements" in text
     assert doubt
     sentence = re.sub(
-        "<[^>]*>", "", verdict_of(run.case, replace(run.posterior, identified=known, effective_size=500.0))
+        "<[^>]*>", "", verdict_of(run.case, changed(run.posterior, identified=known, effective_size=500.0))
     )
     assert sentence.startswith("nb and ks are identified by these 20 stations; φ is not.")
 
 
 def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
     manning, drag = (row.posterior for row in parameter_rows(toy[0])[:2])
-    assert float(manning.split()[0]) == pytest.approx(toy[0].posterior.median["n_b"], rel=0.01)
+    assert float(manning.split()[0]) == pytest.approx(toy[0].posterior.marginals.median["n_b"], rel=0.01)
     assert drag.startswith("10<sup>")
 
 
 def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
     run, _ = d3a
-    hit = run.posterior.bound_hit | {"phi": np.array([False, True])}
-    mass = run.posterior.bound_mass | {"phi": np.array([0.0, 0.14])}
+    hit = run.posterior.marginals.bound_hit | {"phi": np.array([False, True])}
+    mass = run.posterior.marginals.bound_mass | {"phi": np.array([0.0, 0.14])}
     text, doubt = said(run, "parameter", bound_hit=hit, bound_mass=mass)
     assert "presses against the upper bound of its prior (14 % of the weight is near it)" in text
     assert "the data bound it from below only" in text
@@ -355,7 +356,7 @@ def test_says_when_few_members_carry_the_weight(d3a: tuple[Run, str], size: floa
     run, _ = d3a
     text, doubt = said(run, "weights", effective_size=size, pareto_k=0.2)
     assert ("simulate more members" in text) == doubt == provisional
-    posterior = replace(run.posterior, effective_size=size)
+    posterior = changed(run.posterior, effective_size=size)
     sentence = verdict_of(run.case, posterior)
     assert sentence.startswith("A first look only") == provisional
     assert ("too few to say what is identified" in sentence) == provisional
@@ -396,8 +397,8 @@ def test_doubts_come_first(d3a: tuple[Run, str]) -> None:
 def test_compares_with_rigid_cylinders(d3a: tuple[Run, str]) -> None:
     run, _ = d3a
     assert run.cylinder is not None
-    text, _ = said(run, "plants", identified=run.posterior.identified | {"phi": True})
-    ratio = run.posterior.median["phi"] / run.cylinder.quantile(0.5)
+    text, _ = said(run, "plants", identified=run.posterior.marginals.identified | {"phi": True})
+    ratio = run.posterior.marginals.median["phi"] / run.cylinder.quantile(0.5)
     assert f"the flow asks for {ratio:.0f} times as much" in text
-    text, _ = said(run, "plants", identified=run.posterior.identified | {"phi": False})
+    text, _ = said(run, "plants", identified=run.posterior.marginals.identified | {"phi": False})
     assert "cannot tell whether that is so" in text

@@ -1,17 +1,30 @@
 """Posteriors on disk: they come back as they went, and xarray and ArviZ read them."""
 
-from dataclasses import fields, replace
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import get_type_hints
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
+from posteriors import assert_same, changed
 from stored import HASH, MEMBERS, a_header, no_space
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.posterior import LEVELS, CorrectedCanopy, Posterior
+from vegglue.results.layout import stored_fields
+from vegglue.results.posterior import (
+    LEVELS,
+    CorrectedCanopy,
+    GoodnessOfFit,
+    InferenceSettings,
+    Marginals,
+    Posterior,
+    PredictiveDistribution,
+    Transfer,
+    WeightedSample,
+    WeightStatistics,
+)
+from vegglue.results.refinement import Refinement
 from vegglue.storage.hdf5 import read_posterior, stored_hash, write_posterior
 
 
@@ -27,34 +40,26 @@ def a_posterior(canopy: bool) -> Posterior:
     log_likelihood = random.random((MEMBERS, 2)) * [1, np.nan]
     predictive = random.random((4, 500, 2))
     corrected = CorrectedCanopy("phi", 0.8, 1.06, 1.36, random.random(MEMBERS), 1.5, 0.2, levels["phi"], 0.18, 0.12)
-    return Posterior(
-        parameters=names, likelihood="gaussian", sigma_rule="best-member", threshold=-np.inf, members=MEMBERS, failed=1,
-        weighed=11, used=1, best=3, effective_size=7.5, largest_weight=0.3, pareto_k=0.4, chi2=np.nan,
-        ensemble_hash=HASH, seed=5, version="0.1.0", unit={"n_b": "s m^(-1/3)", "phi": "-"},
+    settings = InferenceSettings("glue", "gaussian", "best-member", -np.inf, HASH, 5, "0.1.0")
+    sample = WeightedSample(
+        members=MEMBERS, failed=1, best=3, unit={"n_b": "s m^(-1/3)", "phi": "-"},
         theta={name: random.random(MEMBERS) for name in names}, weights=weights / weights.sum(), efficiency=weights - 1,
-        log_likelihood=log_likelihood, prediction=random.random((MEMBERS, 2)), median=two, sd=two, quantiles=levels,
-        prior_quantiles=levels, log10_median={"phi": 0.3}, log10_sd={"phi": 0.1}, correlation=random.random((2, 2)),
-        width_ratio=two, identified={"n_b": True, "phi": False}, bounds=sides, bound_mass=sides,
-        bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])}, sigma=per_kind, rmse=per_kind,
-        best_rmse=per_kind, noise=np.array([0.02, np.nan]), residual=random.random(2), best_residual=random.random(2),
-        model_band=random.random((5, 2)), total_band=random.random((5, 2)), draws=draws, predictive=predictive,
-        station=station, canopy=corrected if canopy else None, method="glue", refinement=None, transfer=None,
+        log_likelihood=log_likelihood, prediction=random.random((MEMBERS, 2)),
     )  # fmt: skip
-
-
-def assert_same(one: Any, other: Any) -> None:
-    assert type(one) is type(other)
-    if isinstance(one, dict):
-        assert list(one) == list(other)
-        for key in one:
-            assert_same(one[key], other[key])
-    elif isinstance(one, pd.DataFrame):
-        pd.testing.assert_frame_equal(one, other, check_dtype=False)
-    elif isinstance(one, Posterior | CorrectedCanopy):
-        for field in fields(one):
-            assert_same(getattr(one, field.name), getattr(other, field.name))
-    else:
-        np.testing.assert_array_equal(one, other)
+    marginals = Marginals(
+        median=two, sd=two, quantiles=levels, prior_quantiles=levels, log10_median={"phi": 0.3}, log10_sd={"phi": 0.1},
+        correlation=random.random((2, 2)), width_ratio=two, identified={"n_b": True, "phi": False}, bounds=sides,
+        bound_mass=sides, bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])},
+    )  # fmt: skip
+    fit = GoodnessOfFit(
+        used=1, chi2=np.nan, sigma=per_kind, rmse=per_kind, best_rmse=per_kind, noise=np.array([0.02, np.nan]),
+        residual=random.random(2), best_residual=random.random(2),
+    )  # fmt: skip
+    predicted = PredictiveDistribution(random.random((5, 2)), random.random((5, 2)), draws, predictive)
+    return Posterior(
+        settings=settings, sample=sample, weighting=WeightStatistics(11, 7.5, 0.3, 0.4), marginals=marginals, fit=fit,
+        predicted=predicted, station=station, canopy=corrected if canopy else None, refinement=None, transfer=None,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("canopy", [True, False])
@@ -66,8 +71,43 @@ def test_posterior_comes_back_as_it_went(tmp_path: Path, canopy: bool) -> None:
         read_posterior(tmp_path / "posterior.h5", "e" * 64)
 
 
+def names_in(kind: type) -> list[str]:
+    """Names under which a value of this kind lies in its file."""
+    hints = {name: hint for name, hint in get_type_hints(kind).items() if isinstance(hint, type)}
+    plain = [name for name, hint in hints.items() if hint in (str, int, float)]
+    inner = [name for hint in hints.values() if is_dataclass(hint) for name in names_in(hint)]
+    return [*plain, *stored_fields(kind), *inner]
+
+
+@pytest.mark.parametrize("kind", [Posterior, CorrectedCanopy, Refinement, Transfer])
+def test_no_two_fields_of_a_part_have_the_same_name_in_the_file(kind: type) -> None:
+    names = names_in(kind)
+    assert sorted(names) == sorted(set(names))
+    assert names
+
+
+def test_nested_fields_lie_flat_in_the_file(tmp_path: Path) -> None:
+    write_posterior(tmp_path / "posterior.h5", a_posterior(True), "", HASH)
+    with h5py.File(tmp_path / "posterior.h5") as file:
+        members, canopy, stated = set(file["members"]), set(file["canopy"]), set(file.attrs)
+    assert members == {
+        "parameter", "member", "station", "level", "log_parameter", "other_parameter", "side", "kind", "chain", "draw",
+        "unit", "theta", "weights", "efficiency", "log_likelihood", "prediction", "median", "sd", "quantiles",
+        "prior_quantiles", "log10_median", "log10_sd", "correlation", "width_ratio", "identified", "bounds",
+        "bound_mass", "bound_hit", "sigma", "rmse", "best_rmse", "noise", "residual", "best_residual", "model_band",
+        "total_band", "draws", "predictive",
+    }  # fmt: skip
+    assert canopy == {"member", "level", "phi", "quantiles"}
+    assert stated == {
+        "method", "likelihood", "sigma_rule", "threshold", "members", "failed", "weighed", "used", "best",
+        "effective_size", "largest_weight", "pareto_k", "chi2", "ensemble_hash", "seed", "version", "canopy_parameter",
+        "canopy_from_height", "canopy_to_height", "canopy_depth", "canopy_median", "canopy_sd", "canopy_log10_median",
+        "canopy_log10_sd", "config", "config_hash", "format",
+    }  # fmt: skip
+
+
 def test_posterior_without_logarithmic_parameters_comes_back(tmp_path: Path) -> None:
-    posterior = replace(a_posterior(False), log10_median={}, log10_sd={})
+    posterior = changed(a_posterior(False), log10_median={}, log10_sd={})
     write_posterior(tmp_path / "posterior.h5", posterior, "", HASH)
     assert_same(read_posterior(tmp_path / "posterior.h5"), posterior)
 
@@ -105,7 +145,7 @@ def test_arviz_summarises_and_plots_a_posterior(tmp_path: Path) -> None:
     data = arviz.from_netcdf(tmp_path / "posterior.h5", engine="h5netcdf")
     summary = arviz.summary(data, kind="stats", round_to="none")
     assert list(summary.index) == ["n_b", "phi"]
-    assert summary.loc["phi", "mean"] == pytest.approx(posterior.theta["phi"][posterior.draws].mean())
+    assert summary.loc["phi", "mean"] == pytest.approx(posterior.sample.theta["phi"][posterior.predicted.draws].mean())
     assert data.posterior["phi"].dims == ("chain", "draw")
     assert data.log_likelihood["measured"].shape == (4, 500, 1)  # used stations only
     assert data.observed_data["measured"].values.tolist() == [0.4]

@@ -161,9 +161,9 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     assert all(reason.startswith("June: no steady state: ") for reason in ensemble.reason[failed])
     np.testing.assert_array_equal(ensemble.parameters["outlet"], sample_prior(case.parameters, 8, 7)["outlet"])
     posterior = glue(ensemble, case, observations)
-    assert posterior.failed == failed.sum()
-    assert (posterior.weights[failed] == 0).all()
-    assert posterior.weights.sum() == pytest.approx(1.0)
+    assert posterior.sample.failed == failed.sum()
+    assert (posterior.sample.weights[failed] == 0).all()
+    assert posterior.sample.weights.sum() == pytest.approx(1.0)
     assert parameters_at(case, places_of(case, 8))["outlet"] == pytest.approx(ensemble.parameters["outlet"])
 
 

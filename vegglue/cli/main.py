@@ -139,7 +139,7 @@ def report(config: Config, members: Members = None, runs: Runs = Path("runs"), t
     folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     posterior = read_posterior(folder / "posterior.h5", case_hash(case))
-    flow = solve_flow(case, posterior.median)
+    flow = solve_flow(case, posterior.marginals.median)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(load_case(config, trust)))
     page = write_report(folder, case, observations, ensemble, posterior, flow, survey, diagnosis)

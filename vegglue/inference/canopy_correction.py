@@ -7,8 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.inference.posterior_summary import median_of, sd_of
-from vegglue.inference.weighted_statistics import weighted_quantile
+from vegglue.inference.weighted_statistics import weighted_median, weighted_quantile, weighted_sd
 from vegglue.resistance.physical_constants import GRAVITY, KARMAN
 from vegglue.results.posterior import LEVELS, CorrectedCanopy
 
@@ -55,9 +54,9 @@ def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> Cor
         to_height=asked.to_height,
         depth=asked.depth,
         phi=phi,
-        median=median_of(phi, weights),
-        sd=sd_of(phi, weights),
+        median=weighted_median(phi, weights),
+        sd=weighted_sd(phi, weights),
         quantiles=weighted_quantile(phi, weights, LEVELS),
-        log10_median=median_of(log10_phi, weights),
-        log10_sd=sd_of(log10_phi, weights),
+        log10_median=weighted_median(log10_phi, weights),
+        log10_sd=weighted_sd(log10_phi, weights),
     )

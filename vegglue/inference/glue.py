@@ -4,21 +4,17 @@ Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305; the Gaussian li
 Berends et al. (2020), https://doi.org/10.1016/j.advwatres.2020.103675.
 """
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.inference.canopy_correction import corrected_canopy
 from vegglue.inference.likelihood import MemberFit, fit_members
-from vegglue.inference.posterior_summary import marginals, predictions
-from vegglue.inference.weighted_statistics import effective_size, pareto_shape
+from vegglue.inference.posterior_summary import posterior_of
 from vegglue.measurements.observations import Observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.posterior import Posterior
+from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
 
 
 def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterior:
@@ -26,7 +22,7 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
 
     gaussian: L = prod_i (2 pi s_i^2)^(-1/2) exp(-(u_i - U_i)^2 / (2 s_i^2)) over the used stations i, with s the root
     mean square residual of the best member, one for each kind of measurement (best-member), or the standard errors of
-    the data (known). nse and inverse-variance: see likelihood.py. `behavioural` is the smallest Nash-Sutcliffe
+    the data (known). nse and inverse-variance: see member_weights. `behavioural` is the smallest Nash-Sutcliffe
     efficiency of a member with weight, for any of the three; failed members have none.
 
     Errors: InputError when nothing can be weighed: stations other than those simulated, none used, no member solved,
@@ -37,24 +33,29 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
     fit = fit_members(ensemble, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
     weights = member_weights(fit, case.infer.likelihood, threshold)
-    return Posterior(
+    settings = InferenceSettings(
         method="glue",
         likelihood=case.infer.likelihood,
         sigma_rule=case.infer.sigma,
         threshold=threshold,
-        weights=weights,
-        prediction=ensemble.prediction,
-        station=station,
-        refinement=None,
-        transfer=None,
-        canopy=corrected_canopy(ensemble.parameters, case, weights),
-        **{name: getattr(fit, name) for name in ("best", "sigma", "noise", "efficiency", "log_likelihood")},
         ensemble_hash=ensemble.config_hash,
         seed=ensemble.seed,
         version=ensemble.version,
-        **_counts(fit, weights, station),
-        **marginals(ensemble.parameters, case, weights),
-        **predictions(ensemble.prediction, fit.best, fit.noise, weights, station, ensemble.seed),
+    )
+    return posterior_of(settings, _weighted_sample(ensemble, case, fit, weights), case, station, fit.noise, fit.sigma)
+
+
+def _weighted_sample(ensemble: Ensemble, case: Case, fit: MemberFit, weights: Array) -> WeightedSample:
+    return WeightedSample(
+        members=len(weights),
+        failed=int(np.sum(~fit.solved)),
+        best=fit.best,
+        unit={name: case.parameters[name].unit for name in ensemble.parameters},
+        theta=ensemble.parameters,
+        weights=weights,
+        efficiency=fit.efficiency,
+        log_likelihood=fit.log_likelihood,
+        prediction=ensemble.prediction,
     )
 
 
@@ -71,18 +72,6 @@ def check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
         )
     if not station["used"].any():
         raise InputError("observations: no station is used, nothing can be inferred; `vegglue check CONFIG` says why.")
-
-
-def _counts(fit: MemberFit, weights: Array, station: pd.DataFrame) -> dict[str, Any]:
-    return {
-        "members": len(weights),
-        "failed": int(np.sum(~fit.solved)),
-        "weighed": int(np.sum(weights > 0)),
-        "used": int(station["used"].sum()),
-        "effective_size": effective_size(weights),
-        "largest_weight": float(weights.max()),
-        "pareto_k": pareto_shape(weights),
-    }
 
 
 def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:

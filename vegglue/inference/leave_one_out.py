@@ -16,9 +16,6 @@ from scipy.special import logsumexp, ndtr
 from vegglue.arrays import Array
 from vegglue.inference.weighted_statistics import pareto_smoothed
 
-# k-hat above which a score by new weights is not to be trusted.
-TRUSTED_BELOW = 0.7
-
 
 @dataclass(frozen=True)
 class LeftOut:

@@ -8,6 +8,9 @@ from vegglue.arrays import Array
 
 # Halvings of the bracket of a mixture quantile: 2^-50 of its width is below rounding.
 BISECTIONS = 50
+# k-hat above which a mean over weighted members is not to be trusted: its error then falls too slowly with their number
+# (Vehtari et al. 2024, https://jmlr.org/papers/v25/19-556.html).
+TRUSTED_BELOW = 0.7
 
 
 def weighted_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
@@ -58,6 +61,18 @@ def weighted_covariance(values: Array, weights: Array) -> Array:
     return (centred * share[:, None]).T @ centred
 
 
+def weighted_median(values: Array, weights: Array) -> float:
+    """q(0.5) of values (member,), in their unit."""
+    return float(weighted_quantile(values, weights, [0.5])[0])
+
+
+def weighted_sd(values: Array, weights: Array) -> float:
+    """Square root of the weighted variance of values (member,), in their unit; NaN where a weighted one is infinite."""
+    if not np.isfinite(values[weights > 0]).all():
+        return float("nan")
+    return float(np.sqrt(weighted_covariance(values[:, None], weights)[0, 0]))
+
+
 def correlation(covariance: Array) -> Array:
     """r_ij = cov_ij / sqrt(cov_ii cov_jj) [-]; NaN where a quantity does not vary."""
     sd = np.sqrt(np.diag(covariance))
@@ -83,9 +98,9 @@ def systematic_draws(weights: Array, count: int, random: np.random.Generator) ->
 def pareto_shape(weights: Array) -> float:
     """k-hat [-]: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) weights.
 
-    Above 0.7 the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than 5 weights
-    stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens (2009),
-    https://doi.org/10.1198/tech.2009.08017.
+    Above TRUSTED_BELOW the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than
+    5 weights stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens
+    (2009), https://doi.org/10.1198/tech.2009.08017.
     """
     ordered = np.sort(weights / np.max(weights))
     tail = _tail(len(ordered))

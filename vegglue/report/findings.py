@@ -8,6 +8,7 @@ import numpy as np
 
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, fixed, interval, percent, plus_minus, short, unit_html
+from vegglue.inference.weighted_statistics import TRUSTED_BELOW
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.report.homogeneity_words import homogeneity_in_words, rejected
@@ -22,10 +23,10 @@ from vegglue.report.key_numbers import (
     unexplained_error,
     with_unit,
 )
-from vegglue.report.posterior_words import CLAIMED_FROM, HEAVY_TAIL, UNBELIEVED, drawn_in_words, tied, unseen_in_words
+from vegglue.report.posterior_words import UNBELIEVED, drawn_in_words, tied, unseen_in_words
 from vegglue.report.run import Run, patches_drawn
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.posterior import Posterior
+from vegglue.results.posterior import CLAIMED_FROM, Posterior
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 
 MASS_LIMIT = 1e-4  # of |Q/Q_in - 1|: what a stored member is held to
@@ -48,7 +49,7 @@ def findings(run: Run) -> list[Finding]:
         *_correlations(case, posterior),
         *_plants(case, posterior, run.cylinder),
         *_canopy(run),
-        *(_residual(posterior, kind) for kind in posterior.sigma),
+        *(_residual(posterior, kind) for kind in posterior.fit.sigma),
         *_coverage(posterior),
         *_refined(posterior),
         *_transfer(case, posterior),
@@ -62,29 +63,30 @@ def findings(run: Run) -> list[Finding]:
 
 
 def _parameter(case: Case, posterior: Posterior, name: str) -> Finding:
-    low, high = posterior.quantiles[name][0], posterior.quantiles[name][-1]
-    unit = f"{NARROW}{unit_html(posterior.unit[name])}".rstrip()
+    marginals = posterior.marginals
+    low, high = marginals.quantiles[name][0], marginals.quantiles[name][-1]
+    unit = f"{NARROW}{unit_html(posterior.sample.unit[name])}".rstrip()
     span = interval(low, high) if not as_power(posterior, name) else f"{short(low, 2)} to {short(high, 2)}"
     text = f"{symbol(case, name)} = {estimate(posterior, name)} (95{NARROW}% range {span}{unit})"
-    share = percent(posterior.width_ratio[name])
+    share = percent(marginals.width_ratio[name])
     side = pressed_side(posterior, name)
     if side:
-        mass = posterior.bound_mass[name][("lower", "upper").index(side)]
+        mass = marginals.bound_mass[name][("lower", "upper").index(side)]
         tells = "below" if side == "upper" else "above"
         text += (
             f". It presses against the {side} bound of its prior ({percent(mass)} of the weight is near it): "
             f"the data bound it from {tells} only, and the bound, not the data, ends the range"
         )
-    if not posterior.identified[name]:
+    if not marginals.identified[name]:
         text += f". It is not identified: the 95{NARROW}% range is still {share} as wide as before the measurements"
     elif not side:
         text += f", {share} of the width it had before the measurements"
-    return Finding("parameter", text + ".", doubt=bool(side) or not posterior.identified[name])
+    return Finding("parameter", text + ".", doubt=bool(side) or not marginals.identified[name])
 
 
 def _correlations(case: Case, posterior: Posterior) -> Iterator[Finding]:
-    symbols = [symbol(case, name) for name in posterior.parameters]
-    pairs = [f"{symbols[i]} and {symbols[j]} ({fixed(posterior.correlation[i, j], 2)})" for i, j in tied(posterior)]
+    symbols, matrix = [symbol(case, name) for name in posterior.parameters], posterior.marginals.correlation
+    pairs = [f"{symbols[i]} and {symbols[j]} ({fixed(matrix[i, j], 2)})" for i, j in tied(posterior)]
     if pairs:
         said = "The stations know combinations of parameters better than each alone. Correlated in the posterior are"
         yield Finding("trade-off", f"{said} {', '.join(pairs)}.")
@@ -103,9 +105,9 @@ def _plants(case: Case, posterior: Posterior, cylinder: RigidCylinder | None) ->
         )
     if name is None or cylinder is None:
         return
-    inferred = posterior.median[name] if posterior.canopy is None else posterior.canopy.median
+    inferred = posterior.marginals.median[name] if posterior.canopy is None else posterior.canopy.median
     median = cylinder.quantile(0.5)
-    if not posterior.identified[name]:
+    if not posterior.marginals.identified[name]:
         said = "the flow at these stations cannot tell whether that is so"
     else:
         said = f"the flow asks for {short(inferred / median, 2)} times as much"
@@ -131,9 +133,9 @@ def _canopy(run: Run) -> Iterator[Finding]:
 
 
 def _residual(posterior: Posterior, kind: str) -> Finding:
-    error, miss = measurement_error(posterior, kind), posterior.best_rmse[kind]
+    error, miss = measurement_error(posterior, kind), posterior.fit.best_rmse[kind]
     text = f"The best member misses the {kind} measurements by {with_unit(miss, kind)}, the median prediction by "
-    text += with_unit(posterior.rmse[kind], kind)
+    text += with_unit(posterior.fit.rmse[kind], kind)
     if not np.isfinite(error):
         return Finding("residual", f"{text}; without standard errors nothing can be said of what they ought to be.")
     if not unexplained_error(posterior, kind, miss):
@@ -151,7 +153,7 @@ def _coverage(posterior: Posterior) -> Iterator[Finding]:
     value = posterior.station["value"].to_numpy(float)[used]
     inside = [
         int(np.sum((value >= band[0][used]) & (value <= band[-1][used])))
-        for band in (posterior.model_band, posterior.total_band)
+        for band in (posterior.predicted.model_band, posterior.predicted.total_band)
     ]
     yield Finding(
         "bands",
@@ -164,13 +166,12 @@ def _refined(posterior: Posterior) -> Iterator[Finding]:
     refined = posterior.refinement
     if refined is None:
         return
-    missing = refined.errors == "stated" and refined.p_misfit < UNBELIEVED
-    yield Finding(
-        "errors", html.escape(" ".join(drawn_in_words(posterior, refined)[1:])), doubt=refined.errors == "estimated"
-    )
+    errors = refined.error_model.errors
+    missing = errors == "stated" and refined.misfit.p_misfit < UNBELIEVED
+    yield Finding("errors", html.escape(" ".join(drawn_in_words(posterior, refined)[1:])), doubt=errors == "estimated")
     yield Finding("draws", html.escape(drawn_in_words(posterior, refined)[0]))
     told = html.escape(" ".join(unseen_in_words(posterior, refined)))
-    yield Finding("unseen", told, doubt=missing or bool(refined.outlier.any()))
+    yield Finding("unseen", told, doubt=missing or bool(refined.misfit.outlier.any()))
 
 
 def _transfer(case: Case, posterior: Posterior) -> Iterator[Finding]:
@@ -210,17 +211,18 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
 
 
 def _weights(posterior: Posterior) -> Finding:
-    size = f"{max(posterior.effective_size, 1.0):,.0f}"
+    weighting = posterior.weighting
+    size = f"{max(weighting.effective_size, 1.0):,.0f}"
     text = (
-        f"The weights are worth {size} of {posterior.members:,} equal members; the heaviest carries "
-        f"{percent(posterior.largest_weight)}"
+        f"The weights are worth {size} of {posterior.sample.members:,} equal members; the heaviest carries "
+        f"{percent(weighting.largest_weight)}"
     )
-    few, long = posterior.effective_size < CLAIMED_FROM, posterior.pareto_k > HEAVY_TAIL
+    few, long = not posterior.claimed, weighting.pareto_k > TRUSTED_BELOW
     if few:
         text += f". Fewer than {CLAIMED_FROM} make the 95{NARROW}% ranges themselves uncertain: "
         text += "refine or simulate more members" if posterior.refinement is None else "narrow the priors"
     if long:
-        text += f". The tail of the weights is long (k̂ = {fixed(posterior.pareto_k, 2)}, above {HEAVY_TAIL})"
+        text += f". The tail of the weights is long (k̂ = {fixed(weighting.pareto_k, 2)}, above {TRUSTED_BELOW})"
     return Finding("weights", text + ".", doubt=few or long)
 
 

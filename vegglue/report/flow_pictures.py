@@ -70,6 +70,6 @@ def _channel_caption(flow: FlowFields, experiment: str) -> str:
 def _gauges(run: Run, levels: pd.DataFrame) -> Gauges | None:
     if levels.empty:
         return None
-    low, high = run.posterior.model_band[[0, -1]][:, levels.index.to_numpy()]
+    low, high = run.posterior.predicted.model_band[[0, -1]][:, levels.index.to_numpy()]
     x, value, error = (levels[column].to_numpy(float) for column in ("x", "value", "standard_error"))
     return Gauges(x, value, error, low, high)

@@ -43,7 +43,7 @@ def homogeneity_in_words(posterior: Posterior, transfer: Transfer, others: Mappi
 
 def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
     name, doubted = posterior.parameters[j], transfer.p[j] < DOUBTED_ALONE
-    scale = f"log10 {name}" if name in posterior.log10_median else name
+    scale = f"log10 {name}" if name in posterior.marginals.log10_median else name
     each = ", ".join(
         f"{value:.3g} ± {error:.1g} ({experiment})"
         for experiment, value, error in zip(

@@ -8,7 +8,7 @@ import scipy.stats
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
-from vegglue.report.posterior_words import CLAIMED_FROM, how_known
+from vegglue.report.posterior_words import how_known
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED
@@ -25,13 +25,13 @@ class KeyNumber:
 
 def verdict_of(case: Case, posterior: Posterior) -> str:
     """The one sentence on top: what is known now, and how well the model does."""
-    if posterior.effective_size < CLAIMED_FROM:
-        size = max(posterior.effective_size, 1.0)
-        few = f"the weights are worth {size:.0f} of {posterior.members:,} members, too few to say what is identified"
+    if not posterior.claimed:
+        size, members = max(posterior.weighting.effective_size, 1.0), posterior.sample.members
+        few = f"the weights are worth {size:.0f} of {members:,} members, too few to say what is identified"
         return f"A first look only: {few}. {_how_well(posterior)}"
-    known = [name for name in posterior.parameters if posterior.identified[name]]
-    unknown = [name for name in posterior.parameters if not posterior.identified[name]]
-    by = f"by these {count(posterior.used, 'station')}"
+    known = [name for name in posterior.parameters if posterior.marginals.identified[name]]
+    unknown = [name for name in posterior.parameters if not posterior.marginals.identified[name]]
+    by = f"by these {count(posterior.fit.used, 'station')}"
     sentence = f"{_in_a_list(case, known)} {_are(known)} identified {by}" if known else f"Nothing is identified {by}"
     if unknown:
         sentence += f"; {_in_a_list(case, unknown)} {_are(unknown)} not"
@@ -39,8 +39,8 @@ def verdict_of(case: Case, posterior: Posterior) -> str:
 
 
 def _how_well(posterior: Posterior) -> str:
-    kind = next(iter(posterior.rmse))
-    error, miss = measurement_error(posterior, kind), posterior.rmse[kind]
+    kind = next(iter(posterior.fit.rmse))
+    error, miss = measurement_error(posterior, kind), posterior.fit.rmse[kind]
     missed = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
     if not np.isfinite(error):
         return f"{missed}; their own error is not known."
@@ -55,11 +55,12 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
         KeyNumber(symbol(case, name), estimate(posterior, name), _remark(posterior, name))
         for name in posterior.parameters[:4]
     ]
-    kind = next(iter(posterior.sigma))
+    kind = next(iter(posterior.fit.sigma))
     error = measurement_error(posterior, kind)
     against = f"measurement error {with_unit(error, kind)}" if np.isfinite(error) else "measurement error unknown"
-    sigma = KeyNumber(f"residual <var>σ</var> ({kind})", with_unit(posterior.sigma[kind], kind), against)
-    size = KeyNumber("effective members", f"{posterior.effective_size:,.0f}", f"of {posterior.members:,}")
+    sigma = KeyNumber(f"residual <var>σ</var> ({kind})", with_unit(posterior.fit.sigma[kind], kind), against)
+    effective = f"{posterior.weighting.effective_size:,.0f}"
+    size = KeyNumber("effective members", effective, f"of {posterior.sample.members:,}")
     return [*parameters, sigma, size]
 
 
@@ -67,7 +68,7 @@ def _remark(posterior: Posterior, name: str) -> str:
     side = pressed_side(posterior, name)
     if side:
         return f"presses against its {side} bound"
-    return f"{how_known(posterior, name)}: {percent(posterior.width_ratio[name])} of the prior width"
+    return f"{how_known(posterior, name)}: {percent(posterior.marginals.width_ratio[name])} of the prior width"
 
 
 def _in_a_list(case: Case, names: list[str]) -> str:
@@ -90,18 +91,18 @@ def symbol(case: Case, name: str) -> str:
 
 def as_power(posterior: Posterior, name: str) -> bool:
     """Whether a parameter is told as a power of ten: looked at in log10, over more than a decade of its prior."""
-    low, high = posterior.prior_quantiles[name][[0, -1]]
-    return name in posterior.log10_median and high > 10 * low
+    low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
+    return name in posterior.marginals.log10_median and high > 10 * low
 
 
 def estimate(posterior: Posterior, name: str) -> str:
     """Median ± standard deviation, as a power of ten where as_power says so (HTML, with unit)."""
-    unit = unit_html(posterior.unit[name])
+    unit = unit_html(posterior.sample.unit[name])
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
     if as_power(posterior, name):
-        power = plus_minus(posterior.log10_median[name], posterior.log10_sd[name])
+        power = plus_minus(posterior.marginals.log10_median[name], posterior.marginals.log10_sd[name])
         return f"10<sup>{power}</sup>{unit}"
-    return plus_minus(posterior.median[name], posterior.sd[name]) + unit
+    return plus_minus(posterior.marginals.median[name], posterior.marginals.sd[name]) + unit
 
 
 def plant_parameter(case: Case) -> str | None:
@@ -124,14 +125,14 @@ def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
     """
     used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
     count = max(int(used.sum()), 1)
-    error, refinement = measurement_error(posterior, kind), posterior.refinement
-    doubted = refinement is not None and refinement.errors == "stated" and refinement.p_misfit < SELDOM
+    error, refined = measurement_error(posterior, kind), posterior.refinement
+    doubted = refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < SELDOM
     return miss > error * float(np.sqrt(scipy.stats.chi2.isf(SELDOM, count) / count)) or (doubted and miss > error)
 
 
 def pressed_side(posterior: Posterior, name: str) -> str:
     """'upper' or 'lower', the bound of its prior a parameter presses against, or ''."""
-    low, high = posterior.bound_hit[name]
+    low, high = posterior.marginals.bound_hit[name]
     return "upper" if high else "lower" if low else ""
 
 

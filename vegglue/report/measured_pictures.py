@@ -37,7 +37,7 @@ def sections(run: Run) -> Iterator[Picture]:
 
 
 def _bands(posterior: Posterior, rows: NDArray[np.intp]) -> Bands:
-    model, total = posterior.model_band[:, rows], posterior.total_band[:, rows]
+    model, total = posterior.predicted.model_band[:, rows], posterior.predicted.total_band[:, rows]
     return Bands(model[2], (model[1], model[3]), (model[0], model[4]), (total[0], total[4]))
 
 
@@ -52,12 +52,12 @@ def _section(run: Run, experiment: str, section: str, rows: pd.DataFrame) -> Pic
         int(np.sum(used & (value >= low) & (value <= high)))
         for low, high in (bands.model_50, bands.model_95, bands.total_95)
     ]
-    worst = int(np.argmax(np.where(used, np.abs(run.posterior.residual[index]), -1)))
+    worst = int(np.argmax(np.where(used, np.abs(run.posterior.fit.residual[index]), -1)))
     caption = (
         f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>, x = {rows['x'].mean():g} m. "
         f"Of {count(int(used.sum()), 'station')} used, {inside[0]} lie in the 50{NARROW}% and {inside[1]} in the "
         f"95{NARROW}% range of the model, {inside[2]} in that with residual error (dashed). Largest departure "
-        f"{fixed(run.posterior.residual[index][worst], 3)} m/s at y = {rows['y'].iloc[worst]:g} m."
+        f"{fixed(run.posterior.fit.residual[index][worst], 3)} m/s at y = {rows['y'].iloc[worst]:g} m."
     )
     alt = f"Velocity across section {section} of {experiment}: measured points over the modelled 50 and 95 % bands."
     return picture(run, figure, f"section-{experiment}-{section}", caption, alt)
@@ -79,9 +79,9 @@ def residuals(run: Run) -> Iterator[Picture]:
     table, posterior = run.observations.table, run.posterior
     used = table["used"].to_numpy(bool)
     zone = np.array(zones(run))
-    for kind in posterior.sigma:
+    for kind in posterior.fit.sigma:
         rows = np.flatnonzero(used & (table["kind"] == kind).to_numpy())
-        residual, where = posterior.residual[rows], zone[rows]
+        residual, where = posterior.fit.residual[rows], zone[rows]
         means = {str(name): residual[where == name] for name in dict.fromkeys(where)}
         told = "; ".join(
             f"{html.escape(name)} {fixed(part.mean(), 3)} ± {fixed(part.std(), 3)}" for name, part in means.items()
@@ -90,17 +90,17 @@ def residuals(run: Run) -> Iterator[Picture]:
         figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit)
         caption = f"Measured minus median prediction, {kind}, by zone (mean ± spread, {unit}): {told}."
         yield picture(run, figure, f"residuals-{kind}", caption, f"Residuals of {kind} along {axis}, by zone. {told}")
-        score = residual / posterior.noise[rows]
+        score = residual / posterior.fit.noise[rows]
         worst = int(np.argmax(np.abs(score)))
         names = [
             f"{table['section'][row] or table['experiment'][row]}, {axis} = {table[axis][row]:g} m" for row in rows
         ]
         caption = (
-            f"Residuals of {kind} over the error assumed, σ = {short(posterior.sigma[kind], 2)} {unit}: "
+            f"Residuals of {kind} over the error assumed, σ = {short(posterior.fit.sigma[kind], 2)} {unit}: "
             f"the largest is {fixed(score[worst], 1)} at {html.escape(names[worst])}."
         )
         known = measurement_error(posterior, kind)
-        if np.isfinite(known) and posterior.sigma_rule != "known":
+        if np.isfinite(known) and posterior.settings.sigma_rule != "known":
             caption += f" The standard errors of the data are {short(known, 2)} {unit}."
         figure = draw_quantiles(score, names)
         yield picture(
@@ -163,9 +163,9 @@ def _stretch(verticals: list[Vertical]) -> float:
 
 def weights_of_ensemble(run: Run) -> np.ndarray:
     """Of the members that were simulated, also where the posterior was drawn anew."""
-    if run.posterior.method == "glue":
-        return run.posterior.weights
-    fit = fit_members(run.ensemble, run.posterior.station, run.posterior.sigma_rule)
+    if run.posterior.settings.method == "glue":
+        return run.posterior.sample.weights
+    fit = fit_members(run.ensemble, run.posterior.station, run.posterior.settings.sigma_rule)
     return member_weights(fit, "gaussian", -np.inf)
 
 

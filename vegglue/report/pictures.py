@@ -22,7 +22,7 @@ from vegglue.report.findings import MASS_LIMIT
 from vegglue.report.flow_pictures import plans
 from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, plant_parameter, symbol
 from vegglue.report.measured_pictures import discharges, residuals, sections, verticals
-from vegglue.report.posterior_words import CLAIMED_FROM, how_known
+from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, picture
 
 MOST_PAIRS = 6  # of parameters drawn together
@@ -44,8 +44,8 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
 
 
 def _unknown(run: Run, name: str) -> Unknown:
-    (low, high), logarithmic = run.posterior.bounds[name], as_power(run.posterior, name)
-    values = run.posterior.theta[name]
+    (low, high), logarithmic = run.posterior.marginals.bounds[name], as_power(run.posterior, name)
+    values = run.posterior.sample.theta[name]
     return Unknown(
         values,
         run.ensemble.parameters[name],
@@ -53,7 +53,7 @@ def _unknown(run: Run, name: str) -> Unknown:
         float(high) if np.isfinite(high) else float(values.max()),
         logarithmic,
         run.case.parameters[name].symbol or name,
-        run.posterior.unit[name],
+        run.posterior.sample.unit[name],
     )
 
 
@@ -74,8 +74,8 @@ def _references(run: Run, name: str) -> list[ReferenceValue]:
 def _marginal(run: Run, name: str) -> Picture:
     canopy = run.posterior.canopy
     references = [] if canopy is not None and canopy.parameter == name else _references(run, name)
-    figure = draw_marginal(_unknown(run, name), run.posterior.weights, references)
-    width = percent(run.posterior.width_ratio[name])
+    figure = draw_marginal(_unknown(run, name), run.posterior.sample.weights, references)
+    width = percent(run.posterior.marginals.width_ratio[name])
     known = how_known(run.posterior, name)
     caption = f"{symbol(run.case, name)} = {estimate(run.posterior, name)}: {known}, {width} of the prior width."
     alt = (
@@ -91,11 +91,11 @@ def _corrected(run: Run) -> Iterator[Picture]:
         return
     uncorrected = _unknown(run, canopy.parameter)
     kept = (canopy.phi > 0) & np.isfinite(canopy.phi)
-    phi, weights = canopy.phi[kept], run.posterior.weights[kept]
+    phi, weights = canopy.phi[kept], run.posterior.sample.weights[kept]
     references = _references(run, canopy.parameter)
     marked = [reference.value for reference in references]
     low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
-    before = phi if np.array_equal(run.posterior.theta[canopy.parameter], uncorrected.before) else np.zeros(0)
+    before = phi if np.array_equal(run.posterior.sample.theta[canopy.parameter], uncorrected.before) else np.zeros(0)
     unknown = replace(uncorrected, values=phi, before=before, low=low / 1.5, high=1.5 * high)
     caption = (
         f"{symbol(run.case, canopy.parameter)} corrected to a canopy of {canopy.to_height:g} m: "
@@ -110,9 +110,9 @@ def _corrected(run: Run) -> Iterator[Picture]:
 def _joints(run: Run) -> Iterator[Picture]:
     names = run.posterior.parameters
     pairs = list(combinations(range(len(names)), 2))
-    pairs.sort(key=lambda pair: -abs(np.nan_to_num(run.posterior.correlation[pair])))
+    pairs.sort(key=lambda pair: -abs(np.nan_to_num(run.posterior.marginals.correlation[pair])))
     for i, j in pairs[:MOST_PAIRS]:
-        r = run.posterior.correlation[i, j]
+        r = run.posterior.marginals.correlation[i, j]
         marks = [
             (across.name, across.value, upward.value, across.marker.lower())
             for across in _references(run, names[i])
@@ -121,9 +121,9 @@ def _joints(run: Run) -> Iterator[Picture]:
         ]
         tied = "rise together" if r > 0 else "trade off: one rises as the other falls"
         told = f" {tied if abs(r) >= 0.3 else 'hardly constrain each other'} (correlation {fixed(r, 2)})"
-        if run.posterior.effective_size < CLAIMED_FROM:
+        if not run.posterior.claimed:
             told = ": too few members to tell how they constrain each other"
-        figure = draw_joint(_unknown(run, names[i]), _unknown(run, names[j]), run.posterior.weights, marks)
+        figure = draw_joint(_unknown(run, names[i]), _unknown(run, names[j]), run.posterior.sample.weights, marks)
         both = f"{symbol(run.case, names[i])} and {symbol(run.case, names[j])}"
         caption = f"{both}{told}. Area of a disc: weight of a member; grey: prior."
         alt = f"Members in the plane of {names[i]} and {names[j]}, weighted by likelihood."
@@ -138,14 +138,14 @@ def _plants(run: Run) -> Iterator[Picture]:
     corrected = posterior.canopy is not None and posterior.canopy.parameter == name
     inferred = posterior.canopy.phi if corrected and posterior.canopy else unknown.values
     kept = (inferred > 0) & np.isfinite(inferred)
-    inferred, weights = inferred[kept], posterior.weights[kept]
+    inferred, weights = inferred[kept], posterior.sample.weights[kept]
     spread = np.concatenate(
         [weighted_quantile(inferred, weights, [0.005, 0.995]), np.quantile(run.cylinder.draws, [0.005, 0.995])]
     )
     low, high = min(unknown.low, spread.min()), max(unknown.high, spread.max())
     figure = draw_cylinder(inferred, weights, run.cylinder.draws, low, high, unknown.symbol)
     ratio = float(weighted_quantile(inferred, weights, [0.5])[0]) / run.cylinder.quantile(0.5)
-    how = f"{short(ratio, 2)} times" if posterior.identified[name] else "not told apart from"
+    how = f"{short(ratio, 2)} times" if posterior.marginals.identified[name] else "not told apart from"
     caption = (
         f"Inferred plant drag{', corrected for canopy height,' if corrected else ''} is {how} that of rigid cylinders "
         f"of the surveyed size, {plus_minus(run.cylinder.mean, run.cylinder.standard_deviation)} (medians compared)."
@@ -154,9 +154,12 @@ def _plants(run: Run) -> Iterator[Picture]:
 
 
 def _weights(run: Run) -> Picture:
-    size = f"{run.posterior.effective_size:,.0f}"
-    caption = f"The posterior rests on {size} effective members of {run.posterior.members:,}; the heaviest carries {percent(run.posterior.largest_weight)}."  # noqa: E501
-    return picture(run, draw_weights(run.posterior.weights), "weights", caption, "Cumulated weight of the members.")
+    sample, weighting = run.posterior.sample, run.posterior.weighting
+    caption = (
+        f"The posterior rests on {weighting.effective_size:,.0f} effective members of {sample.members:,}; the heaviest "
+        f"carries {percent(weighting.largest_weight)}."
+    )
+    return picture(run, draw_weights(sample.weights), "weights", caption, "Cumulated weight of the members.")
 
 
 def _mass_error(run: Run) -> Picture:

@@ -52,7 +52,7 @@ def picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Pict
 
 def patches_drawn(run: Run, experiment: str) -> VegetatedCells:
     """The plants present in an experiment, at the medians of the parameters."""
-    medians = {name: np.array([value]) for name, value in run.posterior.median.items()}
+    medians = {name: np.array([value]) for name, value in run.posterior.marginals.median.items()}
     return build_problem(run.case, run.site, experiment, medians).plants
 
 

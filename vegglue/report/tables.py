@@ -11,6 +11,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
+from vegglue.inference.weighted_statistics import TRUSTED_BELOW
 from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, symbol
 from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, zones
@@ -83,8 +84,8 @@ def parameter_rows(run: Run) -> list[ParameterRow]:
     rows = []
     for name in posterior.parameters:
         logarithmic = as_power(posterior, name)
-        centre = posterior.log10_median[name] if logarithmic else posterior.median[name]
-        sd = posterior.log10_sd[name] if logarithmic else posterior.sd[name]
+        centre = posterior.marginals.log10_median[name] if logarithmic else posterior.marginals.median[name]
+        sd = posterior.marginals.log10_sd[name] if logarithmic else posterior.marginals.sd[name]
         beside = _Beside() if canopy and canopy.parameter == name else _beside(run, name, centre, sd)
         rows.append(_parameter_row(run, name, beside))
     if canopy is not None:
@@ -95,10 +96,11 @@ def parameter_rows(run: Run) -> list[ParameterRow]:
 
 def _parameter_row(run: Run, name: str, beside: _Beside) -> ParameterRow:
     posterior = run.posterior
-    low, high = posterior.quantiles[name][[0, -1]]
-    bound = " and ".join(side for side, hit in zip(("lower", "upper"), posterior.bound_hit[name], strict=True) if hit)
+    low, high = posterior.marginals.quantiles[name][[0, -1]]
+    hits = zip(("lower", "upper"), posterior.marginals.bound_hit[name], strict=True)
+    bound = " and ".join(side for side, hit in hits if hit)
     answer = how_known(posterior, name)
-    known = f"{SHORTLY.get(answer, answer)}, {percent(posterior.width_ratio[name])}"
+    known = f"{SHORTLY.get(answer, answer)}, {percent(posterior.marginals.width_ratio[name])}"
     return ParameterRow(
         symbol(run.case, name),
         html.escape(run.case.parameters[name].meaning),
@@ -124,11 +126,11 @@ def _corrected_row(case: Case, canopy: CorrectedCanopy, beside: _Beside) -> Para
 
 
 def _prior(run: Run, name: str) -> str:
-    prior, (low, high) = run.case.parameters[name], run.posterior.bounds[name]
+    prior, (low, high) = run.case.parameters[name], run.posterior.marginals.bounds[name]
     words = {"uniform": "uniform", "loguniform": "log-uniform", "normal": "normal", "lognormal": "log-normal"}
     if prior.distribution in ("uniform", "loguniform"):
         return f"{words[prior.distribution]}, {as_given(low)} to {as_given(high)}"
-    low, high = run.posterior.prior_quantiles[name][[0, -1]]
+    low, high = run.posterior.marginals.prior_quantiles[name][[0, -1]]
     return f"{words[prior.distribution]}, 95{NARROW}% in {short(low)} to {short(high)}"
 
 
@@ -164,9 +166,9 @@ def other_rows(run: Run) -> list[OtherRow]:
     study = {key: as_given(value) for key, value in stated.items() if isinstance(value, float)}
     rows = [
         OtherRow("σ", f"residual, {kind}", short(value, 2), "m" if kind == "level" else "m/s", study.get("sigma", "–"))
-        for kind, value in run.posterior.sigma.items()
+        for kind, value in run.posterior.fit.sigma.items()
     ]
-    return [*rows, OtherRow("n", "stations used", str(run.posterior.used), "", study.get("n", "–"))]
+    return [*rows, OtherRow("n", "stations used", str(run.posterior.fit.used), "", study.get("n", "–"))]
 
 
 def station_rows(run: Run) -> list[StationRow]:
@@ -177,7 +179,7 @@ def station_rows(run: Run) -> list[StationRow]:
 
 def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
     posterior = run.posterior
-    low, middle, high = posterior.model_band[[0, 2, -1], index]
+    low, middle, high = posterior.predicted.model_band[[0, 2, -1], index]
     measured = f"{fixed(row['value'], 3)} ± {fixed(row['standard_error'], 3)}"
     return StationRow(
         str(row["experiment"]),
@@ -188,8 +190,8 @@ def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
         str(row["zone"]),
         measured,
         f"{fixed(middle, 3)} ({fixed(low, 3)} to {fixed(high, 3)})",
-        fixed(posterior.residual[index], 3),
-        fixed(posterior.residual[index] / posterior.noise[index], 1),
+        fixed(posterior.fit.residual[index], 3),
+        fixed(posterior.fit.residual[index] / posterior.fit.noise[index], 1),
         str(row["reason"]),
     )
 
@@ -211,9 +213,9 @@ def health(run: Run) -> Iterator[tuple[str, str]]:
     ensemble, posterior = run.ensemble, run.posterior
     solved = ensemble.status != FAILED
     yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
-    yield "effective members", f"{posterior.effective_size:,.0f} of {posterior.members:,}"
-    yield "largest weight", percent(posterior.largest_weight)
-    yield "tail of the weights, k̂", f"{fixed(posterior.pareto_k, 2)} (to be trusted below 0.7)"
+    yield "effective members", f"{posterior.weighting.effective_size:,.0f} of {posterior.sample.members:,}"
+    yield "largest weight", percent(posterior.weighting.largest_weight)
+    yield "tail of the weights, k̂", f"{fixed(posterior.weighting.pareto_k, 2)} (to be trusted below {TRUSTED_BELOW})"
     yield (
         "iterations of a solved member",
         f"{np.median(ensemble.iterations[solved]):.0f} (most {ensemble.iterations.max()})",
@@ -221,7 +223,7 @@ def health(run: Run) -> Iterator[tuple[str, str]]:
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
     yield "processor time", f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member"
     for name in posterior.parameters:
-        low, high = posterior.bound_mass[name]
+        low, high = posterior.marginals.bound_mass[name]
         yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
 
 
@@ -249,7 +251,7 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     )
     yield (
         "likelihood",
-        f"{infer.likelihood}, sigma {infer.sigma}, {run.posterior.method}"
+        f"{infer.likelihood}, sigma {infer.sigma}, {run.posterior.settings.method}"
         + (f", members with an efficiency of at least {infer.behavioural:g}" if infer.behavioural is not None else ""),
     )
     yield "plants taller than the water is deep", "φ as it is" if numerics.emergent == "constant" else "φ h / h_d"

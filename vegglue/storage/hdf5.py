@@ -21,7 +21,8 @@ from vegglue.results.diagnosis import Diagnosis, diagnosis_attributes, diagnosis
 from vegglue.results.ensemble import ROWS, Ensemble, Header, ensemble_from, unsolved
 from vegglue.results.fields import Fields, fields_from, fields_group
 from vegglue.results.layout import Group
-from vegglue.results.posterior import Posterior, posterior_attributes, posterior_from, posterior_groups
+from vegglue.results.posterior import Posterior
+from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
 from vegglue.storage.lock import hold_lock
 from vegglue.storage.resume import Unfinished, is_reserved, put, reserve, stored_array, unfinished_fields
 

@@ -52,8 +52,8 @@ def known_place(case: Case, folder: Path) -> Array | None:
     if stored_hash(folder / "posterior.h5") != wanted:
         return None
     posterior = read_posterior(folder / "posterior.h5", wanted)
-    best = slice(posterior.best, posterior.best + 1)
-    return z_at(case, {name: values[best] for name, values in posterior.theta.items()})[0]
+    best = slice(posterior.sample.best, posterior.sample.best + 1)
+    return z_at(case, {name: values[best] for name, values in posterior.sample.theta.items()})[0]
 
 
 def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None:

@@ -1,0 +1,147 @@
+"""posterior.h5: nested values on one side, flat groups of datasets and attributes on the other.
+
+A field is stored under its own name, however deep it lies. Arrays of the posterior are datasets of the group `members`;
+those of a canopy correction, a refinement or a transfer test are datasets of a group with the name of that part. Single
+numbers and words are attributes of the file, those of a part with its name and _ in front.
+"""
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pandas as pd
+
+from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
+from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
+from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Transfer
+from vegglue.results.refinement import Refinement
+
+PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
+
+
+def posterior_groups(posterior: Posterior) -> dict[str, Group]:
+    """All groups of posterior.h5: those ArviZ knows, `members` with every array, `stations` with the whole table."""
+    named = _named_coordinates(posterior)
+    own = {name: _group(part, named) for name, part in ({"members": posterior} | _parts(posterior)).items()}
+    own["stations"] = table_group(posterior.station, "station", STATION_UNITS)
+    return own | _arviz_groups(posterior)
+
+
+def posterior_attributes(posterior: Posterior) -> dict[str, Any]:
+    """Numbers and words of the posterior and its parts, for the attributes of the file."""
+    own = _attributes(posterior)
+    for name, part in _parts(posterior).items():
+        own |= {f"{name}_{field}": value for field, value in _attributes(part).items()}
+    return own
+
+
+def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]) -> Posterior:
+    """The posterior whose file has these groups and attributes."""
+    station = pd.DataFrame({name: values for name, values in read["stations"].items() if name != "station"})
+    parts: dict[str, Any] = dict.fromkeys(PARTS) | {
+        name: kind(**_fields_from(kind, read[name], stated, f"{name}_")) for name, kind in PARTS.items() if name in read
+    }
+    return Posterior(**_fields_from(Posterior, read["members"], stated), station=station, **parts)
+
+
+def _parts(posterior: Posterior) -> dict[str, Any]:
+    """What a posterior may have besides its own arrays, by the name of the group."""
+    return {name: part for name in PARTS if (part := getattr(posterior, name)) is not None}
+
+
+def _values_in(kind: type) -> dict[str, type]:
+    """Fields that are values with fields of their own."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if isinstance(hint, type) and is_dataclass(hint)}
+
+
+def _plain(kind: type) -> dict[str, type]:
+    """Fields that are one number or word."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if hint in (str, int, float)}
+
+
+def _attributes(value: Any) -> dict[str, Any]:
+    """Numbers and words of a value and of the values in it, by name."""
+    own = {name: getattr(value, name) for name in _plain(type(value))}
+    for name in _values_in(type(value)):
+        own |= _attributes(getattr(value, name))
+    return own
+
+
+def _variables(value: Any) -> dict[str, Variable]:
+    """Arrays of a value and of the values in it, by name."""
+    own = {name: _variable(getattr(value, name), stored) for name, stored in stored_fields(type(value)).items()}
+    for name in _values_in(type(value)):
+        own |= _variables(getattr(value, name))
+    return own
+
+
+def _fields_from(kind: type, group: Mapping[str, np.ndarray], stated: Mapping[str, Any], prefix: str = "") -> Any:
+    """Arguments that make a value of this kind again, but for those that are no field of the group or attribute."""
+    hints = get_type_hints(kind)
+    own = {name: hint(stated[prefix + name]) for name, hint in _plain(kind).items()}
+    own |= {name: _array(group, name, stored, hints[name]) for name, stored in stored_fields(kind).items()}
+    return own | {name: inner(**_fields_from(inner, group, stated, prefix)) for name, inner in _values_in(kind).items()}
+
+
+def _group(value: Any, named: Mapping[str, np.ndarray]) -> Group:
+    variables = _variables(value)
+    sizes = {dim: size for each in variables.values() for dim, size in zip(each.dims, each.values.shape, strict=True)}
+    return Group({dim: named.get(dim, np.arange(size)) for dim, size in sizes.items()}, variables)
+
+
+def _variable(value: Any, stored: Stored) -> Variable:
+    values = list(value.values()) if isinstance(value, dict) else value
+    shape = None if not isinstance(value, dict) or value else (0,) * len(stored.dims)
+    return Variable(stored.dims, np.zeros(shape) if shape else np.array(values), stored.unit)
+
+
+def _array(group: Mapping[str, np.ndarray], name: str, stored: Stored, hint: Any) -> Any:
+    if get_origin(hint) is not dict:
+        return group[name]
+    entry = get_args(hint)[1]
+    convert = entry if entry in (str, float, bool) else np.asarray
+    return {key: convert(value) for key, value in zip(group[stored.dims[0]], group[name], strict=True)}
+
+
+def _named_coordinates(posterior: Posterior) -> dict[str, np.ndarray]:
+    """What stands along the dimensions whose entries have a name or a value; the others are counted from 0."""
+    names = np.array(posterior.parameters, object)
+    return {
+        "parameter": names,
+        "other_parameter": names,
+        "log_parameter": np.array(list(posterior.marginals.log10_median), object),
+        "kind": np.array(list(posterior.fit.sigma), object),
+        "level": np.array(LEVELS),
+        "side": np.array(["low", "high"], object),
+    }
+
+
+def _arviz_groups(posterior: Posterior) -> dict[str, Group]:
+    """Equal-weight draws and used stations only, so that no NaN reaches ArviZ."""
+    sample, refined = posterior.sample, posterior.refinement
+    used = np.flatnonzero(posterior.station["used"].to_numpy(bool))
+    draw = {"chain": np.arange(CHAINS), "draw": np.arange(DRAWS_PER_CHAIN)}
+    prior = {"chain": np.arange(1), "draw": np.arange(sample.members)}
+    station, at_draws = {"station": used}, ("chain", "draw")
+    member, log_likelihood = posterior.predicted.draws, sample.log_likelihood[:, used]
+    units, theta = sample.unit, sample.theta
+    before = refined.draws.prior_theta if refined else theta
+    lp = refined.draws.log_density if refined else log_likelihood.sum(axis=1)
+    table = table_group(posterior.station.iloc[used], "station", STATION_UNITS)
+    predictive = posterior.predicted.predictive[:, :, used]
+
+    def measured(dims: tuple[str, ...], values: Any, unit: str) -> dict[str, Variable]:
+        return {"measured": Variable((*dims, "station"), values, unit)}
+
+    stats = {"lp": Variable(at_draws, lp[member]), "member": Variable(at_draws, member)}
+    value = posterior.station["value"].to_numpy(float)[used]
+    return {
+        "posterior": Group(draw, {name: Variable(at_draws, theta[name][member], units[name]) for name in theta}),
+        "prior": Group(prior, {name: Variable(at_draws, before[name][None, :], units[name]) for name in theta}),
+        "log_likelihood": Group(draw | station, measured(at_draws, log_likelihood[member], "-")),
+        "posterior_predictive": Group(draw | station, measured(at_draws, predictive, VALUE_UNIT)),
+        "observed_data": Group(station, measured((), value, VALUE_UNIT)),
+        "constant_data": Group(station, table.variables),
+        "sample_stats": Group(draw, stats),
+    }
