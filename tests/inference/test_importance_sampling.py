@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from vegglue.inference.emulator import learned
+from vegglue.inference.emulator import fit_emulator
 from vegglue.inference.importance_sampling import Sample, sample
-from vegglue.inference.student_mixture import Mixture, around, draw, log_density, pooled_weights, tempered
+from vegglue.inference.student_mixture import Mixture, draw, log_density, mixture_at_modes, pooled_weights, tempered
 from vegglue.inference.weighted_statistics import effective_size, pareto_shape
 
 SEEDS = range(4)
@@ -27,7 +27,7 @@ def bent(z: np.ndarray) -> np.ndarray:
 
 
 def start(dimensions: int, width: float = 0.8) -> Mixture:
-    return around(np.zeros((1, dimensions)), width**2 * np.eye(dimensions)[None], np.zeros(1))
+    return mixture_at_modes(np.zeros((1, dimensions)), width**2 * np.eye(dimensions)[None], np.zeros(1))
 
 
 def moments(drawn: Sample) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +46,7 @@ def test_moments_of_a_normal_posterior(dimensions: int) -> None:
     def density(z: np.ndarray, values: np.ndarray) -> np.ndarray:
         return -0.5 * np.sum((measured - values) ** 2, axis=1) - 0.5 * np.sum(z**2, axis=1)
 
-    first = around(centre[None] + 0.5 * sd, 1.5 * covariance[None], np.zeros(1))
+    first = mixture_at_modes(centre[None] + 0.5 * sd, 1.5 * covariance[None], np.zeros(1))
     drawn = sample(lambda z: z @ design.T, density, first, 1000, seed=1)
     mean, spread = moments(drawn)
     assert drawn.worth[-1] >= 1000
@@ -72,7 +72,7 @@ def test_two_modes_keep_their_masses() -> None:
         away = np.stack([-0.5 * np.sum((z - centre) ** 2 / 0.25, axis=1) for centre in centres])
         return np.logaddexp(away[0], away[1] - 1.0)
 
-    first = around(centres, np.tile(0.25 * np.eye(3), (2, 1, 1)), np.zeros(2))
+    first = mixture_at_modes(centres, np.tile(0.25 * np.eye(3), (2, 1, 1)), np.zeros(2))
     drawn = sample(lambda z: z, density, first, 1000, seed=2)
     upper = drawn.weights[drawn.z[:, 0] > 0].sum()
     assert upper == pytest.approx(1 / (1 + math.exp(-1)), abs=4 * 0.45 / math.sqrt(1000))
@@ -111,12 +111,12 @@ def test_too_few_rounds_are_no_error() -> None:
 
 def test_a_mixture_is_drawn_from_its_own_density() -> None:
     centres, covariances = np.array([[0.0, 1.0], [3.0, -2.0]]), np.stack([np.eye(2), [[2.0, 0.5], [0.5, 0.3]]])
-    mixture = around(centres, covariances, np.log([3, 1]))
+    mixture = mixture_at_modes(centres, covariances, np.log([3, 1]))
     z = draw(mixture, np.random.default_rng(7).random((40000, 4)))
     assert z.mean(axis=0) == pytest.approx([0.75, 0.25], abs=0.04)
     upper = 0.75 * scipy.stats.t.sf(1.8, 5) + 0.25 * scipy.stats.t.sf(-1.2 / math.sqrt(2), 5)
     assert np.mean(z[:, 0] > 1.8) == pytest.approx(upper, abs=0.01)
-    other = around(np.zeros((1, 2)), 9 * np.eye(2)[None], np.zeros(1))
+    other = mixture_at_modes(np.zeros((1, 2)), 9 * np.eye(2)[None], np.zeros(1))
     mass = np.exp(log_density(other, z) - log_density(mixture, z)).mean()
     assert mass == pytest.approx(1, abs=0.3)
 
@@ -145,7 +145,7 @@ def test_an_emulator_is_exact_where_the_model_is_a_polynomial() -> None:
 
     random = np.random.default_rng(9)
     z, other = random.normal(size=(60, 2)), random.normal(size=(20, 2))
-    emulator = learned(z, cubic(z), np.zeros(60), np.array([0.3, -0.2]), 0.5 * np.eye(2))
+    emulator = fit_emulator(z, cubic(z), np.zeros(60), np.array([0.3, -0.2]), 0.5 * np.eye(2))
     assert emulator.predict(other) == pytest.approx(cubic(other), abs=0.02)
 
 
@@ -153,4 +153,4 @@ def test_an_emulator_passes_over_places_that_failed() -> None:
     z = np.random.default_rng(10).normal(size=(40, 2))
     logs = np.where(np.arange(40) < 5, -np.inf, 0.0)
     values = np.where(np.arange(40)[:, None] < 5, np.nan, z)
-    assert learned(z, values, logs, np.zeros(2), np.eye(2)).predict(z) == pytest.approx(z, abs=1e-3)
+    assert fit_emulator(z, values, logs, np.zeros(2), np.eye(2)).predict(z) == pytest.approx(z, abs=1e-3)

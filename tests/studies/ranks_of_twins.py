@@ -13,7 +13,7 @@ import scipy.optimize
 import scipy.stats
 
 from vegglue.inference.importance_sampling import sample
-from vegglue.inference.student_mixture import around
+from vegglue.inference.student_mixture import mixture_at_modes
 from vegglue.inference.weighted_statistics import systematic_draws
 
 TWINS, DRAWS, PARAMETERS, STATIONS = 200, 99, 3, 12
@@ -44,7 +44,7 @@ def _ranked(random: np.random.Generator, seed: int) -> np.ndarray:
         return -0.5 * np.sum(((measured - values) / ERROR) ** 2, axis=1) - 0.5 * np.sum(z**2, axis=1)
 
     best = scipy.optimize.least_squares(rows, np.zeros(PARAMETERS))
-    start = around(best.x[None], np.linalg.inv(best.jac.T @ best.jac)[None], np.zeros(1))
+    start = mixture_at_modes(best.x[None], np.linalg.inv(best.jac.T @ best.jac)[None], np.zeros(1))
     drawn = sample(predict, density, start, 400, seed)
     draws = drawn.z[systematic_draws(drawn.weights, DRAWS, random)]
     return np.sum(draws < truth, axis=0)

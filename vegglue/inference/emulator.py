@@ -1,4 +1,8 @@
-"""Polynomials through runs of a model: where its posterior lies, for next to nothing. They only say where to look."""
+"""A polynomial emulator of the flow model, fitted to its runs.
+
+It only proposes where to run the model next. Every weight comes from a true run, so the numbers below change how many
+runs are needed and not what is found.
+"""
 
 import math
 from dataclasses import dataclass
@@ -8,12 +12,13 @@ import numpy as np
 
 from vegglue.arrays import Array
 
-HIGHEST = 4
-# Runs for each coefficient, at least.
-RUNS_EACH = 2.0
+HIGHEST_DEGREE = 4
+# At least; a polynomial through fewer would follow single runs.
+RUNS_PER_COEFFICIENT = 2.0
+# Relative to the mean square of a term: keeps the normal equations solvable where runs leave a term undetermined.
 RIDGE = 1e-6
-# Runs whose log density lies this far [per parameter] below the best count half.
-FAR = 5.0
+# Log density below that of the best run [per parameter] at which the root of a run's weight has fallen to a half.
+HALF_WEIGHT_AT = 5.0
 
 
 @dataclass(frozen=True)
@@ -30,19 +35,24 @@ class Emulator:
         return np.asarray(_terms(_standard(z, self.centre, self.lower), self.powers) @ self.coefficient)
 
 
-def learned(z: Array, values: Array, log_density: Array, centre: Array, lower: Array) -> Emulator:
-    """The polynomial of the highest degree that the runs z (m, p), values (m, n) support, best where the density is."""
+def fit_emulator(z: Array, values: Array, log_density: Array, centre: Array, lower: Array) -> Emulator:
+    """Weighted least squares through the runs z (m, p) -> values (m, n), of the highest degree that they determine.
+
+    weight = (1 + (max l - l) / (HALF_WEIGHT_AT p))^-2 with l the log density of each run (m,): the fit is best where
+    the posterior is. centre (p,), lower (p, p): u = lower^-1 (z - centre) are the variables of the polynomial.
+    """
     known = np.isfinite(log_density)
     z, values, log_density = z[known], values[known], log_density[known]
     p = z.shape[1]
-    degree = max((d for d in range(2, HIGHEST + 1) if RUNS_EACH * math.comb(p + d, d) <= len(z)), default=1)
+    degrees = range(2, HIGHEST_DEGREE + 1)
+    degree = max((d for d in degrees if RUNS_PER_COEFFICIENT * math.comb(p + d, d) <= len(z)), default=1)
     powers = tuple(
         tuple(chosen.count(j) for j in range(p))
         for d in range(degree + 1)
         for chosen in combinations_with_replacement(range(p), d)
     )
     terms = _terms(_standard(z, centre, lower), powers)
-    weight = 1.0 / (1.0 + (log_density.max() - log_density) / (FAR * p)) ** 2
+    weight = 1.0 / (1.0 + (log_density.max() - log_density) / (HALF_WEIGHT_AT * p)) ** 2
     size = np.sqrt((weight @ terms**2) / weight.sum())
     root = np.sqrt(weight)[:, None]
     left = terms / size * root
@@ -56,7 +66,7 @@ def _standard(z: Array, centre: Array, lower: Array) -> Array:
 
 def _terms(u: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
     """prod_j u_j^powers (m, b)."""
-    table = np.stack([u**d for d in range(HIGHEST + 1)])
+    table = np.stack([u**d for d in range(HIGHEST_DEGREE + 1)])
     terms = np.ones((len(u), len(powers)))
     for b, power in enumerate(powers):
         for j, d in enumerate(power):

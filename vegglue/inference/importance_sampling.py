@@ -1,7 +1,9 @@
-"""Draws from a posterior by importance sampling with true runs; between rounds an emulator says where to look next.
+"""Draws from a posterior by adaptive importance sampling.
 
-Nothing here knows what is sampled. A weight is the density of a true run over that of all proposals together, so that
-the emulator decides how much a draw is worth and never what the result is.
+    w_i = p(z_i) / q(z_i),   q the mixture of the proposals of all rounds
+
+p comes from a run of the flow model at every draw. Between rounds an emulator of the model shapes the next proposal: it
+decides how many draws are effective, and never what the result is.
 """
 
 from collections.abc import Callable
@@ -12,11 +14,11 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.inference.emulator import Emulator, learned
-from vegglue.inference.student_mixture import Mixture, draw, follow, pooled_weights
+from vegglue.inference.emulator import Emulator, fit_emulator
+from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weights
 from vegglue.inference.weighted_statistics import effective_size
 
-ROUNDS, FIRST, MOST_DRAWS = 7, 192, 1024
+SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16
 Predict = Callable[[Array], Array]
@@ -27,7 +29,7 @@ LogDensity = Callable[[Array, Array], Array]
 class Sample:
     """All draws z (m, p), values predicted there (m, n), NaN where that failed, and log density (m,), -inf there.
 
-    weights (m,): to a sum of one; drawn, worth: draws and effective draws so far, after each round.
+    weights (m,): of sum 1; drawn, worth: draws and effective draws so far, after each round.
     """
 
     z: Array
@@ -39,30 +41,30 @@ class Sample:
 
 
 def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float, seed: int) -> Sample:
-    """Draws until they are worth `wanted` equal ones, or ROUNDS are over.
+    """Draws until `wanted` of them are effective, or SAMPLING_ROUNDS are over.
 
     predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,).
     """
-    places = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
-    mixture, size = start, FIRST
+    points = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
+    mixture, size = start, FIRST_DRAWS
     rounds: list[tuple[int, Mixture]] = []
     parts: list[tuple[Array, Array, Array]] = []
     drawn: list[int] = []
     worth: list[float] = []
     while True:
-        new = draw(mixture, places.random(size))
+        new = draw(mixture, points.random(size))
         values = predict(new)
-        parts.append((new, values, _known(density(new, values))))
+        parts.append((new, values, _impossible_where_nan(density(new, values))))
         rounds.append((size, mixture))
         z, values, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
         weights = pooled_weights(logs, z, rounds)
         drawn.append(len(z))
         worth.append(effective_size(weights))
-        if worth[-1] >= wanted or len(rounds) == ROUNDS:
+        if worth[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
             return Sample(z, values, logs, weights, tuple(drawn), tuple(worth))
         last = effective_size(pooled_weights(parts[-1][2], new, rounds[-1:])) / size
-        emulator = learned(z, values, logs, mixture.centre[0], mixture.lower[0])
-        mixture = follow(partial(_emulated, emulator, density), mixture, seed + len(rounds))
+        emulator = fit_emulator(z, values, logs, mixture.centre[0], mixture.lower[0])
+        mixture = adapt(partial(_emulated, emulator, density), mixture, seed + len(rounds))
         size = _next_size(wanted - worth[-1], last)
 
 
@@ -70,11 +72,11 @@ def _emulated(emulator: Emulator, density: LogDensity, z: Array) -> Array:
     return density(z, emulator.predict(z))
 
 
-def _known(logs: Array) -> Array:
+def _impossible_where_nan(logs: Array) -> Array:
     return np.where(np.isnan(logs), -np.inf, logs)
 
 
 def _next_size(missing: float, share: float) -> int:
-    """Draws of the next round: few while they are worth little, else what is missing."""
-    size = 2 * FIRST if share < 0.25 else np.clip(1.1 * missing / max(share, 0.75), DRAWS_TOGETHER, MOST_DRAWS)
+    """Draws of the next round: few while only a small `share` of the draws is effective, else what is missing."""
+    size = 2 * FIRST_DRAWS if share < 0.25 else np.clip(1.1 * missing / max(share, 0.75), DRAWS_TOGETHER, MOST_DRAWS)
     return int(DRAWS_TOGETHER * np.ceil(size / DRAWS_TOGETHER))

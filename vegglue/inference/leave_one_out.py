@@ -26,7 +26,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Predictive:
+class StationScores:
     """Each station (n,) given all others: log predictive density, k-hat, and the share of its prediction below it."""
 
     score: Array
@@ -40,7 +40,7 @@ def log_likelihoods(left: Array, precision: Array) -> Array:
     return np.asarray(0.5 * np.log(own / (2.0 * np.pi)) - 0.5 * (left @ precision) ** 2 / own)
 
 
-def leave_one_out(left: Array, precision: Array, weights: Array) -> Predictive:
+def leave_one_out(left: Array, precision: Array, weights: Array) -> StationScores:
     """Every station left out in turn: residuals (m, n), inverse covariance (n, n), weights (m,) above 0."""
     logs = log_likelihoods(left, precision)
     away = (left @ precision) / np.sqrt(np.diag(precision))
@@ -49,7 +49,7 @@ def leave_one_out(left: Array, precision: Array, weights: Array) -> Predictive:
         others, k[i] = pareto_smoothed(np.log(weights) - logs[:, i])
         score[i] = _log_mean(logs[:, i], others)
         below[i] = others @ ndtr(away[:, i])
-    return Predictive(score, k, below)
+    return StationScores(score, k, below)
 
 
 def leave_out(left: Array, precision: Array, weights: Array, group: np.ndarray) -> LeftOut:
@@ -63,7 +63,7 @@ def leave_out(left: Array, precision: Array, weights: Array, group: np.ndarray) 
 
 
 def _log_mean(logs: Array, weights: Array) -> float:
-    counts = weights > 1e-300  # what others carry is below rounding
+    counts = weights > 1e-300  # the others together weigh less than rounding
     return float(logsumexp(logs[counts] + np.log(weights[counts])))
 
 

@@ -1,4 +1,4 @@
-"""How well each member of an ensemble predicts what was measured, and what it therefore weighs."""
+"""How well each member of an ensemble predicts what was measured: residuals, efficiency and likelihood."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,13 @@ from vegglue.solver.status import FAILED
 
 @dataclass(frozen=True)
 class MemberFit:
-    """What each member makes of the used stations."""
+    """How well each member predicts the used stations."""
 
     solved: NDArray[np.bool_]  # (member,)
     best: int
-    sigma: dict[str, float]  # by kind of measurement
-    noise: Array  # (station,) NaN unknown
-    efficiency: Array  # (member,) NaN for failed members
+    sigma: dict[str, float]  # standard deviation of the errors by kind of measurement [m/s or m]
+    noise: Array  # (station,) that of each station, NaN unknown
+    efficiency: Array  # (member,) Nash-Sutcliffe [-], NaN for failed members
     log_likelihood: Array  # (member, station) NaN where not used or failed
 
 
@@ -31,7 +31,7 @@ def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
 
 
 def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> MemberFit:
-    """Residual, sigma and Gaussian log-likelihood of each member at the stations, under the rule of sigma:
+    """Efficiency and Gaussian log-likelihood of each member at the stations, with the errors that `rule` asks for.
 
     best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2;
     known: the standard errors of the data. E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
@@ -45,11 +45,14 @@ def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> MemberF
         raise InputError(f"ensemble: none of the {len(solved)} members was solved; see the reasons stored with them.")
     value = station["value"].to_numpy(float)
     residual = np.where(solved[:, None], value - ensemble.prediction, np.nan)
-    square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
+    mean_square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
     errors = _known_errors(station, used) if rule == "known" else None
-    misfit = _profile_misfit(square, kinds) if errors is None else np.sum((residual / errors)[:, used] ** 2, axis=1)
+    if errors is None:
+        misfit = _profile_misfit(mean_square, kinds)
+    else:
+        misfit = np.sum((residual / errors)[:, used] ** 2, axis=1)
     best = int(np.nanargmin(misfit))
-    sigma = {kind: float(np.sqrt(each[best])) for kind, each in square.items()}
+    sigma = {kind: float(np.sqrt(each[best])) for kind, each in mean_square.items()}
     noise = station["kind"].map(sigma).to_numpy(float) if errors is None else errors
     return MemberFit(
         solved=solved,
@@ -81,15 +84,15 @@ def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Array:
     return errors
 
 
-def _profile_misfit(square: dict[str, Array], kinds: dict[str, NDArray[np.intp]]) -> Array:
+def _profile_misfit(mean_square: dict[str, Array], kinds: dict[str, NDArray[np.intp]]) -> Array:
     """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]."""
-    for kind, each in square.items():
+    for kind, each in mean_square.items():
         if np.nanmin(each) == 0:
             raise InputError(
                 f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the residual; "
                 "give standard errors and use `infer.sigma: known`."
             )
-    return np.sum([len(kinds[kind]) * np.log(each) for kind, each in square.items()], axis=0)
+    return np.sum([len(kinds[kind]) * np.log(each) for kind, each in mean_square.items()], axis=0)
 
 
 def _variance(values: Array) -> float:

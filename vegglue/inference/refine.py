@@ -1,8 +1,8 @@
-"""From the best members of an ensemble to a posterior one can stand on: best places, errors, draws with true runs.
+"""A posterior by importance sampling around the best fits, which are searched from the best members of an ensemble.
 
     p(z | y) ~ exp(-|W (y - f(z))|^2 / 2 - |z|^2 / 2),   W' W the inverse covariance of the errors
 
-z are places of the prior in which it is standard normal, f the model itself: every draw that counts is a run.
+z are the parameters on a scale on which the prior is standard normal. f is the flow model itself: every draw is a run.
 """
 
 from dataclasses import replace
@@ -25,19 +25,19 @@ from vegglue.inference.likelihood import efficiency, root_mean_square, stations_
 from vegglue.inference.map_and_errors import Groundwork, groundwork
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.refinement_summary import precision_of, refinement_of
-from vegglue.inference.student_mixture import Mixture, around
+from vegglue.inference.student_mixture import Mixture, mixture_at_modes
 from vegglue.measurements.observations import Observations
 from vegglue.progress import Say
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
 from vegglue.version import VERSION
 
-# Effective draws that are asked for.
-WANTED = 1000
+# Effective draws that are asked for: an end of the 95 % range then rests on 25 of them.
+EFFECTIVE_DRAWS = 1000
 
 
 def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say = lambda text: None) -> Posterior:
-    """Draws worth WANTED of the posterior, or as many as some thousand runs give, with what they predict unseen.
+    """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict unseen data.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
     or no flow is found from the best members.
@@ -47,7 +47,8 @@ def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say 
     base = groundwork(model_of(case, observations), ensemble, case.infer.sigma)
     say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
     run = partial(predict, base.model, [one.point for one in base.fits])
-    drawn = sample(run, partial(log_posterior, base.noise), mixture_around(base.fits), WANTED, case.simulate.seed)
+    density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
+    drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed)
     posterior = _posterior(base, drawn, ensemble)
     return replace(
         posterior,
@@ -57,7 +58,7 @@ def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say 
 
 
 def refinable(case: Case) -> bool:
-    """Whether the case asks for a likelihood of errors, which is what draws can follow; not an informal one."""
+    """Whether the case has a Gaussian likelihood of all members, so that its posterior is a density to draw from."""
     return case.infer.likelihood == "gaussian" and case.infer.behavioural is None
 
 
@@ -71,10 +72,10 @@ def log_posterior(noise: Noise, z: Array, prediction: Array) -> Array:
 
 
 def mixture_around(fits: tuple[Fitted, ...]) -> Mixture:
-    """A component for each mode, sharing by exp(-objective / 2) |covariance|^(1/2)."""
+    """A component for each mode, its share proportional to exp(-objective / 2) |covariance|^(1/2) (Laplace)."""
     covariances = np.stack([one.covariance for one in fits])
     mass = np.array([-0.5 * one.objective for one in fits]) + 0.5 * np.linalg.slogdet(covariances)[1]
-    return around(np.stack([one.point.z for one in fits]), covariances, mass)
+    return mixture_at_modes(np.stack([one.point.z for one in fits]), covariances, mass)
 
 
 def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior:
@@ -116,7 +117,7 @@ def _weighted_sample(base: Groundwork, drawn: Sample) -> WeightedSample:
 
 
 def _factor(noise: Noise, stations: int) -> Array:
-    """Factor of the errors' covariance (station, station), NaN where a station is not used."""
+    """L (station, station) with L L' the covariance of the errors, NaN where a station is not used."""
     wide = np.full((stations, stations), np.nan)
     wide[noise.rows] = 0.0
     wide[np.ix_(noise.rows, noise.rows)] = noise.lower

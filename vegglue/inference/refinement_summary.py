@@ -1,4 +1,4 @@
-"""What draws by importance sampling tell of a posterior besides its weights: modes, errors, and unseen stations."""
+"""What a refined posterior tells besides its weighted draws: its modes, its errors, and predictions of unseen data."""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,8 +25,8 @@ from vegglue.results.refinement import (
     Refinement,
 )
 
-# A station is flagged when the chance of one as far off, among all stations, is below this.
-NO_CHANCE = 0.01
+# A station is an outlier when errors alone put any of all stations as far off with a chance below this.
+OUTLIER_BELOW = 0.01
 
 
 def refinement_of(base: Groundwork, drawn: Sample, best: int) -> Refinement:
@@ -92,7 +92,7 @@ def _misfit(base: Groundwork, prediction: Array, at_all: Callable[[Array], Array
         freedom=freedom,
         p_misfit=float(scipy.stats.chi2.sf(chi2, max(freedom, 1))),
         surprise=at_all(base.surprise),
-        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2) < NO_CHANCE,
+        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2) < OUTLIER_BELOW,
     )
 
 
@@ -108,13 +108,13 @@ def _groups_left_out(left: Array, precision: Array, weights: Array, used: pd.Dat
 
 
 def _groups(used: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Rows of each section of each experiment, then of each experiment, where that leaves something."""
+    """Rows of each section of each experiment, then of each experiment; none where there is only one of them."""
     names = used["experiment"].astype(str).to_numpy()
     sections = used["section"].astype(str).to_numpy()
     sections = np.where(sections == "", used["kind"].astype(str) + "s", sections)
-    places = np.array([f"{a} {b}" for a, b in zip(names, sections, strict=True)])
+    named = np.array([f"{a} {b}" for a, b in zip(names, sections, strict=True)])
     found: dict[str, np.ndarray] = {}
-    for labels, word in ((places, ""), (names, "experiment ")):
+    for labels, word in ((named, ""), (names, "experiment ")):
         each = dict.fromkeys(labels)
         if len(each) > 1:
             found |= {f"{word}{label}": np.flatnonzero(labels == label) for label in each}

@@ -1,4 +1,4 @@
-"""A mixture of Student's t that follows a density: drawn from, evaluated, and fitted to weighted draws."""
+"""A mixture of Student's t distributions, the proposal of importance sampling: drawn from, evaluated and adapted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,16 +12,16 @@ from vegglue.inference.weighted_statistics import effective_size, systematic_dra
 
 # Degrees of freedom of every component: tails heavy enough for a posterior that is not normal.
 FREEDOM = 5.0
-# Effective draws that a fit asks for; with fewer the weights are tempered, w^t with t < 1.
-TO_FIT = 200
-# Rounds and draws of following a density that costs next to nothing; components at most, and added in a round.
-FOLLOW_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, MORE = 8, 4096, 12, 3
+# Effective draws that a fit of the mixture asks for; with fewer the weights are tempered, w^t with t < 1.
+EFFECTIVE_TO_FIT = 200
+# Rounds of adaptation, draws in each (of an emulator, which cost little); components at most, and added in a round.
+ADAPTATION_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, COMPONENTS_ADDED = 8, 4096, 12, 3
 # Rounds whose draws are pooled; draws of equal weight that a fit is made to, in so many steps.
-POOLED, FITTED, FIT_STEPS = 3, 2000, 10
-# Share of its draws that a normal density may lose because a flatter one is followed, so that tails are covered too.
-SPENT = 0.2
-# A round in which the draws are worth this share of their number, or hardly more than in the last one, is the last.
-WORTH, HARDLY_BETTER = 0.85, 1.03
+ROUNDS_POOLED, DRAWS_FITTED, FIT_STEPS = 3, 2000, 10
+# Share of the effective draws given up to cover the tails, for a normal density: the mixture adapts to a flatter one.
+SPENT_ON_TAILS = 0.2
+# Adaptation ends when this share of the draws is effective, or when a round gains less than this factor on the last.
+ENOUGH, LEAST_GAIN = 0.85, 1.03
 
 
 @dataclass(frozen=True)
@@ -33,17 +33,17 @@ class Mixture:
     lower: Array
 
 
-def around(centres: Array, covariances: Array, log_mass: Array) -> Mixture:
+def mixture_at_modes(centres: Array, covariances: Array, log_mass: Array) -> Mixture:
     """A component for each mode (k, p) with its covariance (k, p, p); shares go with exp(log_mass) (k,)."""
     return Mixture(np.exp(log_mass - logsumexp(log_mass)), centres, np.asarray(np.linalg.cholesky(covariances), float))
 
 
-def draw(mixture: Mixture, places: Array) -> Array:
-    """z (m, p) at places (m, p + 2) of the unit cube: which component, how far out, and in which direction."""
-    places = np.clip(places, 1e-9, 1.0 - 1e-9)
-    which = np.minimum(np.searchsorted(np.cumsum(mixture.share), places[:, 0]), mixture.share.size - 1)
-    stretch = np.sqrt(FREEDOM / chdtri(FREEDOM, places[:, 1]))
-    away = np.einsum("mij,mj->mi", mixture.lower[which], ndtri(places[:, 2:]))
+def draw(mixture: Mixture, points: Array) -> Array:
+    """z (m, p) at points (m, p + 2) of the unit cube: which component, how far out, and in which direction."""
+    points = np.clip(points, 1e-9, 1.0 - 1e-9)
+    which = np.minimum(np.searchsorted(np.cumsum(mixture.share), points[:, 0]), mixture.share.size - 1)
+    stretch = np.sqrt(FREEDOM / chdtri(FREEDOM, points[:, 1]))
+    away = np.einsum("mij,mj->mi", mixture.lower[which], ndtri(points[:, 2:]))
     return np.asarray(mixture.centre[which] + stretch[:, None] * away)
 
 
@@ -68,7 +68,7 @@ def _distance(lower: Array, away: Array) -> Array:
 
 
 def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]]) -> Array:
-    """w_i = p(z_i) / sum_r (n_r / n) q_r(z_i), to a sum of one: draws of all rounds, each from its own mixture.
+    """w_i = p(z_i) / sum_r (n_r / n) q_r(z_i), of sum 1: n_r draws of each round r, from its own mixture q_r.
 
     Cornuet et al. (2012), https://doi.org/10.1111/j.1467-9469.2011.00756.x.
     """
@@ -79,36 +79,37 @@ def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]
     return np.asarray(weights / weights.sum())
 
 
-def follow(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixture:
-    """The start moved, reshaped and split until it resembles the density: target z (m, p) -> its log (m,)."""
+def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixture:
+    """The start moved, reshaped and split until it resembles the density; target: z (m, p) -> log density (m,)."""
     random = np.random.default_rng(seed)
     mixture, before, power = start, 0.0, _power(start.centre.shape[1])
     rounds: list[tuple[int, Mixture]] = []
     parts: list[tuple[Array, Array]] = []
-    for _ in range(FOLLOW_ROUNDS):
+    for _ in range(ADAPTATION_ROUNDS):
         new = draw(mixture, random.random((EMULATED_DRAWS, start.centre.shape[1] + 2)))
         logs = power * target(new)
-        rounds, parts = [*rounds[1 - POOLED :], (EMULATED_DRAWS, mixture)], [*parts[1 - POOLED :], (new, logs)]
+        rounds = [*rounds[1 - ROUNDS_POOLED :], (EMULATED_DRAWS, mixture)]
+        parts = [*parts[1 - ROUNDS_POOLED :], (new, logs)]
         worth = effective_size(pooled_weights(logs, new, rounds[-1:])) / EMULATED_DRAWS
-        if worth > WORTH or 0.5 < worth < HARDLY_BETTER * before:
+        if worth > ENOUGH or 0.5 < worth < LEAST_GAIN * before:
             break
         before = worth
         z, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
-        weights = tempered(pooled_weights(logs, z, rounds), TO_FIT)
-        equal = z[systematic_draws(weights, FITTED, random)]
-        mixture = _grown(mixture, equal, min(MORE, MOST_COMPONENTS - mixture.share.size), random)
+        weights = tempered(pooled_weights(logs, z, rounds), EFFECTIVE_TO_FIT)
+        equal = z[systematic_draws(weights, DRAWS_FITTED, random)]
+        mixture = _grown(mixture, equal, min(COMPONENTS_ADDED, MOST_COMPONENTS - mixture.share.size), random)
         for _ in range(FIT_STEPS):
             mixture = _fitted(mixture, equal, effective_size(weights))
     return mixture
 
 
 def _power(dimensions: int) -> float:
-    """b < 1 such that draws of p^b are worth 1 - SPENT of as many of p, (b (2 - b))^(dimensions / 2) for a normal p."""
-    return float(1.0 - np.sqrt(1.0 - (1.0 - SPENT) ** (2.0 / dimensions)))
+    """b < 1 with (b (2 - b))^(dimensions / 2) = 1 - SPENT_ON_TAILS, the effective share of draws from p^b, p normal."""
+    return float(1.0 - np.sqrt(1.0 - (1.0 - SPENT_ON_TAILS) ** (2.0 / dimensions)))
 
 
 def tempered(weights: Array, wanted: float) -> Array:
-    """w^t with the largest t <= 1 at which they are worth `wanted`, or what there is; to a sum of one."""
+    """w^t of sum 1, with the largest t in 0 to 1 for which at least `wanted` of the draws are effective."""
     if effective_size(weights) >= wanted:
         return weights
     low, high = 0.0, 1.0

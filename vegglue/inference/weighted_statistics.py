@@ -1,4 +1,4 @@
-"""Statistics of weighted members: quantiles, moments, what the weights are worth, and equal-weight draws."""
+"""Statistics of weighted members: quantiles, moments, the effective number of members, and draws of equal weight."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,16 +8,16 @@ from vegglue.arrays import Array
 
 # Halvings of the bracket of a mixture quantile: 2^-50 of its width is below rounding.
 BISECTIONS = 50
-# k-hat above which a mean over weighted members is not to be trusted: its error then falls too slowly with their number
-# (Vehtari et al. 2024, https://jmlr.org/papers/v25/19-556.html).
-TRUSTED_BELOW = 0.7
+# k-hat above which a mean over weighted members is not to be trusted: no practical number of members makes its error
+# small (Vehtari et al. 2024, https://jmlr.org/papers/v25/19-556.html).
+TRUSTED_K_HAT = 0.7
 
 
 def weighted_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
-    """q(p) interpolates the sorted values at p_k = (w_1 + ... + w_k - w_k/2) / sum w; no weight, no part in it.
+    """q(p) interpolates the sorted values at p_k = (w_1 + ... + w_k - w_k/2) / sum w.
 
-    values: (member, ...); weights: (member,); returns (level, ...) in the unit of the values. Where a weighted value is
-    NaN the quantile is NaN.
+    values: (member, ...); weights: (member,); returns (level, ...) in the unit of the values. Members of weight zero do
+    not count; where a value of any other member is NaN, so is the quantile.
     """
     values, weights = values[weights > 0], weights[weights > 0]
     columns = values.reshape(len(weights), -1)
@@ -34,12 +34,12 @@ def _column_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
 
 
 def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLike) -> Array:
-    """q(p) with sum_k w_k Phi((q - c_k) / s) = p: quantiles of members that each carry a normal error.
+    """q(p) with sum_k w_k Phi((q - c_k) / s) = p: quantiles of the members' predictions c_k plus a normal error.
 
     centres: (member, station); weights: (member,); sd: (station,) > 0; returns (level, station) in the unit of centres.
     Where a centre or sd is NaN the quantile is NaN.
     """
-    kept = weights > 1e-12 * weights.max()  # what the others carry is below rounding
+    kept = weights > 1e-12 * weights.max()  # the others together weigh less than rounding
     centres, share = centres[kept], weights[kept] / weights[kept].sum()
     low = np.tile(centres.min(axis=0) - 10 * sd, (np.size(levels), 1))
     high = np.tile(centres.max(axis=0) + 10 * sd, (np.size(levels), 1))
@@ -88,17 +88,18 @@ def effective_size(weights: Array) -> float:
 def systematic_draws(weights: Array, count: int, random: np.random.Generator) -> NDArray[np.int64]:
     """Indices of `count` equal-weight draws: members where (u + i) / count falls in the cumulated weights, shuffled.
 
-    Each member comes floor or ceil of count * weight times. Kitagawa (1996), https://doi.org/10.2307/1390750.
+    u is uniform in 0 to 1. Each member is drawn floor or ceil of count * weight times.
+    Kitagawa (1996), https://doi.org/10.2307/1390750.
     """
     cumulated = np.cumsum(weights)
-    places = (random.random() + np.arange(count)) / count * cumulated[-1]
-    return random.permutation(np.searchsorted(cumulated, places, side="right"))
+    points = (random.random() + np.arange(count)) / count * cumulated[-1]
+    return random.permutation(np.searchsorted(cumulated, points, side="right"))
 
 
 def pareto_shape(weights: Array) -> float:
     """k-hat [-]: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) weights.
 
-    Above TRUSTED_BELOW the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than
+    Above TRUSTED_K_HAT the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than
     5 weights stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens
     (2009), https://doi.org/10.1198/tech.2009.08017.
     """
@@ -110,10 +111,10 @@ def pareto_shape(weights: Array) -> float:
 
 
 def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
-    """Weights (m,) to a sum of one whose largest are replaced by quantiles of the distribution fitted to them; k-hat.
+    """Weights (m,) of sum 1, the largest replaced by quantiles of the Pareto distribution fitted to them; and k-hat.
 
-    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large ones
-    they stay as they are: k-hat is NaN where all are alike, infinite where hardly any counts.
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large weights nothing is replaced:
+    k-hat is then NaN, or infinite where the weights are worth fewer than 5 members.
     """
     weights = np.exp(log_weights - np.max(log_weights))
     order = np.argsort(weights, kind="stable")

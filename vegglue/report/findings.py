@@ -8,7 +8,7 @@ import numpy as np
 
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, fixed, interval, percent, plus_minus, short, unit_html
-from vegglue.inference.weighted_statistics import TRUSTED_BELOW
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.report.homogeneity_words import homogeneity_in_words, rejected
@@ -217,12 +217,12 @@ def _weights(posterior: Posterior) -> Finding:
         f"The weights are worth {size} of {posterior.sample.members:,} equal members; the heaviest carries "
         f"{percent(weighting.largest_weight)}"
     )
-    few, long = not posterior.claimed, weighting.pareto_k > TRUSTED_BELOW
+    few, long = not posterior.claimed, weighting.pareto_k > TRUSTED_K_HAT
     if few:
         text += f". Fewer than {CLAIMED_FROM} make the 95{NARROW}% ranges themselves uncertain: "
         text += "refine or simulate more members" if posterior.refinement is None else "narrow the priors"
     if long:
-        text += f". The tail of the weights is long (k̂ = {fixed(weighting.pareto_k, 2)}, above {TRUSTED_BELOW})"
+        text += f". The tail of the weights is long (k̂ = {fixed(weighting.pareto_k, 2)}, above {TRUSTED_K_HAT})"
     return Finding("weights", text + ".", doubt=few or long)
 
 

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vegglue.inference.weighted_statistics import TRUSTED_BELOW
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report.homogeneity_words import homogeneity_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Marginals, Posterior
 from vegglue.results.refinement import ErrorModel, GroupsLeftOut, LeaveOneOut, MisfitTest, PosteriorModes, Refinement
@@ -49,7 +49,7 @@ def _worth(posterior: Posterior) -> list[str]:
     size = f"{weighting.effective_size:.3g}"
     sentences = [
         f"The weights are worth {size} equal members; the largest weight is {weighting.largest_weight:.2g}, the index "
-        f"of their tail k-hat {weighting.pareto_k:.2g} (to be trusted below {TRUSTED_BELOW})."
+        f"of their tail k-hat {weighting.pareto_k:.2g} (to be trusted below {TRUSTED_K_HAT})."
     ]
     if not posterior.claimed:
         remedy = "refine around the best members (`infer --method refine`)"
@@ -219,13 +219,13 @@ def _misfit_under_errors(misfit: MisfitTest) -> list[str]:
 
 
 def _scores(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -> list[str]:
-    doubtful = int(np.sum(alone.score_k > TRUSTED_BELOW))
-    doubt = f", {doubtful} of them not to be trusted (k-hat above {TRUSTED_BELOW})" if doubtful else ""
+    doubtful = int(np.sum(alone.score_k > TRUSTED_K_HAT))
+    doubt = f", {doubtful} of them not to be trusted (k-hat above {TRUSTED_K_HAT})" if doubtful else ""
     sentences = [
         f"Leaving each station out in turn, the log predictive density is {alone.elpd:.1f} ± "
         f"{alone.elpd_error:.1f} over {posterior.fit.used} stations{doubt}."
     ]
-    shaky = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_BELOW]
+    shaky = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_K_HAT]
     if groups.left_out.size:
         each = groups.left_out_score / groups.left_out_stations
         worst = int(np.argmin(each))

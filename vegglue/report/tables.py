@@ -11,7 +11,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
-from vegglue.inference.weighted_statistics import TRUSTED_BELOW
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, symbol
 from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, zones
@@ -215,7 +215,7 @@ def health(run: Run) -> Iterator[tuple[str, str]]:
     yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
     yield "effective members", f"{posterior.weighting.effective_size:,.0f} of {posterior.sample.members:,}"
     yield "largest weight", percent(posterior.weighting.largest_weight)
-    yield "tail of the weights, k̂", f"{fixed(posterior.weighting.pareto_k, 2)} (to be trusted below {TRUSTED_BELOW})"
+    yield "tail of the weights, k̂", f"{fixed(posterior.weighting.pareto_k, 2)} (to be trusted below {TRUSTED_K_HAT})"
     yield (
         "iterations of a solved member",
         f"{np.median(ensemble.iterations[solved]):.0f} (most {ensemble.iterations.max()})",
