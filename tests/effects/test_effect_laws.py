@@ -40,8 +40,13 @@ def stand(**given):
 
 
 def reading(**given):
-    settings = {"value": 0.5, "velocity": 1.0, "depth": 0.8, "u": 0.5, "rate": 0.05, "u_y": 0.4}
-    return Reading(**filled(Reading, settings | given, (1, 1)))
+    """A probe that measures across a flow whose u is of no matter to it."""
+    settings = {"value": 0.5, "velocity": 1.0, "component": 0.5, "component_y": 0.4, "depth": 0.8, "rate": 0.05}
+    return Reading(**filled(Reading, settings | {"u": 0.9} | given, (1, 1)))
+
+
+def gauge(**given):
+    return reading(**{"velocity": 0.0, "level": 1.0, "component": 0.0, "component_y": 0.0} | given)
 
 
 def boundary():
@@ -164,13 +169,13 @@ ROWS = {
     ),
     "turning_earth": (cells(u=0.6, v=0.2), {"parameter": 1e-4}, {"x": 2e-5, "y": -6e-5}),
     "probe_gain": (reading(), {"gain": 0.05}, {"value": 0.525}),
-    "device_gain": (reading(velocity=0.0), {"gain": 0.05}, {"value": 0.5}),
+    "device_gain": (gauge(), {"gain": 0.05}, {"value": 0.5}),
     "zero_offset": (reading(), {"offset": 0.01}, {"value": 0.51}),
     "station_shift": (reading(), {"shift": 0.1}, {"value": 0.54}),
     "partial_depth": (reading(), {"excess": 0.2}, {"value": 0.5 * (1.0 + 0.2 * 0.2 / 0.41)}),
     "among_plants": (reading(canopy_share=0.5), {"gain": 0.2}, {"value": 0.55}),
-    "gauge_datum": (reading(velocity=0.0), {"shift": 0.02}, {"value": 0.52}),
-    "gauge_head": (reading(velocity=0.0, u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),
+    "gauge_datum": (gauge(), {"shift": 0.02}, {"value": 0.52}),
+    "gauge_head": (gauge(u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),
     "unlisted_object": (
         cells(on=ground(x=1.0, y=2.0)),
         {"drag": 2.0, "x": 1.0, "y": 1.5, "radius": 0.5},
@@ -194,6 +199,15 @@ def test_effect_hands_on_what_its_equation_says(name):
         if middle.ndim == 3 and middle.shape[:2] == (5, 5):
             middle = middle[2, 2]
         assert middle == pytest.approx(np.broadcast_to(number, middle.shape), rel=1e-9, abs=1e-15), key
+
+
+def test_no_instrument_effect_touches_a_discharge():
+    through = gauge(level=0.0)
+    for name, (_, values, _) in ROWS.items():
+        effect = library()[name]
+        if effect.stage == "sensor":
+            found = effect.act(through, **{key: np.array([value]) for key, value in values.items()})
+            assert found["value"] == 0.5, name
 
 
 def test_partial_depth_of_a_log_law():

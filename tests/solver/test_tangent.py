@@ -91,7 +91,9 @@ def test_weights_of_a_reading_give_the_reading(solved):
         "kind": ["velocity", "level"] * 3, "x": [3.1, 14.0, 29.9, 0.1, 7.77, 14.6], "y": [4.6, 5.2, 4.4, 4.5, 0.1, 3.9],
     })  # fmt: skip
     read = read_sensors(problem, state, grid, station, ()).prediction[0]
-    assert np.einsum("ikjn,ikj->n", reading_weights(station, grid), state[..., 0]) == pytest.approx(read)
+    assert np.einsum("ikjn,ikj->n", reading_weights(problem, state, grid, station), state[..., 0]) == pytest.approx(
+        read
+    )
 
 
 def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):

@@ -9,7 +9,7 @@ from vegglue.resistance.physical_constants import GRAVITY, KARMAN
 
 
 def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:
-    """u -> u (1 + b)."""
+    """u -> u (1 + b), u what a probe measures: along x, across, or speed."""
     return {"value": reading.value * (1.0 + gain * reading.velocity)}
 
 
@@ -20,7 +20,7 @@ def zero_offset(reading: Reading, offset: Array) -> dict[str, Array]:
 
 def station_shift(reading: Reading, shift: Array) -> dict[str, Array]:
     """u -> u + d du/dy."""
-    return {"value": reading.value + shift * reading.u_y * reading.velocity}
+    return {"value": reading.value + shift * reading.component_y * reading.velocity}
 
 
 def partial_depth(reading: Reading, excess: Array) -> dict[str, Array]:
@@ -31,7 +31,7 @@ def partial_depth(reading: Reading, excess: Array) -> dict[str, Array]:
     """
     open_water = reading.velocity * (1.0 - reading.canopy_share)
     shear = np.sqrt(reading.rate * reading.depth) / KARMAN
-    return {"value": reading.value + excess * shear * reading.u * open_water}
+    return {"value": reading.value + excess * shear * reading.component * open_water}
 
 
 def among_plants(reading: Reading, gain: Array) -> dict[str, Array]:
@@ -41,12 +41,12 @@ def among_plants(reading: Reading, gain: Array) -> dict[str, Array]:
 
 def gauge_datum(reading: Reading, shift: Array) -> dict[str, Array]:
     """z_s -> z_s + d."""
-    return {"value": reading.value + shift * (1.0 - reading.velocity)}
+    return {"value": reading.value + shift * reading.level}
 
 
 def gauge_head(reading: Reading, share: Array) -> dict[str, Array]:
     """z_s -> z_s + a u^2 / (2 g)."""
-    return {"value": reading.value + share * reading.u**2 / (2.0 * GRAVITY) * (1.0 - reading.velocity)}
+    return {"value": reading.value + share * reading.u**2 / (2.0 * GRAVITY) * reading.level}
 
 
 RELATIVE = Amplitude("gain", "-", "relative error b of the probes", 0.05, -0.5, 0.5)

@@ -112,17 +112,21 @@ class BoundaryValues:
 
 @dataclass(frozen=True)
 class Reading:
-    """What instruments show: value (station, m) [m/s or m]; velocity: (station, 1) 1 for velocities, 0 for levels;
-    and of the flow at each station depth [m], u [m/s], friction rate k [1/m], du/dy [1/s] (station, m), canopy height
-    over depth (station, m), 0 outside plants; x, y [m] (station, 1).
+    """What instruments show: value (station, m) [m/s, m or m3/s]; which of them measure a velocity or a level, 1 or 0
+    (station, 1), neither for a discharge; component: the velocity that a probe measures, along x, across, or the speed
+    [m/s], component_y its d/dy [1/s] (station, m), 0 for what is no velocity; and of the flow at each station depth
+    [m], u [m/s], friction rate k [1/m] (station, m), canopy height over depth (station, m), 0 outside plants; x, y [m]
+    (station, 1).
     """
 
     value: Array
     velocity: Array
+    level: Array
+    component: Array
+    component_y: Array
     depth: Array
     u: Array
     rate: Array
-    u_y: Array
     canopy_share: Array
     x: Array
     y: Array

@@ -115,8 +115,9 @@ def response_by_adjoints(model: Model, point: Point, experiment: str) -> Array:
     """See `Engine.force_response`; in single precision, one solve for each station."""
     flow = point.flows[experiment]
     rows = model.rows[experiment]
-    weights = reading_weights(model.station_of(experiment), model.site.grid)[:, :, slice(*flow.band)]
-    sensitivity = adjoints(flow.factors, weights)[:, ALONG]
+    problem, state = problem_at(model, experiment, point.z), widen(flow.state, flow.rows, flow.band)
+    weights = reading_weights(problem, state, model.site.grid, model.station_of(experiment))
+    sensitivity = adjoints(flow.factors, weights[:, :, slice(*flow.band)])[:, ALONG]
     of_faces = np.moveaxis(sensitivity, -1, 0)
     # A force in a cell pushes the faces on both sides of it by half; R_u falls by what pushes.
     cells = 0.5 * of_faces

@@ -1,5 +1,6 @@
-"""What instruments would read in a computed flow: velocities and levels at stations, discharge through sections."""
+"""What instruments would read in a computed flow, and how these readings answer to the state."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,12 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
-from vegglue.effects.surroundings import Reading, across
+from vegglue.effects.surroundings import Reading
 from vegglue.flow.closures import closed
 from vegglue.flow.equations import Faces, faces
-from vegglue.flow.problem import ALONG, LEVEL, Problem
+from vegglue.flow.problem import Problem
+from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
+from vegglue.measurements.kinds import Kind, kind_of
 from vegglue.site.grid import Grid
 
 
@@ -30,8 +33,8 @@ class FlowFields:
 
 @dataclass(frozen=True)
 class Readings:
-    """Of m members: prediction (m, station) [m/s, m], flow (m, section) [m3/s], largest |Q/Q_in - 1| (m,) [-], and
-    level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a cell is wet.
+    """Of m members: prediction (m, station) [unit of its kind], flow (m, section) [m3/s], largest |Q/Q_in - 1| (m,)
+    [-], and level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a cell is wet.
     """
 
     prediction: Array
@@ -48,44 +51,76 @@ def read_sensors(
     sections: tuple[tuple[str, float], ...],
     kept: slice = slice(0, 0),
 ) -> Readings:
-    """Depth-averaged u or level, bilinear between cell centres; discharge through the face nearest to each section."""
-    now = faces(problem, state)
-    u = 0.5 * (now.u[1:] + now.u[:-1])
+    """What each station shows, by the reader of its kind; discharge through the face nearest to each section.
+
+    Errors: InputError for a kind of observation that nothing knows.
+    """
+    flow = GriddedFlow(problem, state, grid)
+    now = flow.at_faces
     prediction = np.empty((len(station), problem.members))
-    velocity = (station["kind"] == "velocity").to_numpy()
-    for field, rows in ((u, velocity), (now.level, ~velocity)):
-        prediction[rows] = _bilinear(field, grid, station["x"].to_numpy()[rows], station["y"].to_numpy()[rows])
+    for kind, rows, x, y in _by_kind(station):
+        prediction[rows] = READERS[kind.name].read(flow, x, y)
     if any(one.effect.stage == "sensor" for one in problem.acting):
-        prediction = _shown(problem, state, now, u, prediction, grid, station)
-    flow = now.flux_x.sum(axis=1) * problem.dy
-    edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
-    nearest = [int(np.argmin(np.abs(edges - x))) for _, x in sections]
-    error = np.abs(flow / _entered(problem) - 1.0).max(axis=0)
+        prediction = _shown(flow, prediction, station)
+    through = flow.discharge
+    error = np.abs(through / _entered(problem) - 1.0).max(axis=0)
     wet = now.cell[kept] > 0.1 * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
-    return Readings(prediction.T, flow[nearest].T, error, np.moveaxis(fields, -1, 0))
+    nearest = [nearest_face(grid, x) for _, x in sections]
+    return Readings(prediction.T, through[nearest].T, error, np.moveaxis(fields, -1, 0))
 
 
-def _shown(
-    problem: Problem, state: Array, now: Faces, u: Array, value: Array, grid: Grid, station: pd.DataFrame
-) -> Array:
+def _by_kind(station: pd.DataFrame) -> Iterator[tuple[Kind, NDArray[np.intp], Array, Array]]:
+    """Of each kind its rows, x and y. Errors: InputError for an unknown kind."""
+    names, x, y = station["kind"].to_numpy(), station["x"].to_numpy(float), station["y"].to_numpy(float)
+    for name in dict.fromkeys(names):
+        rows = np.flatnonzero(names == name)
+        yield kind_of(str(name)), rows, x[rows], y[rows]
+
+
+def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     """What instruments make of it: the effects of the stage sensor, each where it acts."""
-    x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
+    problem, now = flow.problem, flow.at_faces
     canopy = np.zeros_like(now.cell)
     canopy[problem.plants.column, problem.plants.row] = problem.plants.canopy_height
-    fields = {"depth": now.cell, "u": u, "rate": closed(problem, state, now.cell)[0], "u_y": across(u, grid.dy)}
+    fields = {"depth": now.cell, "u": flow.u, "rate": closed(problem, flow.state, now.cell)[0]}
     fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
-    there = {name: _bilinear(field, grid, x, y) for name, field in fields.items()}
-    velocity = (station["kind"] == "velocity").to_numpy(float)[:, None]
+    x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
+    there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
+    there |= _measured_by_probes(flow, value, station) | {"x": x[:, None], "y": y[:, None]}
     for one in problem.acting:
         rows = np.ones(len(station), dtype=bool)
         if one.sections:
             rows &= station["section"].isin(one.sections).to_numpy()
         if one.devices:
             rows &= station["device"].isin(one.devices).to_numpy()
-        reading = Reading(value=value, velocity=velocity, x=x[:, None], y=y[:, None], **there)
+        reading = Reading(value=value, **there)
         value = np.where(rows[:, None], applied((one,), "sensor", reading, {"value": value})["value"], value)
     return value
+
+
+def _measured_by_probes(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> dict[str, Array]:
+    """Which stations are probes and gauges, and the velocity that probes measure with its slope, 0 at all others."""
+    velocity, level = np.zeros((2, len(station), 1))
+    component, component_y = np.zeros((2, *value.shape))
+    for kind, rows, x, y in _by_kind(station):
+        level[rows] = float(kind.instrument == "gauge")
+        if kind.velocity:
+            velocity[rows], component[rows] = 1.0, value[rows]
+            component_y[rows] = READERS[kind.name].slope_across(flow, x, y)
+    return {"velocity": velocity, "level": level, "component": component, "component_y": component_y}
+
+
+def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Array:
+    """d prediction / d state (nx, 3, ny, n) at a state (nx, 3, ny, 1), whatever instruments make of it.
+
+    Errors: InputError for a kind of observation that nothing knows.
+    """
+    flow = GriddedFlow(problem, state, grid)
+    weights = np.zeros((*state.shape[:3], len(station)))
+    for kind, rows, x, y in _by_kind(station):
+        weights[..., rows] = READERS[kind.name].weights(flow, x, y)
+    return weights
 
 
 def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
@@ -124,34 +159,3 @@ def _from_sides(problem: Problem, nx: int) -> Array:
             share = np.clip((np.arange(nx + 1) - inflow.start) / (inflow.stop - inflow.start), 0.0, 1.0)
             entered += share[:, None] * inflow.discharge
     return entered
-
-
-def _bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
-    """field (nx, ny, m) at points, (points, m); beyond the outermost centres the value of the outermost."""
-    i, along = between(x, grid.x[0], grid.dx, grid.x.size)
-    j, across = between(y, grid.y[0], grid.dy, grid.y.size)
-    south = (1.0 - along)[:, None] * field[i, j] + along[:, None] * field[i + 1, j]
-    north = (1.0 - along)[:, None] * field[i, j + 1] + along[:, None] * field[i + 1, j + 1]
-    return (1.0 - across)[:, None] * south + across[:, None] * north
-
-
-def reading_weights(station: pd.DataFrame, grid: Grid) -> Array:
-    """d prediction / d state (nx, 3, ny, n) of the flow itself, whatever instruments make of it."""
-    weights = np.zeros((grid.x.size, 3, grid.y.size, len(station)))
-    i, along = between(station["x"].to_numpy(), grid.x[0], grid.dx, grid.x.size)
-    j, across = between(station["y"].to_numpy(), grid.y[0], grid.dy, grid.y.size)
-    velocity, n = (station["kind"] == "velocity").to_numpy(), np.arange(len(station))
-    for column, of_column in ((i, 1.0 - along), (i + 1, along)):
-        for row, of_row in ((j, 1.0 - across), (j + 1, across)):
-            share = of_column * of_row
-            weights[column, LEVEL, row, n] += np.where(velocity, 0.0, share)
-            for face in (column, np.maximum(column - 1, 0)):  # u of a cell is the mean of its faces
-                weights[face, ALONG, row, n] += np.where(velocity, 0.5 * share, 0.0)
-    return weights
-
-
-def between(points: Array, first: float, step: float, size: int) -> tuple[np.ndarray, Array]:
-    """Of `size` centres a step apart: the one below each point, and the share of the next one in what it reads [-]."""
-    place = np.clip((points - first) / step, 0.0, size - 1.0)
-    lower = np.minimum(place.astype(np.int64), size - 2)
-    return lower, place - lower

@@ -1,5 +1,5 @@
 """Results as values, and how each lies in a file: ensemble, fields, posterior, diagnosis.
 
-May import: case, site, flow, solver.
+May import: case, site, measurements, flow, solver.
 Open first: ensemble.py, posterior.py.
 """

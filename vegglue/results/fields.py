@@ -9,7 +9,7 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.flow.sensor import between
+from vegglue.flow.readers import between
 from vegglue.results.layout import Group, Stored, Variable, stored_fields
 from vegglue.site.grid import Grid
 
