@@ -56,7 +56,7 @@ class Offset(Part):
 
 
 class Observation(Part):
-    kind: Literal["adv", "velocity", "level"] = Field(description="points in the vertical, depth-averaged, or gauges")
+    kind: str = Field(description="adv (points in the vertical), velocity, velocity_across, speed, level or discharge")
     file: Path = Field(description="CSV file")
     experiment: str | None = Field(default=None, description="experiment of all rows, if the file has no such column")
     section: str | None = Field(default=None, description="section of all rows, if the file has no such column")
@@ -70,7 +70,7 @@ class Observation(Part):
     @model_validator(mode="after")
     def _keys_of_the_kind(self) -> Self:
         adv = ("experiment", "section", "case", "average", "floor", "surface")
-        exactly(self, self.kind, {"adv": adv, "velocity": (), "level": ()}, ("experiment", "section"))
+        exactly(self, self.kind, {self.kind: (), "adv": adv}, ("experiment", "section"))
         return self
 
 

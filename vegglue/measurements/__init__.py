@@ -1,5 +1,5 @@
 """What was measured, read from files, judged, and brought into one table of stations.
 
 May import: case, site.
-Open first: observations.py, adv_section.py.
+Open first: observations.py, kinds.py.
 """

@@ -1,4 +1,4 @@
-"""What was measured: ADV points, depth-averaged velocities and gauge levels, as one table of stations."""
+"""What was measured: ADV points, and stations of every kind that can be read as they are, as one table."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +11,7 @@ from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError
 from vegglue.measurements.adv_section import Section, average_of, read_section
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
 
@@ -34,8 +35,9 @@ Key = tuple[str, str]  # experiment, section
 class Observations:
     """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
 
-    table: one row per station, columns STATION; `value` is a depth-averaged velocity along x [m/s] or a level [m];
-    standard_error and depth are NaN when unknown. Rows with used = False say why in `reason` (their value may be NaN).
+    table: one row per station, columns STATION_COLUMNS; `value` and standard_error in the unit of their `kind`, see
+    kinds.py; y of a discharge is where it is drawn; standard_error and depth are NaN when unknown. Rows with used =
+    False say why in `reason` (their value may be NaN).
     points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the
     bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
     profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
@@ -58,8 +60,8 @@ class Observations:
 def read_observations(case: Case) -> Observations:
     """Read every file the case names, judge the quality, average over the depth.
 
-    Raises InputError, naming file and row, for what cannot be read, is missing, repeated, or no number; a vertical or
-    point that can be read but not trusted stays, with used = False and the reason.
+    Raises InputError, naming file and row, for what cannot be read, is missing, repeated, or no number, and for a kind
+    that nothing knows; a vertical or point that can be read but not trusted stays, with used = False and the reason.
     """
     sections: dict[Key, Section] = {}
     stations = []
@@ -74,7 +76,7 @@ def read_observations(case: Case) -> Observations:
             sections[key] = read_section(case, observation)
             stations.append(_averaged(sections[key], observation))
         else:
-            stations.append(_read_stations(case, observation))
+            stations.append(_read_stations(case, observation, _kind_in(case, observation)))
     table = _joined(stations)
     _refuse_unknown_places(case, table)
     return Observations(
@@ -123,31 +125,44 @@ def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
     error = np.hypot(own, np.sqrt(max(hidden, 0.0)))
     if observation.standard_error is not None:
         error = pd.Series(observation.standard_error, index=profiles.index)
-    return profiles.assign(kind="velocity", value=value, standard_error=error)[list(STATION_COLUMNS)]
+    return profiles.assign(kind=STREAMWISE, value=value, standard_error=error)[list(STATION_COLUMNS)]
 
 
-def _read_stations(case: Case, observation: Observation) -> pd.DataFrame:
-    """Depth-averaged velocities (x, y, u[, u_se]) or gauge levels (x, y, level[, level_se]); an error of 0 is unknown.
+def _kind_in(case: Case, observation: Observation) -> Kind:
+    """Errors: InputError naming config and file when the kind is unknown."""
+    if observation.kind not in KINDS:
+        raise InputError(
+            f"{shown_name(case.source)}: the observation in {observation.file.name} expected a `kind` among adv, "
+            f"{', '.join(KINDS)}, got {observation.kind!r}: {nearest(observation.kind, ['adv', *KINDS])}"
+        )
+    return kind_of(observation.kind)
 
-    An `experiment` or `section` in the case chooses the rows with that name, or names all rows of a file without it.
+
+def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataFrame:
+    """Values as they were measured: x, y, the column of the kind, maybe its standard error; an error of 0 is unknown.
+
+    A discharge needs no y: it is drawn in the middle of the grid. An `experiment` or `section` in the case chooses the
+    rows with that name, or names all rows of a file without it; only velocities need a section.
     """
-    path, value = observation.file, {"velocity": "u", "level": "level"}[observation.kind]
+    path = observation.file
     given = {"experiment": observation.experiment, "section": observation.section}
-    if observation.kind == "level" and observation.section is None:
+    if not kind.velocity and observation.section is None:
         given["section"] = ""
     needed = [name for name, text in given.items() if text is None]
-    rows = read_table(path, needed, ("x", "y", value), (f"{value}_se",), [name for name in given if name not in needed])
+    place = ["x", "y"] if kind.at_point else ["x"]
+    labels = [name for name in given if name not in needed]
+    rows = read_table(path, needed, (*place, kind.column), (kind.error_column, "y"), labels)
     for name, text in given.items():
         rows = _chosen(path, rows, name, text)
     unknown = ~rows["experiment"].isin(list(case.experiments))
     refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
-    refuse_repeated(path, rows, ("experiment", "section", "x", "y"))
-    error = rows.get(f"{value}_se", pd.Series(observation.standard_error or 0.0, index=rows.index))
-    refuse_rows(path, error < 0.0, f"expected {value}_se of at least 0; mend it or leave the column out")
-    stations = rows.rename(columns={value: "value"}).assign(
-        kind=observation.kind,
+    refuse_repeated(path, rows, ("experiment", "section", *place))
+    error = rows.get(kind.error_column, pd.Series(observation.standard_error or 0.0, index=rows.index))
+    refuse_rows(path, error < 0.0, f"expected {kind.error_column} of at least 0; mend it or leave the column out")
+    stations = rows.rename(columns={kind.column: "value"}).assign(
+        kind=kind.name,
         x=rows["x"] + observation.offset.x,
-        y=rows["y"] + observation.offset.y,
+        y=rows["y"] + observation.offset.y if "y" in rows else 0.5 * sum(case.grid.y),
         standard_error=error.mask(error == 0.0),
         used=True,
         reason="",
