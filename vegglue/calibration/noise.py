@@ -13,6 +13,7 @@ import scipy.special
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
+from vegglue.measurements.kinds import kind_of
 
 # How much of the difference between a grid and one of twice its size is taken as the error of the finer one [-]:
 # 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to
@@ -81,9 +82,10 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
         error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value
     if not (error > 0).all():
         first = used.iloc[int(np.flatnonzero(~(error > 0))[0])]
+        column = kind_of(str(first["kind"])).error_column
         raise InputError(
             f"observations: expected a standard error above 0 at every used station, got none at x = {first['x']:g}, "
-            f"y = {first['y']:g} m; add the column u_se or level_se, or `standard_error` to the observation."
+            f"y = {first['y']:g} m; add the column {column}, or `standard_error` to the observation."
         )
     zero = np.zeros(len(used))
     rows = np.flatnonzero(station["used"].to_numpy(bool))
@@ -194,13 +196,15 @@ def covariance_of(noise: Noise) -> Array:
 
 
 def _apart(used: pd.DataFrame) -> Array:
-    """Distances along each section in units of the spacing of its stations; infinite across sections and kinds."""
+    """Distances along each section in units of the spacing of its stations; infinite across sections and kinds, and
+    where errors of neighbours are not correlated.
+    """
     apart = np.full((len(used), len(used)), np.inf)
     np.fill_diagonal(apart, 0.0)
-    velocity = (used["kind"] == "velocity").to_numpy()
-    keys = (used["experiment"].astype(str) + "\n" + used["section"].astype(str)).to_numpy()
-    for key in np.unique(keys[velocity]):
-        here = np.flatnonzero(velocity & (keys == key))
+    correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
+    keys = used[["experiment", "section", "kind"]].astype(str).agg("\n".join, axis=1).to_numpy()
+    for key in np.unique(keys[correlated]):
+        here = np.flatnonzero(keys == key)
         y = used["y"].to_numpy(float)[here]
         spacing = np.median(np.diff(np.sort(y))) if here.size > 1 else 1.0
         apart[np.ix_(here, here)] = np.abs(y[:, None] - y[None]) / max(spacing, 1e-9)

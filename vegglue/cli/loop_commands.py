@@ -1,13 +1,14 @@
 """The shell of the loop: import, diagnose, extend, compare, next, run. What they do stands in `loop`."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from vegglue.case.config import load_case
@@ -22,6 +23,7 @@ from vegglue.errors import InputError
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.field_folder import case_from_folder
+from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.workflow.loop import (
     child_path,
@@ -198,16 +200,19 @@ def _tell(found: Diagnosis) -> None:
 
 def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
     table = Table(box=None, pad_edge=False, header_style="bold")
-    headings = ("model", "parameters", "RMSE", "levels", "chi2 / n", "held out (section)", "fell by", "held out (exp.)",
-                "log score", "in 50 %", "in 95 %", "validation")  # fmt: skip
+    others = _other_kinds(rungs)
+    headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
+                "chi2 / n", "held out (section)", "fell by", "held out (exp.)", "log score", "in 50 %", "in 95 %",
+                "validation")  # fmt: skip
     for heading in headings:
-        table.add_column(heading, justify="left" if heading == "model" else "right")
+        table.add_column(escape(heading), justify="left" if heading == "model" else "right")
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
         table.add_row(
-            one.name, str(one.parameters), f"{one.rmse['velocity']:.4f}", f"{one.rmse['level']:.4f}",
-            f"{one.chi2:.0f} / {one.stations}", f"{held_out(one):.4f}", gain, f"{held_out(one, 'experiments'):.4f}",
-            f"{one.log_score:.2f}", f"{one.inside50:.0%}", f"{one.inside95:.0%}", f"{one.validation:.4f}",
+            one.name, str(one.parameters), f"{one.rmse[STREAMWISE]:.4f}", f"{one.rmse[WATER_LEVEL]:.4f}",
+            *(f"{one.rmse[kind.name]:.4f}" for kind in others), f"{one.chi2:.0f} / {one.stations}",
+            f"{held_out(one):.4f}", gain, f"{held_out(one, 'experiments'):.4f}", f"{one.log_score:.2f}",
+            f"{one.inside50:.0%}", f"{one.inside95:.0%}", f"{one.validation:.4f}",
         )  # fmt: skip
     console.print(table)
     if rungs:
@@ -221,6 +226,12 @@ def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
         moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < 0.01]
         if moving:
             console.print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
+
+
+def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
+    """What was measured besides velocities along x and levels."""
+    others = (kind for kind in KINDS.values() if kind.name not in (STREAMWISE, WATER_LEVEL))
+    return [kind for kind in others if any(np.isfinite(one.rmse[kind.name]) for one in rungs)]
 
 
 def _show_next(found: Sequence[tuple[str, Sequence[MeasurementWorth]]]) -> None:
@@ -242,6 +253,12 @@ def _show_next(found: Sequence[tuple[str, Sequence[MeasurementWorth]]]) -> None:
 def _rung_json(one: Rung) -> dict[str, Any]:
     tree = {name: value for name, value in asdict(one).items() if not isinstance(value, np.ndarray) and name != "place"}
     tree["held_out_sections"], tree["held_out_experiments"] = held_out(one), held_out(one, "experiments")
+    tree["rmse"] = _known_numbers(one.rmse)
+    return _known_numbers(tree)
+
+
+def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """null instead of NaN, which JSON does not know."""
     return {
         name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
     }

@@ -17,18 +17,17 @@ from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import alike, told_by_data
 from vegglue.inference.likelihood import root_mean_square
-
-KINDS = ("velocity", "level")
+from vegglue.measurements.kinds import KINDS, STREAMWISE
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One model of the ladder. Errors [m/s] of velocities unless said; stations (n,) are the used ones.
+    """One model of the ladder. Errors [m/s] of velocities along x unless said; stations (n,) are the used ones.
 
-    rmse: by kind; sections, experiments: held-out error of each station, NaN where nothing could be left out;
-    log_score: mean log predictive density of held-out sections; inside50, inside95: share of held-out measurements
-    within the bands [-]; homogeneity: chance that a parameter is the same in all experiments, by name; validation:
-    root mean square error of velocities that no calibration has seen, NaN without them.
+    rmse: by kind, NaN for what was not measured; sections, experiments: held-out error of each station, NaN where
+    nothing could be left out; log_score: mean log predictive density of held-out sections; inside50, inside95: share of
+    held-out measurements within the bands [-]; homogeneity: chance that a parameter is the same in all experiments, by
+    name; validation: root mean square error of velocities that no calibration has seen, NaN without them.
     """
 
     name: str
@@ -55,7 +54,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     """What there is to say of one calibrated model; validation: the same at stations it has not seen."""
     model, noise, point = base.model, base.noise, base.fitted.point
     used = model.station.iloc[noise.rows]
-    velocity = (used["kind"] == "velocity").to_numpy()
+    velocity = (used["kind"] == STREAMWISE).to_numpy()
     left = noise.residual(point.prediction)
     section, spread = _held_out(base, used["section"].astype(str).to_numpy())
     experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
@@ -150,7 +149,7 @@ def _validated(base: Baseline, validation: Model) -> float:
     if point is None:
         return float("nan")
     station = validation.station
-    rows = (station["used"] & (station["kind"] == "velocity")).to_numpy(bool)
+    rows = (station["used"] & (station["kind"] == STREAMWISE)).to_numpy(bool)
     return root_mean_square(station["value"].to_numpy(float)[rows] - point.prediction[rows])
 
 

@@ -1,5 +1,7 @@
 """Where the model misses: the misfit by experiment, section and zone of the channel."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -7,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.engine.interface import Model, Point
+from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of
 from vegglue.site.channel_geometry import channel_geometry
 
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
@@ -14,13 +17,17 @@ AT_EDGE = 0.2
 
 
 def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
-    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge)."""
+    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge).
+
+    Zones of velocities across and of speeds are told apart from those of velocities along x: `floor (v)`.
+    """
     used = model.station.iloc[noise.rows]
+    kinds = [kind_of(str(name)) for name in used["kind"]]
     table = pd.DataFrame(
         {
             "experiment": used["experiment"].to_numpy(),
-            "section": np.where(used["kind"] == "level", "gauges", used["section"]),
-            "zone": _zones(model, used),
+            "section": [_section(kind, str(name)) for kind, name in zip(kinds, used["section"], strict=True)],
+            "zone": _zones(model, used, kinds),
             "left": noise.residual(point.prediction),
             "error": noise.of_data,
         }
@@ -43,13 +50,25 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _zones(model: Model, used: pd.DataFrame) -> list[str]:
+def _section(kind: Kind, section: str) -> str:
+    """Gauges are one group; a discharge may have a section of its own."""
+    return section if kind.velocity else "gauges" if kind.instrument == "gauge" else section or "discharges"
+
+
+def _zones(model: Model, used: pd.DataFrame, kinds: Sequence[Kind]) -> list[str]:
     grid, x, y = model.site.grid, used["x"].to_numpy(float), used["y"].to_numpy(float)
     cells = zip(_cell(x, grid.x, grid.dx), _cell(y, grid.y, grid.dy), strict=True)
     return [
-        "level" if kind == "level" else _zone(channel_geometry(model.case, model.site, str(experiment)), *cell)
-        for experiment, kind, cell in zip(used["experiment"], used["kind"], cells, strict=True)
+        _named(kind, channel_geometry(model.case, model.site, str(experiment)), *cell)
+        for experiment, kind, cell in zip(used["experiment"], kinds, cells, strict=True)
     ]
+
+
+def _named(kind: Kind, ground: ChannelGeometry, i: int, j: int) -> str:
+    if not kind.velocity:
+        return kind.name
+    zone = _zone(ground, i, j)
+    return zone if kind.name == STREAMWISE else f"{zone} ({kind.column})"
 
 
 def _cell(points: Array, centres: Array, step: float) -> np.ndarray:

@@ -19,6 +19,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, linearise, responses
+from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.site.gridded_site import build_site
 
@@ -106,7 +107,7 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
     model's with further experiments.
     """
     tables, plans, count = [model.station], [], len(model.station)
-    velocity = model.station[(model.station["kind"] == "velocity") & model.station["used"]]
+    velocity = model.station[velocity_rows(model.station) & model.station["used"]]
     for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
         table = _stations(experiment, plan_name, x, y, kind)
         rows, setting = np.arange(count, count + len(table)), case.experiments[experiment]
@@ -124,17 +125,17 @@ def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, 
     taken = [float(x) for x in velocity["x"].unique()]
     hours = HOURS["section"] + y.size * HOURS["vertical"]
     new = [float(x) for x in places if min(abs(x - there) for there in taken) > 0.3 * (places[1] - places[0])]
-    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, "velocity", hours) for x in new]
+    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, hours) for x in new]
     ideas += [
-        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), np.array([_middle(y)]), "level", HOURS["gauge"])
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), np.array([_middle(y)]), WATER_LEVEL, HOURS["gauge"])
         for x in places[::2]
     ]
     others = [name for name in case.experiments if name not in model.case.experiments]
     for x in taken:
         at, here = f"the section at x = {x:g} m", np.sort(velocity[velocity["x"] == x]["y"].unique().astype(float))
-        ideas.append((f"{at} again ({usual})", usual, x, here, "velocity", hours))
+        ideas.append((f"{at} again ({usual})", usual, x, here, STREAMWISE, hours))
         more = hours + HOURS["discharge"]
-        ideas += [(f"{at} {experiment}", experiment, x, here, "velocity", more) for experiment in others]
+        ideas += [(f"{at} {experiment}", experiment, x, here, STREAMWISE, more) for experiment in others]
     return ideas
 
 
@@ -186,8 +187,9 @@ def _errors(station: pd.DataFrame, noise: Noise) -> Array:
     kinds = station["kind"].to_numpy()
     for kind in dict.fromkeys(kinds):
         known = errors[(kinds == kind) & np.isfinite(errors)]
-        fallback = {"velocity": 0.015, "level": 0.003}[kind]
-        errors[(kinds == kind) & ~np.isfinite(errors)] = np.median(known) if known.size else fallback
+        errors[(kinds == kind) & ~np.isfinite(errors)] = (
+            np.median(known) if known.size else kind_of(str(kind)).usual_error
+        )
     return errors
 
 

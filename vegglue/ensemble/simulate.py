@@ -21,6 +21,7 @@ from vegglue.errors import InputError
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
+from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.parallel import as_finished
 from vegglue.progress import Progress
@@ -198,5 +199,5 @@ def make_header(
 
 def section_places(observations: Observations) -> tuple[tuple[str, float], ...]:
     """Name and mean x [m] of every section a velocity was measured in."""
-    velocity = observations.table[observations.table["kind"] == "velocity"]
+    velocity = observations.table[velocity_rows(observations.table)]
     return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())

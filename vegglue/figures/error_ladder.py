@@ -13,11 +13,14 @@ from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import Rung, held_out, improvement
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.figures.typography import fixed, short
+from vegglue.measurements.kinds import STREAMWISE
 
 # Chance that a parameter is the same in all experiments, below which it is drawn as one that has to move.
 MOVES = 0.05
 # Panels of parameters side by side, and ratio of largest to smallest above which their axis is logarithmic.
 LADDER_COLUMNS, DECADES = 5, 30.0
+# The axis of errors reaches up to this at least [m/s]: where no velocity along x was measured, there is none to show.
+SMALLEST_TOP = 1e-3
 # Letters of a parameter's name in a line.
 TITLE = 26
 
@@ -51,7 +54,7 @@ def draw_ladder(rungs: Sequence[Rung]) -> Figure:
 def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
     place = np.arange(1, len(rungs) + 1)
     held, alone = (np.array([held_out(rung, by) for rung in rungs]) for by in ("sections", "experiments"))
-    inside = np.array([rung.rmse["velocity"] for rung in rungs])
+    inside = np.array([rung.rmse[STREAMWISE] for rung in rungs])
     unseen, floor = (np.array([getattr(rung, name) for rung in rungs]) for name in ("validation", "noise_floor"))
     bars = np.array([np.nan, *(_spread(*pair) for pair in pairwise(rungs))])
     axes.errorbar(place, held, np.nan_to_num(bars), fmt="o-", color=COLOUR["model"], markersize=6, linewidth=1.6,
@@ -68,7 +71,7 @@ def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
         "not seen by any fit": (unseen, "measured"), "in sample": (inside, "muted"),
         "error of measuring": (floor, "ink"),
     })  # fmt: skip
-    top = np.nanmax([*held, *alone, *inside, *unseen, *floor])
+    top = np.nanmax([*held, *alone, *inside, *unseen, *floor, SMALLEST_TOP])
     axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(rungs) + 0.9), ylabel="velocity error, root mean square [m/s]")
     axes.set_xticks(place, [_step_name(rungs, k) for k in range(len(rungs))])
     axes.tick_params(axis="x", length=0)

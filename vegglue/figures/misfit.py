@@ -19,6 +19,7 @@ from vegglue.arrays import Array
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
 from vegglue.figures.typography import fixed
+from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 
 # Standard errors beyond which a residual is drawn as one that errors alone seldom make.
 USUAL = 2.0
@@ -34,12 +35,12 @@ AFTER: dict[str, Any] = {"color": COLOUR["model"], "linewidth": 1.5}
 
 @styled
 def draw_profiles(stations: pd.DataFrame, added: str, flagged: Sequence[int] = ()) -> Figure:
-    """Measured and predicted velocity across sections, a row for each experiment; below each what is left of it.
+    """Measured and predicted u across sections, a row for each experiment; below each what is left of it.
 
     stations: those of observations with prediction_first, prediction and error (1 sd) of each; added: what stands
     between the two predictions, '' for nothing; flagged: labels of rows that were set aside.
     """
-    velocity = stations[stations["kind"] == "velocity"]
+    velocity = stations[stations["kind"] == STREAMWISE]
     experiments = list(dict.fromkeys(velocity["experiment"]))
     sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
     size = max(WIDTH, 0.9 + 2.1 * len(sections)), 0.75 + 2.05 * len(experiments)
@@ -113,7 +114,7 @@ def _paint_left(axes: Axes, part: pd.DataFrame, along: str, added: str) -> None:
 @styled
 def draw_gauges(stations: pd.DataFrame, added: str) -> Figure:
     """Measured minus predicted level [mm] of each gauge along the channel, with 95 % of its error, by experiment."""
-    levels = stations[stations["kind"] == "level"]
+    levels = stations[stations["kind"] == WATER_LEVEL]
     experiments = list(dict.fromkeys(levels["experiment"]))
     size = max(WIDTH, 0.9 + 1.6 * len(experiments)), HEIGHT - 0.4
     figure, panels = canvas(*size, ncols=len(experiments), sharey=True, squeeze=False)

@@ -16,7 +16,8 @@ from matplotlib.ticker import MaxNLocator
 
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, canvas, label, styled
-from vegglue.figures.typography import fixed
+from vegglue.figures.typography import fixed, unit_math
+from vegglue.measurements.kinds import KINDS, Kind
 from vegglue.screening.score_test import ALIKE, alike_groups
 
 # How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
@@ -134,30 +135,38 @@ def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
 
 @styled
 def draw_fingerprint(trace: Array, station: pd.DataFrame, unit: str) -> Figure:
-    """What one unit of an effect changes: velocities across each section, a line for each experiment; levels along x.
+    """What one unit of an effect changes: velocities across each section, a line for each experiment; levels and
+    discharges along x.
 
-    trace: (station,) [m/s or m per unit]; station: experiment, kind, section, x, y; unit: of the amplitude, as text.
+    trace: (station,) [unit of the kind per unit]; station: experiment, kind, section, x, y; unit: of the amplitude, as
+    text.
     """
     table = station.assign(change=trace)
-    velocity, levels = (table[table["kind"] == kind] for kind in ("velocity", "level"))
-    sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
-    parts = [(velocity[velocity["section"] == name], "y", "u [m/s") for name in sections]
-    parts += [(levels, "x", "level [m")] if len(levels) else []
+    parts = [part for kind in KINDS.values() for part in _parts_of(kind, table[table["kind"] == kind.name])]
     figure, grid = _panels(len(parts))
     lines = dict(zip(dict.fromkeys(table["experiment"]), LINES * len(table), strict=False))
     per = "" if unit in ("-", "") else f" per {unit}"
-    for place, (axes, (part, along, what)) in enumerate(zip(grid, parts, strict=False)):
-        _paint_traces(axes, part, along, lines)
-        axes.set_title("gauges" if along == "x" else f"{sections[place]}, x = {part['x'].mean():g} m", fontsize=8.5)
-        if along == "x" or place % SIGNAL_AXIS == 0:
-            axes.set_ylabel(f"change of {what}{per}]")
-        if along == "y":
-            axes.set_ylim(*_range(velocity["change"]))
+    for place, (axes, (part, title, kind)) in enumerate(zip(grid, parts, strict=False)):
+        _paint_traces(axes, part, "y" if kind.velocity else "x", lines)
+        axes.set_title(title, fontsize=8.5)
+        if place % SIGNAL_AXIS == 0 or kind != parts[place - 1][2]:
+            axes.set_ylabel(f"change of {kind.column} [{unit_math(kind.unit)}{per}]")
+        if kind.velocity:
+            axes.set_ylim(*_range(table.loc[table["kind"] == kind.name, "change"]))
     handles = [
         Line2D([], [], linestyle=line, color=COLOUR["model"], label=experiment) for experiment, line in lines.items()
     ]
     figure.legend(handles=handles, loc="outside upper left", ncols=4, frameon=False, fontsize=SMALL + 0.5)
     return figure
+
+
+def _parts_of(kind: Kind, rows: pd.DataFrame) -> list[tuple[pd.DataFrame, str, Kind]]:
+    """Rows and title of each panel of a kind: one for each section of velocities, one for all others."""
+    if not kind.velocity:
+        return [(rows, f"{kind.instrument}s", kind)] if len(rows) else []
+    sections = rows.groupby("section")["x"].mean().sort_values().index
+    parts = [(str(name), rows[rows["section"] == name]) for name in sections]
+    return [(part, f"{name}, x = {part['x'].mean():g} m", kind) for name, part in parts]
 
 
 def _panels(number: int) -> tuple[Figure, list[Axes]]:

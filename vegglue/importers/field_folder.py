@@ -15,6 +15,7 @@ from typing import Any
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError
+from vegglue.measurements.kinds import KINDS
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
@@ -159,9 +160,9 @@ def _plants(patches: list[Mapping[str, Any]]) -> Tree:
 
 def _observations(folder: Path, target: Path) -> list[Tree]:
     found = []
-    for kind, name in (("velocity", "velocities.csv"), ("level", "levels.csv")):
-        if (folder / name).is_file():
-            found.append({"kind": kind, "file": _named(folder / name, target)})
+    for kind in KINDS.values():
+        if (folder / kind.file).is_file():
+            found.append({"kind": kind.name, "file": _named(folder / kind.file, target)})
     if not found:
         raise InputError(f"{_shown(folder)}: expected velocities.csv or levels.csv, got neither; put them there.")
     return found

@@ -16,6 +16,7 @@ from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
+from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 from vegglue.report.diagnosis_words import added, error_of, first_score, last_score, ranked, standing_of
 from vegglue.report.run import Run, picture
 from vegglue.results.diagnosis import Diagnosis
@@ -120,7 +121,7 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
 
 def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     stations = _with_predictions(diagnosis)
-    velocity = stations[stations["kind"] == "velocity"]
+    velocity = stations[stations["kind"] == STREAMWISE]
     sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
     names = added(diagnosis)
     before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
@@ -142,10 +143,10 @@ def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
 
 def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     stations = _with_predictions(diagnosis)
-    if not (stations["kind"] == "level").any():
+    if not (stations["kind"] == WATER_LEVEL).any():
         return
     before, after = (
-        1000 * error_of(diagnosis, each, "level") for each in (diagnosis.prediction_first, diagnosis.prediction)
+        1000 * error_of(diagnosis, each, WATER_LEVEL) for each in (diagnosis.prediction_first, diagnosis.prediction)
     )
     told = f"{short(after, 2)} mm"
     if diagnosis.steps:

@@ -8,6 +8,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.figures.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
 from vegglue.inference.likelihood import root_mean_square
+from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
@@ -104,8 +105,8 @@ def added(diagnosis: Diagnosis) -> str:
     return " and ".join(step.accepted for step in diagnosis.steps)
 
 
-def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = "velocity") -> float:
-    """Root mean square of measured minus predicted over the stations that count [m/s or m], NaN without any."""
+def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
+    """Root mean square of measured minus predicted over the stations that count [unit of the kind], NaN without."""
     station = diagnosis.station
     counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
     counted[list(diagnosis.flagged)] = False
@@ -149,7 +150,7 @@ def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
     value = float(station["value"])
     return FlaggedRow(
         experiment=str(station["experiment"]),
-        section=str(station["section"]) or "gauge",
+        section=str(station["section"]) or kind_of(str(station["kind"])).instrument,
         x=as_given(station["x"]),
         y=as_given(station["y"]),
         measured=fixed(value, 3),

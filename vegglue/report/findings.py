@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, fixed, interval, percent, plus_minus, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.report.homogeneity_words import homogeneity_in_words, rejected
@@ -134,8 +135,8 @@ def _canopy(run: Run) -> Iterator[Finding]:
 
 def _residual(posterior: Posterior, kind: str) -> Finding:
     error, miss = measurement_error(posterior, kind), posterior.fit.best_rmse[kind]
-    text = f"The best member misses the {kind} measurements by {with_unit(miss, kind)}, the median prediction by "
-    text += with_unit(posterior.fit.rmse[kind], kind)
+    text = f"The best member misses the {kind_of(kind).words} measurements by {with_unit(miss, kind)}, the median "
+    text += f"prediction by {with_unit(posterior.fit.rmse[kind], kind)}"
     if not np.isfinite(error):
         return Finding("residual", f"{text}; without standard errors nothing can be said of what they ought to be.")
     if not unexplained_error(posterior, kind, miss):

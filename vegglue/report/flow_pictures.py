@@ -10,6 +10,7 @@ from vegglue.figures.plan_view import Gauges, Outline, draw_plan, draw_reach, we
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
+from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report.run import Run, picture, planted
 from vegglue.site.polygons import corners_of
 
@@ -29,7 +30,7 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
         figure = draw_reach(flow, wet_window(flow, reach), patches, stations)
         alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
         yield picture(run, figure, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
-    figure = draw_plan(flow, patches, stations, _gauges(run, rows[rows["kind"] == "level"]))
+    figure = draw_plan(flow, patches, stations, _gauges(run, rows[rows["kind"] == WATER_LEVEL]))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
     yield picture(run, figure, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
 

@@ -8,6 +8,7 @@ import scipy.stats
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
+from vegglue.measurements.kinds import kind_of
 from vegglue.report.posterior_words import how_known
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -41,7 +42,7 @@ def verdict_of(case: Case, posterior: Posterior) -> str:
 def _how_well(posterior: Posterior) -> str:
     kind = next(iter(posterior.fit.rmse))
     error, miss = measurement_error(posterior, kind), posterior.fit.rmse[kind]
-    missed = f"The model misses the {kind} measurements by {with_unit(miss, kind)} (root mean square)"
+    missed = f"The model misses the {kind_of(kind).words} measurements by {with_unit(miss, kind)} (root mean square)"
     if not np.isfinite(error):
         return f"{missed}; their own error is not known."
     if unexplained_error(posterior, kind, miss):
@@ -58,7 +59,9 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     kind = next(iter(posterior.fit.sigma))
     error = measurement_error(posterior, kind)
     against = f"measurement error {with_unit(error, kind)}" if np.isfinite(error) else "measurement error unknown"
-    sigma = KeyNumber(f"residual <var>σ</var> ({kind})", with_unit(posterior.fit.sigma[kind], kind), against)
+    sigma = KeyNumber(
+        f"residual <var>σ</var> ({kind_of(kind).words})", with_unit(posterior.fit.sigma[kind], kind), against
+    )
     effective = f"{posterior.weighting.effective_size:,.0f}"
     size = KeyNumber("effective members", effective, f"of {posterior.sample.members:,}")
     return [*parameters, sigma, size]
@@ -137,8 +140,8 @@ def pressed_side(posterior: Posterior, name: str) -> str:
 
 
 def with_unit(value: float, kind: str) -> str:
-    """A residual or error of a kind of measurement with its unit."""
-    return f"{short(value, 2)}{NARROW}{'m' if kind == 'level' else 'm/s'}"
+    """A residual or error of a kind of measurement with its unit (HTML)."""
+    return f"{short(value, 2)}{NARROW}{unit_html(kind_of(kind).unit)}"
 
 
 def largest_mass_error(ensemble: Ensemble) -> float:

@@ -19,10 +19,11 @@ from vegglue.figures.measured import (
     draw_verticals,
 )
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import NARROW, count, fixed, plus_minus, short
+from vegglue.figures.typography import NARROW, count, fixed, plus_minus, short, unit_html, unit_math
 from vegglue.inference.glue import member_weights
 from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
+from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.observations import fitted_curve
 from vegglue.report.key_numbers import measurement_error
 from vegglue.report.run import Run, patches_drawn, picture, zones
@@ -31,9 +32,10 @@ from vegglue.results.posterior import Posterior
 
 def sections(run: Run) -> Iterator[Picture]:
     """Measured against modelled across each section of each experiment (the paper's Fig. 7)."""
-    velocity = run.observations.table[run.observations.table["kind"] == "velocity"]
-    for (experiment, section), rows in velocity.groupby(["experiment", "section"], sort=False):
-        yield _section(run, str(experiment), str(section), rows)
+    table = run.observations.table
+    velocity = table[velocity_rows(table)]
+    for (kind, experiment, section), rows in velocity.groupby(["kind", "experiment", "section"], sort=False):
+        yield _section(run, kind_of(str(kind)), str(experiment), str(section), rows)
 
 
 def _bands(posterior: Posterior, rows: NDArray[np.intp]) -> Bands:
@@ -41,7 +43,7 @@ def _bands(posterior: Posterior, rows: NDArray[np.intp]) -> Bands:
     return Bands(model[2], (model[1], model[3]), (model[0], model[4]), (total[0], total[4]))
 
 
-def _section(run: Run, experiment: str, section: str, rows: pd.DataFrame) -> Picture:
+def _section(run: Run, kind: Kind, experiment: str, section: str, rows: pd.DataFrame) -> Picture:
     index = rows.index.to_numpy()
     bands = _bands(run.posterior, index)
     below = _below(run, experiment, float(rows["x"].mean()))
@@ -53,14 +55,18 @@ def _section(run: Run, experiment: str, section: str, rows: pd.DataFrame) -> Pic
         for low, high in (bands.model_50, bands.model_95, bands.total_95)
     ]
     worst = int(np.argmax(np.where(used, np.abs(run.posterior.fit.residual[index]), -1)))
+    what, name = ("", "section") if kind.name == STREAMWISE else (f"{kind.words}, ", kind.name)
     caption = (
-        f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>, x = {rows['x'].mean():g} m. "
+        f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>, {what}x = {rows['x'].mean():g} m. "
         f"Of {count(int(used.sum()), 'station')} used, {inside[0]} lie in the 50{NARROW}% and {inside[1]} in the "
         f"95{NARROW}% range of the model, {inside[2]} in that with residual error (dashed). Largest departure "
         f"{fixed(run.posterior.fit.residual[index][worst], 3)} m/s at y = {rows['y'].iloc[worst]:g} m."
     )
-    alt = f"Velocity across section {section} of {experiment}: measured points over the modelled 50 and 95 % bands."
-    return picture(run, figure, f"section-{experiment}-{section}", caption, alt)
+    alt = (
+        f"{kind.words.capitalize()} across section {section} of {experiment}: measured points over the modelled 50 and "
+        "95 % bands."
+    )
+    return picture(run, figure, f"{name}-{experiment}-{section}", caption, alt)
 
 
 def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
@@ -75,37 +81,37 @@ def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
 
 
 def residuals(run: Run) -> Iterator[Picture]:
-    """Residuals of each kind by zone, velocities across and levels along the channel, and against normal quantiles."""
+    """Residuals of each kind by zone, velocities across and others along the channel, and against normal quantiles."""
     table, posterior = run.observations.table, run.posterior
     used = table["used"].to_numpy(bool)
     zone = np.array(zones(run))
-    for kind in posterior.fit.sigma:
-        rows = np.flatnonzero(used & (table["kind"] == kind).to_numpy())
+    for kind in map(kind_of, posterior.fit.sigma):
+        rows = np.flatnonzero(used & (table["kind"] == kind.name).to_numpy())
         residual, where = posterior.fit.residual[rows], zone[rows]
         means = {str(name): residual[where == name] for name in dict.fromkeys(where)}
         told = "; ".join(
             f"{html.escape(name)} {fixed(part.mean(), 3)} ± {fixed(part.std(), 3)}" for name, part in means.items()
         )
-        unit, axis = ("m", "x") if kind == "level" else ("m/s", "y")
-        figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit)
-        caption = f"Measured minus median prediction, {kind}, by zone (mean ± spread, {unit}): {told}."
-        yield picture(run, figure, f"residuals-{kind}", caption, f"Residuals of {kind} along {axis}, by zone. {told}")
+        unit, axis = unit_html(kind.unit), "y" if kind.velocity else "x"
+        figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit_math(kind.unit))
+        caption = f"Measured minus median prediction, {kind.words}, by zone (mean ± spread, {unit}): {told}."
+        alt = f"Residuals of {kind.words} along {axis}, by zone. {told}"
+        yield picture(run, figure, f"residuals-{kind.name}", caption, alt)
         score = residual / posterior.fit.noise[rows]
         worst = int(np.argmax(np.abs(score)))
         names = [
             f"{table['section'][row] or table['experiment'][row]}, {axis} = {table[axis][row]:g} m" for row in rows
         ]
         caption = (
-            f"Residuals of {kind} over the error assumed, σ = {short(posterior.fit.sigma[kind], 2)} {unit}: "
+            f"Residuals of {kind.words} over the error assumed, σ = {short(posterior.fit.sigma[kind.name], 2)} {unit}: "
             f"the largest is {fixed(score[worst], 1)} at {html.escape(names[worst])}."
         )
-        known = measurement_error(posterior, kind)
+        known = measurement_error(posterior, kind.name)
         if np.isfinite(known) and posterior.settings.sigma_rule != "known":
             caption += f" The standard errors of the data are {short(known, 2)} {unit}."
         figure = draw_quantiles(score, names)
-        yield picture(
-            run, figure, f"quantiles-{kind}", caption, f"Ordered residuals of {kind} against normal quantiles."
-        )
+        alt = f"Ordered residuals of {kind.words} against normal quantiles."
+        yield picture(run, figure, f"quantiles-{kind.name}", caption, alt)
 
 
 def verticals(run: Run) -> Iterator[Picture]:

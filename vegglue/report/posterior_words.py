@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.kinds import kind_of
 from vegglue.report.homogeneity_words import homogeneity_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Marginals, Posterior
 from vegglue.results.refinement import ErrorModel, GroupsLeftOut, LeaveOneOut, MisfitTest, PosteriorModes, Refinement
@@ -33,7 +34,7 @@ def describe(posterior: Posterior, others: Mapping[str, object] | None = None) -
 def _ensemble(posterior: Posterior) -> list[str]:
     settings, sample = posterior.settings, posterior.sample
     rule = "the root mean square residual of the best member" if settings.sigma_rule == "best-member" else "known"
-    sigma = " and ".join(f"{value:.3g} {UNIT_OF_KIND[kind]} for {kind}" for kind, value in posterior.fit.sigma.items())
+    sigma = of_kinds(posterior.fit.sigma, "for")
     threshold = ""
     if math.isfinite(settings.threshold):
         threshold = f", {posterior.weighting.weighed} of them with weight (efficiency at least {settings.threshold:g})"
@@ -42,6 +43,12 @@ def _ensemble(posterior: Posterior) -> list[str]:
         f"Weighed by the {settings.likelihood} likelihood over {posterior.fit.used} of {len(posterior.station)} "
         f"stations{threshold}; sigma is {sigma} ({rule}).",
     ]
+
+
+def of_kinds(errors: Mapping[str, float], preposition: str) -> str:
+    """0.012 m/s for velocity and 0.003 m for level: one error for each kind of measurement."""
+    known = ((kind_of(name), value) for name, value in errors.items())
+    return " and ".join(f"{value:.3g} {kind.unit} {preposition} {kind.words}" for kind, value in known)
 
 
 def _worth(posterior: Posterior) -> list[str]:
@@ -116,7 +123,7 @@ def _correlations(posterior: Posterior) -> list[str]:
 
 def _misfit(posterior: Posterior) -> list[str]:
     fit = posterior.fit
-    errors = " and ".join(f"{value:.3g} {UNIT_OF_KIND[kind]} in {kind}" for kind, value in fit.rmse.items())
+    errors = of_kinds(fit.rmse, "in")
     used = posterior.station["used"].to_numpy(bool)
     value = posterior.station["value"].to_numpy(float)
     outside = (value < posterior.predicted.total_band[0]) | (value > posterior.predicted.total_band[-1])
@@ -144,7 +151,6 @@ def _canopy(posterior: Posterior) -> list[str]:
     ]
 
 
-UNIT_OF_KIND = {"velocity": "m/s", "level": "m"}
 # Chances below which errors alone are not believed to explain what is seen.
 DOUBTED, UNBELIEVED = 0.05, 0.001
 # Stations that are named one by one, at most.
@@ -174,7 +180,7 @@ def _modes(posterior: Posterior, modes: PosteriorModes) -> str:
 
 
 def _errors_in_words(posterior: Posterior, model: ErrorModel) -> list[str]:
-    sizes = " and ".join(f"{value:.3g} {UNIT_OF_KIND[kind]} for {kind}" for kind, value in posterior.fit.sigma.items())
+    sizes = of_kinds(posterior.fit.sigma, "for")
     if model.errors == "estimated":
         estimate = (
             f"The errors are estimated from what the best place leaves, {sizes}: what the model misses counts as "

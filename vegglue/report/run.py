@@ -12,6 +12,7 @@ from vegglue.figures.style import Picture, publish
 from vegglue.flow.problem import VegetatedCells
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields
+from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.results.diagnosis import Diagnosis
@@ -65,11 +66,14 @@ def planted(run: Run, experiment: str) -> np.ndarray:
 
 
 def zones(run: Run) -> list[str]:
-    """Where each station stands: 'plants' in a patch that is present, else its friction class."""
+    """Where each station stands: 'plants' in a patch that is present, else its friction class; 'section' where a whole
+    cross-section is measured.
+    """
     table, grid = run.observations.table, run.site.grid
     column = np.clip(np.searchsorted(grid.x + 0.5 * grid.dx, table["x"]), 0, len(grid.x) - 1)
     row = np.clip(np.searchsorted(grid.y + 0.5 * grid.dy, table["y"]), 0, len(grid.y) - 1)
     names = np.array(run.site.class_names)[run.site.friction_class[column, row]]
     cells = {experiment: planted(run, experiment) for experiment in table["experiment"].unique()}
     among = [cells[experiment][i, j] for experiment, i, j in zip(table["experiment"], column, row, strict=True)]
-    return [str(name) for name in np.where(among, "plants", names)]
+    whole = [not kind_of(name).at_point for name in table["kind"]]
+    return [str(name) for name in np.where(whole, "section", np.where(among, "plants", names))]

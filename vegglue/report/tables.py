@@ -12,6 +12,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.kinds import kind_of
 from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, symbol
 from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, zones
@@ -165,8 +166,8 @@ def other_rows(run: Run) -> list[OtherRow]:
     stated = run.case.reference.table if run.case.reference else {}
     study = {key: as_given(value) for key, value in stated.items() if isinstance(value, float)}
     rows = [
-        OtherRow("σ", f"residual, {kind}", short(value, 2), "m" if kind == "level" else "m/s", study.get("sigma", "–"))
-        for kind, value in run.posterior.fit.sigma.items()
+        OtherRow("σ", f"residual, {kind.words}", short(value, 2), kind.unit, study.get("sigma", "–"))
+        for kind, value in ((kind_of(name), value) for name, value in run.posterior.fit.sigma.items())
     ]
     return [*rows, OtherRow("n", "stations used", str(run.posterior.fit.used), "", study.get("n", "–"))]
 
@@ -184,7 +185,7 @@ def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
     return StationRow(
         str(row["experiment"]),
         str(row["section"]) or "–",
-        str(row["kind"]),
+        kind_of(row["kind"]).words,
         fixed(row["x"], 1),
         fixed(row["y"], 2),
         str(row["zone"]),

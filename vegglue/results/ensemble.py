@@ -7,11 +7,12 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
+from vegglue.measurements.kinds import KINDS
 from vegglue.results.fields import FieldWindow
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
 from vegglue.solver.status import NOT_YET
 
-VALUE_UNIT = "m/s for velocity, m for level"
+VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
 
 

@@ -14,6 +14,7 @@ from vegglue.case.schema import Case, EffectEntry, Parameter
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
+from vegglue.measurements.kinds import velocity_rows
 
 # Combinations of shapes that a search tries at most.
 MOST_SHAPES = 12
@@ -70,7 +71,7 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
 def places_of(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
     """Where a cause of its own may act: experiments, sections of velocities, and devices, as far as they are used."""
     used = station[station["used"].to_numpy(bool)]
-    velocity = used[used["kind"] == "velocity"]
+    velocity = used[velocity_rows(used)]
     return {
         "experiment": list(case.experiments),
         "section": [str(name) for name in velocity["section"].unique()],

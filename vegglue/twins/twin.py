@@ -27,6 +27,7 @@ from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Model, Point, linearise, responses
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
+from vegglue.measurements.kinds import velocity_rows
 from vegglue.screening import score_test
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of, working_of
 from vegglue.site.gridded_site import build_site
@@ -226,7 +227,7 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
     used = model.station[model.station["used"].to_numpy(bool)]
     low, high = model.case.grid.x
     x = random.uniform(low + 0.15 * (high - low), low + 0.8 * (high - low))
-    velocity = used[used["kind"] == "velocity"]["y"]
+    velocity = used[velocity_rows(used)]["y"]
     middle, half = 0.5 * (velocity.max() + velocity.min()), 0.5 * (velocity.max() - velocity.min())
     radius = next(shape.default for shape in candidate.effect.shapes if shape.name == "radius")
     return {"x": float(x), "y": float(middle + 0.8 * half * random.uniform(-1.0, 1.0)), "radius": radius}

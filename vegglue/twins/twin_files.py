@@ -9,35 +9,35 @@ from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError
+from vegglue.measurements.kinds import KINDS, Kind
 
 SEAL = "answer.sealed"
-FILES = {"velocity": ("velocities.csv", "u"), "level": ("levels.csv", "level")}
 
 
 def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Path:
     """Write all files and return the config. Errors: StorageError when the folder cannot be written."""
     name = case_name(folder.resolve().name, "twin")
     used = station[station["used"].to_numpy(bool)]
-    kinds = [kind for kind in FILES if (used["kind"] == kind).any()]
+    kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
         "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
         "name": name,
         "title": f"Twin of {case.name}, something may be hidden (synthetic)",
-        "observations": [{"kind": kind, "file": FILES[kind][0]} for kind in kinds],
+        "observations": [{"kind": kind.name, "file": kind.file} for kind in kinds],
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
     note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
-    texts = {FILES[kind][0]: _stations(used, kind) for kind in kinds}
+    texts = {kind.file: _stations(used, kind) for kind in kinds}
     for file, text in (texts | {f"{name}.yaml": note + as_yaml(tree), SEAL: seal}).items():
         write_text(folder / file, text, "give another folder by --to")
     return folder / f"{name}.yaml"
 
 
-def _stations(used: pd.DataFrame, kind: str) -> str:
+def _stations(used: pd.DataFrame, kind: Kind) -> str:
     """The stations of a kind as a table."""
-    value = FILES[kind][1]
-    named = used[used["kind"] == kind].rename(columns={"value": value, "standard_error": f"{value}_se"})
-    columns = ["experiment", *(["section"] if kind == "velocity" else []), "x", "y", value, f"{value}_se"]
+    names = {"value": kind.column, "standard_error": kind.error_column}
+    named = used[used["kind"] == kind.name].rename(columns=names)
+    columns = ["experiment", *(["section"] if kind.velocity else []), "x", "y", *names.values()]
     return str(named[columns].to_csv(index=False, float_format="%.5f"))
 
 

@@ -13,6 +13,7 @@ from vegglue.case.parameter_space import middle_value
 from vegglue.case.parts import Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case, Experiment
+from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
 from vegglue.results.fields import excess
@@ -243,6 +244,8 @@ def _stations(case: Case, site: Site, observations: Observations) -> Iterator[st
         if not (west <= row["x"] <= east and south <= row["y"] <= north):
             yield f"The {_station(row)} is outside the grid."
             continue
+        if not kind_of(row["kind"]).at_point:
+            continue
         i, j = np.abs(site.grid.x - row["x"]).argmin(), np.abs(site.grid.y - row["y"]).argmin()
         depth = float(expected_depth(case, site, case.experiments[row["experiment"]])[i, j])
         if not row["depth"] > 0 and depth <= 0:
@@ -250,7 +253,7 @@ def _stations(case: Case, site: Site, observations: Observations) -> Iterator[st
 
 
 def _edges_of_patches(case: Case, observations: Observations) -> Iterator[str]:
-    table = observations.table[observations.table["kind"] == "velocity"]
+    table = observations.table[velocity_rows(observations.table)]
     limit = ON_THE_EDGE * min(case.grid.cell)
     for patch in case.plants.patches:
         near = [
