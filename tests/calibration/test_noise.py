@@ -46,6 +46,23 @@ def test_neighbours_are_correlated_only_within_their_section() -> None:
     assert covariance[STATIONS - 1, STATIONS] == 0.0
 
 
+def test_components_at_one_place_are_neighbours_of_their_own_kind_alone() -> None:
+    both = pd.concat([stations(), stations().assign(kind="velocity_across")], ignore_index=True)
+    others = stations().assign(kind="discharge")
+    covariance = covariance_of(with_correlation(noise_of(both), 0.5, 1.0)) / 0.01**2
+    many = SECTIONS * STATIONS
+    assert covariance[many, many : many + 3] == pytest.approx([1.0, 0.5, 0.25])
+    assert not covariance[:many, many:].any()
+    alone = covariance_of(with_correlation(noise_of(others), 0.5, 1.0)) / 0.01**2
+    assert alone == pytest.approx(np.eye(many))
+
+
+@pytest.mark.parametrize(("kind", "column"), [("level", "level_se"), ("velocity_across", "v_se")])
+def test_a_missing_error_is_refused_by_the_column_of_its_kind(kind: str, column: str) -> None:
+    with pytest.raises(InputError, match=f"add the column {column}, or"):
+        noise_of(stations(0.0).assign(kind=kind))
+
+
 def test_whitened_errors_are_independent_and_of_size_one() -> None:
     noise = with_correlation(noise_of(stations()), 0.7, 1.0)
     assert noise.whiten(noise.lower) == pytest.approx(np.eye(SECTIONS * STATIONS), abs=1e-9)

@@ -1,4 +1,4 @@
-"""A field team's folder -> a case: site.json, velocities.csv and levels.csv, with wide priors and sensible defaults.
+"""A field team's folder -> a case: site.json and a file of each kind of observation, with wide priors and sensible defaults.
 
 site.json says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at x = 0, y = 0 on
 the axis), patches (x, y, stems_per_m2), canopy_height_guess_m, eddy_viscosity_m2_s, and experiments (discharge_m3_s,
@@ -29,7 +29,7 @@ BY_EYE = 0.12
 def case_from_folder(folder: Path, target: Path) -> Tree:
     """The config, as keys and values, of the measurements in a folder; files are named relative to `target`.
 
-    Errors: InputError when site.json or velocities.csv is missing or says too little.
+    Errors: InputError when site.json or every file of measurements is missing or says too little.
     """
     site = _read_site(folder / "site.json")
     channel, experiments = site["channel"], site["experiments"]
@@ -164,7 +164,8 @@ def _observations(folder: Path, target: Path) -> list[Tree]:
         if (folder / kind.file).is_file():
             found.append({"kind": kind.name, "file": _named(folder / kind.file, target)})
     if not found:
-        raise InputError(f"{_shown(folder)}: expected velocities.csv or levels.csv, got neither; put them there.")
+        files = ", ".join(kind.file for kind in KINDS.values())
+        raise InputError(f"{_shown(folder)}: expected one of {files}, got none; put what was measured there.")
     return found
 
 
