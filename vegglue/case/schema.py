@@ -56,7 +56,7 @@ class Offset(Part):
 
 
 class Observation(Part):
-    kind: str = Field(description="adv (points in the vertical), velocity, velocity_across, speed, level or discharge")
+    kind: str = Field(description="what was measured, e.g. velocity or level; adv: points in the vertical")
     file: Path = Field(description="CSV file")
     experiment: str | None = Field(default=None, description="experiment of all rows, if the file has no such column")
     section: str | None = Field(default=None, description="section of all rows, if the file has no such column")

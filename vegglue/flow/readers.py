@@ -138,7 +138,7 @@ def _of_field(field: Callable[[GriddedFlow], Array], weights: OfStations) -> Rea
 ALONG_X = _of_field(lambda flow: flow.u, _u_weights)
 ACROSS_X = _of_field(lambda flow: flow.v, _v_weights)
 # Slower than this [m/s] a speed has no direction to answer in.
-AT_REST = 1e-12
+LEAST_SPEED = 1e-12
 
 
 def _speed(flow: GriddedFlow, x: Array, y: Array) -> Array:
@@ -148,7 +148,7 @@ def _speed(flow: GriddedFlow, x: Array, y: Array) -> Array:
 
 def _of_both(of_u: Array, of_v: Array, u: Array, v: Array) -> Array:
     """d speed = (u du + v dv) / speed, 0 at rest."""
-    return (u * of_u + v * of_v) / np.maximum(np.hypot(u, v), AT_REST)
+    return (u * of_u + v * of_v) / np.maximum(np.hypot(u, v), LEAST_SPEED)
 
 
 def _speed_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:

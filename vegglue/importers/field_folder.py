@@ -1,4 +1,4 @@
-"""A field team's folder -> a case: site.json and a file of each kind of observation, with wide priors and sensible defaults.
+"""A field team's folder -> a case: site.json and a file of each kind of observation, wide priors, sensible defaults.
 
 site.json says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at x = 0, y = 0 on
 the axis), patches (x, y, stems_per_m2), canopy_height_guess_m, eddy_viscosity_m2_s, and experiments (discharge_m3_s,
