@@ -112,14 +112,14 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Line:
 
 def test_every_kind_is_fitted(line: Line) -> None:
     posterior = line.posterior
-    assert list(posterior.rmse) == list(KINDS)
-    assert posterior.used == len(places())
-    for name, error in posterior.rmse.items():
+    assert list(posterior.fit.rmse) == list(KINDS)
+    assert posterior.fit.used == len(places())
+    for name, error in posterior.fit.rmse.items():
         assert error < 2.0 * ERROR[KINDS[name].unit], name
     for name, value in TRUTH.items():
-        assert abs(posterior.median[name] - value) < 4.0 * posterior.sd[name], name
-    assert posterior.sd["q"] < 0.04
-    assert posterior.refinement.p_misfit > 1e-3
+        assert abs(posterior.marginals.median[name] - value) < 4.0 * posterior.marginals.sd[name], name
+    assert posterior.marginals.sd["q"] < 0.04
+    assert posterior.refinement.misfit.p_misfit > 1e-3
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -128,7 +128,7 @@ def test_every_kind_moves_the_weights(line: Line, name: str) -> None:
     there = (table["kind"] == name).to_numpy()
     moved = table.assign(value=table["value"] + 2.0 * there * table["standard_error"])
     before, after = (
-        glue(line.ensemble, line.case, replace(line.observations, table=one)).weights for one in (table, moved)
+        glue(line.ensemble, line.case, replace(line.observations, table=one)).sample.weights for one in (table, moved)
     )
     assert np.abs(after - before).max() > 1e-4
     assert np.ptp(line.ensemble.prediction[:, there], axis=0).min() > 0.1 * table["standard_error"][there].min()
@@ -165,7 +165,7 @@ def test_models_are_compared_and_measurements_planned(line: Line) -> None:
 def test_the_page_names_every_kind_and_its_unit(line: Line) -> None:
     posterior = line.folder / "posterior.h5"
     write_posterior(posterior, line.posterior, "", "")
-    flow = solve_flow(line.case, line.posterior.median)
+    flow = solve_flow(line.case, line.posterior.marginals.median)
     page = write_report(
         line.folder, line.case, line.observations, line.ensemble, read_posterior(posterior), flow, None, line.diagnosis
     )
@@ -192,7 +192,7 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> Line:
 
 def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
     """Scores that speak of velocities along x have nothing to say, and say so."""
-    assert other.posterior.sd["q"] < 0.04
+    assert other.posterior.marginals.sd["q"] < 0.04
     found = rung(baseline(model_of(other.case, other.observations)))
     assert np.isnan([held_out(found), found.rmse["velocity"], found.rmse["level"]]).all()
     assert found.rmse["speed"] < 0.02
@@ -202,7 +202,7 @@ def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
 
 @pytest.mark.slow
 def test_their_page_is_written(other: Line) -> None:
-    flow = solve_flow(other.case, other.posterior.median)
+    flow = solve_flow(other.case, other.posterior.marginals.median)
     page = write_report(
         other.folder, other.case, other.observations, other.ensemble, other.posterior, flow, None, other.diagnosis
     )

@@ -85,7 +85,7 @@ class Marginals:
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """What is left between measured and predicted, and the errors it is compared with; a kind is velocity or level."""
+    """What is left between measured and predicted, and the errors it is compared with, by kind of observation."""
 
     used: int  # stations that count
     chi2: float  # of the best member against known standard errors [-], NaN where one is unknown
