@@ -29,6 +29,7 @@ from vegglue.report.homogeneity_words import homogeneity_in_words
 from vegglue.report.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior, Transfer
+from vegglue.solver.status import FAILED
 from vegglue.storage.hdf5 import read_ensemble, read_posterior, write_posterior
 
 KNOWN = ("simulate: {members: 1024, seed: 7}", "simulate: {members: 64, seed: 7}\ninfer: {sigma: known}")
@@ -199,6 +200,17 @@ def test_starts_are_the_best_that_lie_apart(reach: tuple[Case, Observations, Ens
     assert np.array_equal(starts[0], z[np.argmax(logs)])
     apart = np.linalg.norm(starts[:, None] - starts[None], axis=2) + np.eye(len(starts))
     assert apart.min() > 0.7
+
+
+@pytest.mark.parametrize("rule", ["known", "best-member"])
+def test_an_ensemble_without_a_solved_member_is_told(reach: tuple[Case, Observations, Ensemble], rule: str) -> None:
+    case, observations, ensemble = reach
+    none = replace(
+        ensemble, status=np.full_like(ensemble.status, FAILED), prediction=np.full_like(ensemble.prediction, np.nan)
+    )
+    case = case.model_copy(update={"infer": case.infer.model_copy(update={"sigma": rule})})
+    with pytest.raises(InputError, match=f"none of the {len(none.status)} members was solved"):
+        refine(none, case, observations, jobs=1)
 
 
 def test_ends_of_the_search_are_counted_once() -> None:

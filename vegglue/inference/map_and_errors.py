@@ -49,9 +49,14 @@ def modes_of(model: Model, noise: Noise, ensemble: Ensemble) -> Modes:
 
 
 def starting_places(noise: Noise, z: Array, prediction: Array) -> Array:
-    """The best members (STARTS at most, p) that lie apart, by |W (y - f)|^2 + |z|^2; z (m, p), prediction (m, n)."""
+    """The best members (STARTS at most, p) that lie apart, by |W (y - f)|^2 + |z|^2; z (m, p), prediction (m, n).
+
+    Errors: InputError when no member has a prediction at all used stations.
+    """
     left = noise.value - prediction[:, noise.rows]
     known = np.flatnonzero(np.isfinite(left).all(axis=1))
+    if not known.size:
+        raise InputError(f"ensemble: none of the {len(z)} members was solved; see the reasons stored with them.")
     misfit = np.sum(noise.whiten(left[known].T) ** 2, axis=0) + np.sum(z[known] ** 2, axis=1)
     order = known[np.argsort(misfit, kind="stable")][:AMONG]
     chosen = [int(order[0])]
