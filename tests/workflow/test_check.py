@@ -91,6 +91,8 @@ def test_a_sound_case_is_passed_in_silence(tmp_path):
         ("level: 1.0}", "level: 0.2}", "leaves at a Froude number of 1.3"),
         ("level: 1.0}", "level: 2.0}", "Experiment low puts water on the side edges of the grid"),
         ("{side: west}", "{side: west, range: [4.01, 4.02]}", "Inflow upstream holds no cell centre"),
+        ("outlet: {}", "outlet: {range: [4.26, 4.75]}", "The outlet holds no cell centre"),
+        ("{side: west}", "{side: west, range: [4.26, 4.75]}", "Inflow upstream holds no cell centre"),
         ("{side: west}", "{side: west, range: [4.2, 5]}", "Inflow upstream lies above the water of experiment low"),
         ("members: 1024}", "members: 1024}\ninfer: {sigma: known}", None),
         (

@@ -7,6 +7,7 @@ from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import build_site
+from vegglue.site.zones import ranges_without_cells
 
 # A coarser grid has at least so many cells along and across: below, a section is hardly resolved.
 FEWEST_CELLS = 6
@@ -22,7 +23,7 @@ def model_of(case: Case, observations: Observations, engine: Engine = NEWTON) ->
 def coarser(model: Model) -> Model | None:
     """The model on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
 
-    None where their number is odd or would become too small.
+    None where their number is odd or would become too small, or an inflow or the outlet would hold no cell centre.
     """
     grid = model.site.grid
     along = 1 if grid.dx > LONG * grid.dy else 2
@@ -30,4 +31,5 @@ def coarser(model: Model) -> Model | None:
         return None
     cell = (along * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])
     case: Case = model.case.model_copy(update={"grid": model.case.grid.model_copy(update={"cell": cell})})
-    return replace(model, case=case, site=build_site(case))
+    site = build_site(case)
+    return None if any(ranges_without_cells(case, site.grid)) else replace(model, case=case, site=site)

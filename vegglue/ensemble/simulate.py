@@ -28,6 +28,7 @@ from vegglue.progress import Progress
 from vegglue.results.ensemble import Header
 from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
 from vegglue.site.gridded_site import Site, build_site
+from vegglue.site.zones import refuse_ranges_without_cells
 from vegglue.solver.batch import NEIGHBOURHOOD, solve_members
 from vegglue.solver.parameter_metric import leaves, parameter_metric
 from vegglue.solver.reference_member import SolvedMember, known_middle
@@ -46,12 +47,13 @@ Begin = dict[str, SolvedMember | None]
 def simulate(case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
-    Errors: InputError when the fields to be kept exceed their budget; StorageError when another run holds the folder or
-    the disk is full (what was written stays).
+    Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
+    StorageError when another run holds the folder or the disk is full (what was written stays).
     """
     if not case.parameters:
         raise InputError(f"{os.path.relpath(case.source)}: `parameters` expected a prior or more, got none: add one.")
     site = build_site(case)
+    refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
     theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)

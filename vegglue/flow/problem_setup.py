@@ -14,12 +14,17 @@ from vegglue.flow.problem import InflowSegment, Problem, VegetatedCells
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.site.channel_geometry import channel_geometry, patches_present
 from vegglue.site.gridded_site import Site
+from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
 BED_LAWS = {"manning": (bed_laws.MANNING, "n"), "keulegan": (bed_laws.KEULEGAN, "k_s"), "chezy": (bed_laws.CHEZY, "c")}
 
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
-    """The problem of one experiment for all members of theta, {parameter: (members,)}."""
+    """The problem of one experiment for all members of theta, {parameter: (members,)}.
+
+    Errors: InputError when an inflow or the outlet holds no cell centre.
+    """
+    refuse_ranges_without_cells(case, site.grid)
     members = len(next(iter(theta.values()))) if theta else 1
     setting = case.experiments[experiment]
     classes = [case.friction.classes[name] for name in site.class_names]
@@ -41,7 +46,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
                 case.inflows.values(), boundary.discharge, boundary.spread, strict=True
             )
         ),
-        outlet=_within(case.outlet.range, site.grid.y),
+        outlet=centres_within(case.outlet.range, site.grid.y),
         outlet_level=boundary.level,
         film=case.numerics.film_depth,
         log_argument_minimum=case.numerics.bank_argument_minimum,
@@ -56,7 +61,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
 
 def _boundary(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> BoundaryValues:
     """What the case says of inflows and outlet; spread and place have as many cells as the longest side."""
-    cells = [_inflow_cells(inflow, site).size for inflow in case.inflows.values()]
+    cells = [inflow_cells(inflow, site.grid).size for inflow in case.inflows.values()]
     place = np.zeros((len(cells), max(cells), 1))
     for inflow, size in enumerate(cells):
         place[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
@@ -102,23 +107,12 @@ def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: 
 
 
 def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> InflowSegment:
-    cells = _inflow_cells(inflow, site)
+    cells = inflow_cells(inflow, site.grid)
     start, stop = int(cells[0]), int(cells[-1]) + 1
     along = 0.0 if inflow.angle is None else 1.0 / float(np.tan(np.radians(inflow.angle)))
     return InflowSegment(
         inflow.side, start, stop, discharge, inflow.spread == "conveyance", spread[: stop - start], along
     )
-
-
-def _inflow_cells(inflow: Inflow, site: Site) -> np.ndarray:
-    return np.flatnonzero(_within(inflow.range, site.grid.y if inflow.side == "west" else site.grid.x))
-
-
-def _within(part: tuple[float, float] | None, centres: Array) -> np.ndarray:
-    """Cells whose centre lies in a range, all of them without one."""
-    if part is None:
-        return np.ones(centres.size, dtype=bool)
-    return (centres >= part[0]) & (centres < part[1])
 
 
 def lifted(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry) -> Array:

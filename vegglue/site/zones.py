@@ -1,14 +1,16 @@
-"""Which cells a patch of plants or a zone of friction holds."""
+"""Which cells a patch of plants, a zone of friction, an inflow or the outlet holds: those whose centre lies in it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
+from vegglue.case.config import shown_path
+from vegglue.case.parts import Interval
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import Patch, Zone
+from vegglue.case.site_schema import Inflow, Patch, Zone
 from vegglue.errors import InputError
 from vegglue.site.grid import Grid
 from vegglue.site.polygons import in_polygon
@@ -72,8 +74,36 @@ def beyond(steep: Mask, bed: Array) -> Mask:
     return np.where(columns < rows, left, right)
 
 
-def _in_range(x: tuple[float, float] | None, y: tuple[float, float] | None, grid: Grid) -> Mask:
+def _in_range(x: Interval | None, y: Interval | None, grid: Grid) -> Mask:
+    return centres_within(x, grid.x)[:, None] & centres_within(y, grid.y)[None, :]
+
+
+def centres_within(interval: Interval | None, centres: Array) -> Mask:
+    """low <= c < high, for cell centres c (n,) [m]; all of them without an interval."""
     # Half-open, so that a cell centre on a shared edge belongs to one of two neighbours.
-    along = (grid.x >= x[0]) & (grid.x < x[1]) if x else np.full(grid.x.size, True)
-    across = (grid.y >= y[0]) & (grid.y < y[1]) if y else np.full(grid.y.size, True)
-    return along[:, None] & across[None, :]
+    if interval is None:
+        return np.ones(centres.size, dtype=bool)
+    return (centres >= interval[0]) & (centres < interval[1])
+
+
+def inflow_cells(inflow: Inflow, grid: Grid) -> NDArray[np.int64]:
+    """Cells of its side that an inflow enters by: rows of the west side, columns of the south or north side."""
+    return np.flatnonzero(centres_within(inflow.range, grid.y if inflow.side == "west" else grid.x))
+
+
+def ranges_without_cells(case: Case, grid: Grid) -> Iterator[str]:
+    """Keys of the ranges of inflows and outlet that hold no cell centre of a grid."""
+    for name, inflow in case.inflows.items():
+        if not inflow_cells(inflow, grid).size:
+            yield f"inflows.{name}.range"
+    if not centres_within(case.outlet.range, grid.y).any():
+        yield "outlet.range"
+
+
+def refuse_ranges_without_cells(case: Case, grid: Grid) -> None:
+    """Errors: InputError when an inflow or the outlet holds no cell centre."""
+    for key in ranges_without_cells(case, grid):
+        raise InputError(
+            f"{shown_path(case.source)}: `{key}` expected a range with the centre of a cell in it, got one between "
+            f"those of cells of {grid.dx:g} m x {grid.dy:g} m: widen it."
+        )

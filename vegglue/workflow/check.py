@@ -4,7 +4,6 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.consistency import values
@@ -17,10 +16,10 @@ from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
 from vegglue.results.fields import excess
-from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site
 from vegglue.site.polygons import area_of, corners_of, distance_to_outline
-from vegglue.site.zones import cells_of_patch
+from vegglue.site.zones import cells_of_patch, centres_within, inflow_cells
 
 Bounds = tuple[float, float]
 FEW_MEMBERS = 100
@@ -132,21 +131,17 @@ def _acts(place: KeyPath, classes: set[str], growing: set[str]) -> bool:
 def _growing(case: Case, site: Site) -> set[str]:
     """Stands that have cells in at least one experiment."""
     found = set()
-    for experiment in case.experiments.values():
-        for index, patch in enumerate(case.plants.patches):
-            if _present(experiment, patch.name) and (site.patch == index).any():
-                found.add(patch.stand)
+    for experiment in case.experiments:
+        for index in patches_present(case, experiment):
+            if (site.patch == index).any():
+                found.add(case.plants.patches[index].stand)
     return found
-
-
-def _present(experiment: Experiment, patch: str) -> bool:
-    return patch in experiment.plants if isinstance(experiment.plants, tuple) else experiment.plants
 
 
 def _boundaries(case: Case, site: Site) -> Iterator[str]:
     for name, experiment in case.experiments.items():
         depth = expected_depth(case, site, experiment)
-        open_ = _within(case.outlet.range, site.grid.y)
+        open_ = centres_within(case.outlet.range, site.grid.y)
         level = middle_value(case, experiment.level)
         wet = np.maximum(depth[-1, open_], 0.0)
         if not open_.any():
@@ -159,17 +154,12 @@ def _boundaries(case: Case, site: Site) -> Iterator[str]:
         if (depth[:, [0, -1]] > 0).any():
             yield f"Experiment {name} puts water on the side edges of the grid, which act as walls: widen the grid."
         for inflow, side in case.inflows.items():
-            along = site.grid.y if side.side == "west" else site.grid.x
             edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
-            cells = _within(side.range, along)
-            if not cells.any():
+            cells = inflow_cells(side, site.grid)
+            if not cells.size:
                 yield f"Inflow {inflow} holds no cell centre: no water can enter."
             elif side.side == "west" and not (edge[cells] > 0).any():
                 yield f"Inflow {inflow} lies above the water of experiment {name}."
-
-
-def _within(part: tuple[float, float] | None, centres: Array) -> NDArray[np.bool_]:
-    return (centres >= part[0]) & (centres <= part[1]) if part else np.full(centres.size, True)
 
 
 def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> float:
@@ -182,7 +172,7 @@ def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> f
 def _canopies(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     for name, experiment in case.experiments.items():
         depth = expected_depth(case, site, experiment)
-        for stand in sorted({patch.stand for patch in case.plants.patches if _present(experiment, patch.name)}):
+        for stand in sorted({case.plants.patches[index].stand for index in patches_present(case, name)}):
             cells = np.isin(site.patch, [i for i, patch in enumerate(case.plants.patches) if patch.stand == stand])
             if not cells.any():
                 continue
