@@ -18,6 +18,7 @@ from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
 
 SYNTHETIC = "synthetic record"  # stamped on every figure of one
@@ -59,10 +60,7 @@ def patches_drawn(run: Run, experiment: str) -> VegetatedCells:
 
 def planted(run: Run, experiment: str) -> np.ndarray:
     """Whether each cell (nx, ny) bears plants in an experiment."""
-    plants = patches_drawn(run, experiment)
-    cells = np.zeros(run.site.bed.shape, dtype=bool)
-    cells[plants.column, plants.row] = True
-    return cells
+    return np.isin(run.site.patch, patches_present(run.case, experiment))
 
 
 def zones(run: Run) -> list[str]:
