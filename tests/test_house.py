@@ -148,6 +148,13 @@ def test_paths_of_a_machine_are_recognised() -> None:
         assert not OF_A_MACHINE.search(text), text
 
 
+def test_the_code_knows_no_study_as_the_paper() -> None:
+    """Code that runs on any case names a study by its authors; a config may say `the paper`."""
+    of_one_study = re.compile(r"\bthe paper\b|\bpaper['’]s\b|\bwillow", re.IGNORECASE)
+    sources = [path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".j2")]
+    assert [str(path) for path in sources if of_one_study.search(path.read_text(encoding="utf-8"))] == []
+
+
 def test_the_top_level_is_the_one_agreed() -> None:
     for name in ("pyproject.toml", "vegglue", "configs", "data", "runs", "tests", "Makefile", "README.md", "LICENSE"):
         assert (ROOT / name).exists(), name

@@ -305,6 +305,16 @@ def test_an_ensemble_outlives_another_likelihood_but_not_another_prior():
     assert simulation_hash(load_case(swapped)) != simulation_hash(case)
 
 
+def test_an_ensemble_outlives_what_is_said_of_the_record():
+    write("experiment,x,y,level\nlow,1,0,0.9\n", "levels.csv")
+    text = SMALL + "observations:\n  - {kind: level, file: levels.csv}\n"
+    case = load_case(write(text))
+    computed = load_case(write(text.replace("levels.csv}", "levels.csv, synthetic: true}")))
+    assert [one.synthetic for one in (*case.observations, *computed.observations)] == [False, True]
+    assert simulation_hash(computed) == simulation_hash(case)
+    assert case_hash(computed) != case_hash(case)
+
+
 def test_a_case_cannot_be_changed():
     case = load_case(write(SMALL))
     with pytest.raises(ValueError, match="frozen"):

@@ -72,7 +72,7 @@ def test_the_assumed_density_is_said():
         ("stems,-22,0,1", r"row 9: expected a mean above 0"),
         ("stems,22,-1,1", r"row 9: expected a standard deviation of at least 0"),
         ("stems,22,0,0", r"row 9: expected at least 1 sample"),
-        ("stalks,22,0,1", r"row 9: expected one of the quantities willow_height"),
+        ("stalks,22,0,1", r"row 9: expected one of the quantities plant_height"),
         ("stem_height,0.4,0.01,66", r"row 9: expected quantity to differ .* row 3"),
         ("", r"row 9"),
     ],

@@ -215,9 +215,23 @@ def test_a_synthetic_record_is_called_so(d3a: tuple[Run, str], toy: tuple[Run, s
     assert "synthetic record" in d3a[1]
     assert "nobody measured it" in d3a[1]
     assert "synthetic" not in toy[1]
-    case = d3a[0].case
-    assert is_synthetic(case.model_copy(update={"title": ""}))
-    assert not is_synthetic(case.model_copy(update={"title": "", "reference": None}))
+    case = d3a[0].case.model_copy(update={"title": ""})
+    measured = tuple(one.model_copy(update={"synthetic": False}) for one in case.observations)
+    assert is_synthetic(case.model_copy(update={"reference": None}))
+    assert is_synthetic(case.model_copy(update={"observations": measured}))
+    assert not is_synthetic(case.model_copy(update={"reference": None, "observations": measured}))
+
+
+def test_a_title_makes_no_record_synthetic(toy: tuple[Run, str]) -> None:
+    assert not is_synthetic(toy[0].case.model_copy(update={"title": "A channel of synthetic turf"}))
+
+
+def test_values_of_others_are_named_by_their_source(d3a: tuple[Run, str], tmp_path: Path) -> None:
+    assert "marked: Berends et al. (2020), Table 3, made with." in d3a[1]
+    assert "linear interpolation" in d3a[1]
+    for source, name in (("", "reference"), ("A study of a river " + 9 * "long ", "A study of a river long long …")):
+        reference = {"source": source, "table": {"n_b": [0.03, 0.01]}}
+        assert f"marked: {name}." in written(a_toy(tmp_path / name, reference=reference))
 
 
 def test_what_users_wrote_is_text_and_no_markup(toy: tuple[Run, str]) -> None:

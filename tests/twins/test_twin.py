@@ -189,6 +189,7 @@ def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:
     station, answer = measured(ground, ["viscosity"], 6.0, "white", 1)
     target = write_twin(ground.model.case, tmp_path / "Riddle 1", station, sealed(answer))
     assert config_in(tmp_path / "Riddle 1") == target
+    assert all(observation.synthetic for observation in load_case(target).observations)
     target.with_name("riddle-1+viscosity.yaml").touch()
     assert config_in(tmp_path / "Riddle 1") == target, "beside a child that `run` has written"
     model = model_in(load_case(target))

@@ -14,7 +14,7 @@ from vegglue.case.schema import Case
 # What a finished ensemble does not depend on.
 NOT_SIMULATED = dict.fromkeys(
     ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction"), True
-) | {"simulate": {"field_budget"}}
+) | {"simulate": {"field_budget"}, "observations": {"__all__": {"synthetic"}}}
 # Goes up whenever the same case gets other numbers, so that results of before no longer fit it.
 EQUATIONS = 3
 Tree = dict[str, Any]

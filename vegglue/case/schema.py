@@ -61,11 +61,14 @@ class Observation(Part):
     experiment: str | None = Field(default=None, description="experiment of all rows, if the file has no such column")
     section: str | None = Field(default=None, description="section of all rows, if the file has no such column")
     case: str | None = Field(default=None, description="adv: rows of the file with this value in column `case`")
-    average: Literal["paper", "profile"] | None = Field(default=None, description="adv: rule of depth-averaging")
+    average: Literal["paper", "profile"] | None = Field(
+        default=None, description="adv: depth average by `paper`, linear between points, or `profile`, of a fit"
+    )
     offset: Offset = Field(default_factory=Offset, description="added to the coordinates of the file [m]")
     floor: Number | None = Field(default=None, description="adv: level of the channel floor in z of the file [m]")
     surface: Number | None = Field(default=None, description="adv: measured water level in z of the file [m]")
     standard_error: Positive | None = Field(default=None, description="of all values, if the file has no such column")
+    synthetic: bool = Field(default=False, description="true: computed, not measured; reports and figures then say so")
 
     @model_validator(mode="after")
     def _keys_of_the_kind(self) -> Self:

@@ -188,7 +188,7 @@ def _draw_vertical(axes: Axes, vertical: Vertical, stretch: float) -> None:
 
 @styled
 def draw_canopy_profiles(inside: Sequence[Vertical], canopy: tuple[float, float] | None) -> Figure:
-    """Velocity against height above the bed for the verticals inside plants, with the canopy height (paper, Fig. 3)."""
+    """Velocity against height above the bed for the verticals inside plants, with the canopy height."""
     figure, axes = canvas(WIDTH, HEIGHT + 0.3)
     for vertical in inside:
         axes.plot(vertical.curve_velocity, vertical.curve_height, color=COLOUR["model"], linewidth=0.9)

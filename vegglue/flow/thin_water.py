@@ -8,7 +8,7 @@ on thin faces,
     the unknown is w = rho u, rho = h / h_c, with h_c the depth at the centre: what it carries is linear in w.
 
 Deep water stays as it is, roots stay roots, and at the centre nothing changes. With the rows alone a member of one
-chunk of the paper's ensemble took 8 steps instead of 15, of another 15 instead of 30 (means of 100, when they came).
+chunk of an ensemble of 5,000 took 8 steps instead of 15, of another 15 instead of 30 (means of 100, when they came).
 With both, the median of four chunks is 6 to 9 instead of 8 to 11; the mean, which stragglers rule, did not fall. A
 nonlinear preconditioner from the left and one from the right, as in Cai and Keyes 2002, doi:10.1137/S106482750037620X;
 not checked against it.

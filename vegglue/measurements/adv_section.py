@@ -67,10 +67,12 @@ def read_section(case: Case, observation: Observation) -> Section:
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
-    """Depth average and standard error (rows,) [m/s] by the rule `paper` or `profile`.
+    """Depth average and standard error (rows,) [m/s] by a rule.
 
-    The error of the paper's rule has a part for the straight line it draws to the bed and the constant it draws to the
-    surface: the difference d between both rules taken as the bound of a uniform distribution, d / sqrt(3).
+    paper: as in Berends et al. (2020), linear between points, zero at the bed and constant above the highest point;
+    profile: of the fitted profile. The error of `paper` has a part for the straight line it draws to the bed and the
+    constant it draws to the surface: the difference d between both rules taken as the bound of a uniform distribution,
+    d / sqrt(3).
     """
     if rule == "profile":
         return profiles["fitted"], profiles["fitted_error"]

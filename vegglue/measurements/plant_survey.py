@@ -12,7 +12,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
 
 SURVEYED = (
-    "willow_height",
+    "plant_height",
     "stem_height",
     "undergrowth_height",
     "stem_diameter",
@@ -22,7 +22,7 @@ SURVEYED = (
     "stems",
     "branches_per_stem",
 )
-DRAG_COEFFICIENT = 1.0  # the paper's choice for submerged plants, after Wunder et al. (2011)
+DRAG_COEFFICIENT = 1.0  # [-] of submerged plants: Berends et al. (2020), after Wunder et al. (2011)
 
 
 @dataclass(frozen=True)
@@ -86,24 +86,25 @@ def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
 def rigid_cylinder(
     survey: dict[str, SurveyedQuantity], choice: Survey, draws: int = 20000, seed: int = 1
 ) -> RigidCylinder:
-    """phi = C_d m (D_s h_s + b D_b (h_w - h_s)) min(h_d / h_w, 1) + C_d m_u D_u min(h_u, h_d).
+    """phi = C_d m (D_s h_s + b D_b (h_p - h_s)) min(h_d / h_p, 1) + C_d m_u D_u min(h_u, h_d).
 
-    m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the willow height h_w, bent rigidly
-    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_w; upright when
+    m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the plant height h_p, bent rigidly
+    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_p; upright when
     `choice.deflected_height` is not given), and m_u stems of undergrowth of diameter D_u and height h_u, which stay
     upright [m]; C_d = 1. No foliage.
 
     Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
-    positive. `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the paper's +-
-    must be), `mean` uses the error of the mean over the sampled plants. The density m_u was not surveyed: it is
-    log-uniform between `choice.undergrowth_density` [1/m2], an assumption of the user; without it, no undergrowth.
+    positive. `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the +- of
+    Berends et al. 2020 must be), `mean` uses the error of the mean over the sampled plants. The density m_u was not
+    surveyed: it is log-uniform between `choice.undergrowth_density` [1/m2], an assumption of the user; without it, no
+    undergrowth.
 
     Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
     bending after Verschoren et al. (2016).
     """
     generator = np.random.default_rng(seed)
     drawn = {name: _draw(survey[name], choice.spread, draws, generator) for name in SURVEYED}
-    height, stem_height = drawn["willow_height"], np.minimum(drawn["stem_height"], drawn["willow_height"])
+    height, stem_height = drawn["plant_height"], np.minimum(drawn["stem_height"], drawn["plant_height"])
     deflected = np.full(draws, choice.deflected_height or np.inf)
     bent = DRAG_COEFFICIENT * drawn["stems"] * np.minimum(deflected / height, 1.0)
     diameter = drawn["stem_diameter_with_debris" if choice.debris else "stem_diameter"]

@@ -1,4 +1,4 @@
-"""One cross-section: from verticals to the discharge through it, by the paper's rule and by a better one.
+"""One cross-section: from verticals to the discharge through it, by linear interpolation and by fitted profiles.
 
 Both rules are linear in what was measured, so they are written as weights and the errors follow exactly.
 """
@@ -48,7 +48,7 @@ class Discharge:
 
 
 def grid_weights(section: CrossSection, position: Array, columns: Sequence[Column], step: float) -> list[Array]:
-    """w, per vertical (points,), with Q = sum(w u): the paper's rule [m2].
+    """w, per vertical (points,), with Q = sum(w u): the rule `paper` [m2].
 
     Points are interpolated linearly on a regular (y, z) grid of cells at most `step` [m] high: upward in each vertical
     (zero at the bed, constant from the highest point to the surface), then across at each level between verticals,

@@ -31,7 +31,7 @@ from vegglue.results.posterior import Posterior
 
 
 def sections(run: Run) -> Iterator[Picture]:
-    """Measured against modelled across each section of each experiment (the paper's Fig. 7)."""
+    """Measured against modelled across each section of each experiment."""
     table = run.observations.table
     velocity = table[velocity_rows(table)]
     for (kind, experiment, section), rows in velocity.groupby(["kind", "experiment", "section"], sort=False):
@@ -115,7 +115,7 @@ def residuals(run: Run) -> Iterator[Picture]:
 
 
 def verticals(run: Run) -> Iterator[Picture]:
-    """All verticals of each ADV section, and those inside plants with the canopy height (the paper's Fig. 3)."""
+    """All verticals of each ADV section, and those inside plants with the canopy height."""
     observations = run.observations
     if observations.profiles.empty:
         return
@@ -183,7 +183,7 @@ def discharges(run: Run) -> Iterator[Picture]:
             continue
         through = run.ensemble.section_flow[:, run.ensemble.experiments.index(experiment), sections.index(section)]
         spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])
-        names = {"paper": "paper’s rule", "profile": "profile fit"}
+        names = {"paper": "linear interpolation", "profile": "profile fit"}
         rows = [(names.get(rule, rule), found.value, found.standard_error) for rule, found in rules.items()]
         told = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)
         figure = draw_discharge(rows, (float(spread[0]), float(spread[1]), float(spread[2])))

@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
+from textwrap import shorten
 
 import numpy as np
 
+from vegglue.case.schema import Reference
 from vegglue.figures.posterior import (
     ReferenceValue,
     Unknown,
@@ -26,6 +28,7 @@ from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, picture
 
 MOST_PAIRS = 6  # of parameters drawn together
+LONGEST_LABEL = 32  # characters beside a mark that fit into half of a marginal
 
 
 def pictures(run: Run) -> dict[str, list[Picture]]:
@@ -65,10 +68,15 @@ def _references(run: Run, name: str) -> list[ReferenceValue]:
     stated = reference.table.get(name, reference.table.get(f"log10_{name}"))
     if stated is not None:
         value, sd = stated if isinstance(stated, tuple) else (stated, np.nan)
-        found.append(ReferenceValue("paper", value if name in reference.table else 10**value, sd, "D"))
+        found.append(ReferenceValue(_source(reference), value if name in reference.table else 10**value, sd, "D"))
     if name in reference.made_with:
         found.append(ReferenceValue("made with", reference.made_with[name], np.nan, "X"))
     return found
+
+
+def _source(reference: Reference) -> str:
+    """Whose values they are, short enough for a label."""
+    return shorten(reference.source, LONGEST_LABEL, placeholder=" …") or "reference"
 
 
 def _marginal(run: Run, name: str) -> Picture:

@@ -41,9 +41,9 @@ class Run:
 
 
 def is_synthetic(case: Case) -> bool:
-    """Whether the record was computed: its title says so, or the case knows what it was made with."""
+    """Whether a record was computed: an observation says so, or the case knows what it was made with."""
     made_with = case.reference is not None and bool(case.reference.made_with)
-    return made_with or "synthetic" in case.title.lower()
+    return made_with or any(observation.synthetic for observation in case.observations)
 
 
 def picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:

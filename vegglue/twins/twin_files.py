@@ -23,7 +23,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Pa
         "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
         "name": name,
         "title": f"Twin of {case.name}, something may be hidden (synthetic)",
-        "observations": [{"kind": kind.name, "file": kind.file} for kind in kinds],
+        "observations": [{"kind": kind.name, "file": kind.file, "synthetic": True} for kind in kinds],
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
     note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"

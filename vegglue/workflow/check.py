@@ -61,7 +61,7 @@ def _range(case: Case, value: Value) -> Bounds:
 def _ensemble(case: Case, observations: Observations) -> Iterator[str]:
     members, table = case.simulate.members, observations.table
     if members < FEW_MEMBERS:
-        yield f"Only {members} members will be simulated: quantiles need some hundreds, the paper took 5000."
+        yield f"Only {members} members will be simulated: quantiles need some hundreds."
     if members & (members - 1):
         power = 2 ** round(np.log2(members))
         yield f"Note: {members} members is no power of two; Sobol' points fill the priors more evenly with {power}."
