@@ -17,6 +17,7 @@ from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations
 from vegglue.report.posterior_words import describe
+from vegglue.resistance.plant_laws import baptist_chezy
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import LEVELS, Posterior
 from vegglue.solver.status import FAILED
@@ -327,6 +328,15 @@ def test_corrected_phi_gives_the_same_resistance(from_height: float, to_height: 
     assert [chezy(value, to_height, 1.36) for value in corrected] == pytest.approx(before)
     assert correct_phi_for_canopy(corrected, to_height, from_height, 1.36, 60.0) == pytest.approx(phi)
     assert np.all(np.diff(corrected) > 0)
+
+
+def test_correction_stands_on_the_law_of_the_solver(monkeypatch: pytest.MonkeyPatch) -> None:
+    phi, bare = np.array([[0.5, 1.0], [2.0, 40.0]]), np.array([60.0, 30.0])
+    corrected = correct_phi_for_canopy(phi, 0.8, 1.06, 1.36, bare)
+    law = np.vectorize(baptist_chezy)
+    assert law(corrected, 1.06, 1.36, bare) == pytest.approx(law(phi, 0.8, 1.36, bare), rel=1e-14)
+    monkeypatch.setattr("vegglue.inference.canopy_correction.above_canopy", lambda top, depth: 0.0)
+    assert correct_phi_for_canopy(phi, 1.36, 1.06, 1.36, bare) == pytest.approx(phi, rel=1e-13)
 
 
 def test_correction_ends_at_the_bare_bed_and_at_a_wall() -> None:

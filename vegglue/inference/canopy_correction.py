@@ -1,38 +1,32 @@
 """phi of a stand for another canopy height, as Berends et al. (2020) corrected it."""
 
-import math
-
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
 from vegglue.inference.weighted_statistics import weighted_median, weighted_quantile, weighted_sd
-from vegglue.resistance.physical_constants import GRAVITY, KARMAN
+from vegglue.resistance.physical_constants import GRAVITY
+from vegglue.resistance.plant_laws import above_canopy, baptist_chezy
 from vegglue.results.posterior import LEVELS, CorrectedCanopy
 
 
 def correct_phi_for_canopy(
     phi: Array, from_height: float, to_height: float, depth: float, bare_chezy: float | Array
 ) -> Array:
-    """phi' with C(phi', to_height) = C(phi, from_height) at the same depth h [-], C the Chézy coefficient of
+    """phi' with C(phi', to_height) = C(phi, from_height) at the same depth h [-], C of `baptist_chezy`.
 
-        C = (1 / C_b^2 + phi / (2 g))^(-1/2) + sqrt(g) / kappa ln(max(h / h_d, 1))
+        phi' = 2 g ((C - C_above)^-2 - 1/C_b^2), C_above the part of the water above plants of to_height
 
     phi: any shape; heights h_d and depth h [m]; bare_chezy C_b [m^1/2/s]. 0 where even the bare bed would be too rough,
     infinite where no plants would be rough enough. Berends et al. (2020) corrected D3b like this and do not print the
     formula: equal C is the natural reading. C: Baptist et al. (2007), https://doi.org/10.1080/00221686.2007.9521778.
     """
-    through_plants = (1 / np.square(bare_chezy) + phi / (2 * GRAVITY)) ** -0.5
-    wanted = through_plants + _above(depth, from_height) - _above(depth, to_height)
+    chezy = np.vectorize(baptist_chezy, otypes=[np.float64])(phi, from_height, depth, bare_chezy)
+    within = chezy - above_canopy(to_height, depth)
     with np.errstate(divide="ignore"):
-        corrected = 2 * GRAVITY * (np.maximum(wanted, 0.0) ** -2 - 1 / np.square(bare_chezy))
+        corrected = 2 * GRAVITY * (np.maximum(within, 0.0) ** -2 - 1 / np.square(bare_chezy))
     return np.maximum(corrected, 0.0)
-
-
-def _above(depth: float, canopy_height: float) -> float:
-    """Part of C that the water above the plants adds [m^1/2/s]."""
-    return math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / canopy_height, 1.0))
 
 
 def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> CorrectedCanopy | None:

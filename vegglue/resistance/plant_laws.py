@@ -73,11 +73,22 @@ def _submerged(law: int, phi: float, top: float, depth: float) -> float:
 
 
 @compiled
+def above_canopy(top: float, depth: float) -> float:
+    """g^(1/2)/kappa ln(max(h/h_d, 1)): what the water above the plants adds to C by Baptist's law [m^1/2/s]."""
+    return math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / top, 1.0))
+
+
+@compiled
+def baptist_chezy(phi: float, top: float, depth: float, bare: float) -> float:
+    """C = (1/C_b^2 + phi/2g)^(-1/2) + g^(1/2)/kappa ln(max(h/h_d, 1)) [m^1/2/s]."""
+    return 1.0 / math.sqrt(1.0 / bare**2 + phi / (2.0 * GRAVITY)) + above_canopy(top, depth)
+
+
+@compiled
 def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float:
     """C [m^1/2/s] of plants and bed; phi already of the part under water."""
     if law == BAPTIST:
-        within = 1.0 / math.sqrt(1.0 / bare**2 + phi / (2.0 * GRAVITY))
-        return within + math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / top, 1.0))
+        return baptist_chezy(phi, top, depth, bare)
     if depth > top:
         plants = _submerged(law, phi, top, depth)
     else:
