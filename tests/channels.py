@@ -47,6 +47,7 @@ def make_problem(
         "outlet": np.ones(ny, bool),
         "outlet_level": np.array([level]),
         "film": 1e-4,
+        "log_argument_minimum": 1.3,
     }
     return Problem(**(settings | changes))
 

@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.flow import kernels, thin_water, wet_and_dry
 from vegglue.flow.closures import EMPTY, closed
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment, Problem
+from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
 
 def storage(problem: Problem, level: Array) -> Array:
     """dh/dz_s of every cell [-], (nx, ny, m): the share of it that is wet."""
-    above = level - problem.bed[:, :, None] - 0.1 * problem.film
+    above = level - problem.bed[:, :, None] - FILM_ON_LAND * problem.film
     if problem.lift.size:
         above = above - problem.lift
     reach = problem.reach[:, :, None]

@@ -74,8 +74,8 @@ class Problem:
     inflows: tuple[InflowSegment, ...]
     outlet: NDArray[np.bool_]
     outlet_level: Array
-    film: float = 0.01
-    log_argument_minimum: float = 1.3
+    film: float
+    log_argument_minimum: float
     phi_proportional: bool = False
     smallest_shear_depth: bool = False
     lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))

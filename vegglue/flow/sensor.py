@@ -15,6 +15,7 @@ from vegglue.flow.equations import Faces, faces
 from vegglue.flow.problem import Problem
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
 from vegglue.measurements.kinds import Kind, kind_of
+from vegglue.resistance.physical_constants import FILM_ON_LAND
 from vegglue.site.grid import Grid
 
 
@@ -64,7 +65,7 @@ def read_sensors(
         prediction = _shown(flow, prediction, station)
     through = flow.discharge
     error = np.abs(through / _entered(problem) - 1.0).max(axis=0)
-    wet = now.cell[kept] > 0.1 * problem.film
+    wet = now.cell[kept] > FILM_ON_LAND * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
     nearest = [nearest_face(grid, x) for _, x in sections]
     return Readings(prediction.T, through[nearest].T, error, np.moveaxis(fields, -1, 0))

@@ -21,6 +21,7 @@ import numpy as np
 from vegglue.compilation import compiled
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.wet_and_dry import wet_depth
+from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 # Films of depth above which a face stays as it is. Of the rows, 2 needs two more steps in ten, 10 none fewer;
 # of rho, 20 and 100 none fewer.
@@ -114,7 +115,7 @@ def answers(state, bed, lift, reach, film, thick):
     for i, e, j in np.argwhere(thick < THIN * film):
         a, b = _beyond(i, e, j)
         wide, share = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j] / (THIN * film)
-        wet = min(max(0.5 * (_above(state, bed, lift, i, j, a, b, 0) - 0.1 * film + wide) / wide, 0.0), 1.0)
+        wet = min(max(0.5 * (_above(state, bed, lift, i, j, a, b, 0) - FILM_ON_LAND * film + wide) / wide, 0.0), 1.0)
         answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / thick[i, e, j] * state[i, e, j, 0]
     return answer
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vegglue.compilation import compiled
+from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 
 @compiled
@@ -13,7 +14,7 @@ def wet_depth(above: float, reach: float, film: float) -> float:
     idea of Defina 2000, doi:10.1029/2000WR900167), and h has a derivative everywhere. The f/10 that stays on dry land
     lets the water table run on below it.
     """
-    dry = 0.1 * film
+    dry = FILM_ON_LAND * film
     lifted = above - dry
     share = min(max(0.5 * lifted * (1.0 / reach) + 0.5, 0.0), 1.0)
     return dry + reach * share * share + max(lifted - reach, 0.0)

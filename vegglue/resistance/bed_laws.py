@@ -6,7 +6,7 @@ import numpy as np
 
 from vegglue.compilation import compiled
 from vegglue.resistance.elementary import cube_root, logarithm
-from vegglue.resistance.physical_constants import GRAVITY
+from vegglue.resistance.physical_constants import FILM_ON_LAND, GRAVITY
 
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
 LOG_SLOPE = 18.0 / math.log(10.0)
@@ -57,7 +57,7 @@ def class_drag(depth, reach, friction_class, law, coefficient, log_argument_mini
     doi:10.1002/wrcr.20324; but the wet part is asked once, at its mean depth, and not each depth as if the water beside
     it did not matter (`test_verification_banks`).
     """
-    (nx, ny, m), dry = depth.shape, 0.1 * film
+    (nx, ny, m), dry = depth.shape, FILM_ON_LAND * film
     drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))
     for c in range(law.size):
         _chezys(on_film[c], wet, dry, law[c], coefficient[c], log_argument_minimum)

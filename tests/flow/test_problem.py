@@ -1,0 +1,12 @@
+"""What a problem is given, and what it may not make up."""
+
+from dataclasses import MISSING, fields
+
+from vegglue.case.schema import Numerics
+from vegglue.flow.problem import Problem
+
+
+def test_choices_of_the_solver_have_their_defaults_in_the_schema() -> None:
+    default = {item.name: item.default for item in fields(Problem)}
+    assert default["film"] is default["log_argument_minimum"] is MISSING
+    assert (Numerics().film_depth, Numerics().bank_argument_minimum) == (0.01, 1.3)
