@@ -1,9 +1,47 @@
 """How loops are compiled: cached, and without the lock that would keep threads from running side by side."""
 
+import re
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
 from numba import njit
 
-# Products and sums may fuse. No flag that lets one compilation round otherwise than the next: the same numbers from a
-# cold and a warm cache.
-compiled = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
-# For eliminations, whose order of operations is part of the result.
-compiled_exactly = njit(cache=True, nogil=True, error_model="numpy")
+# Files that loops take constants and flags from, beside those that hold loops themselves.
+SHARED = ("compilation.py", "physical_constants.py")
+
+
+def compiled(loop: Callable[..., Any]) -> Any:
+    """A loop whose products and sums may fuse."""
+    # No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
+    return _fresh(njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")(loop))
+
+
+def compiled_exactly(loop: Callable[..., Any]) -> Any:
+    """A loop whose order of operations is part of the result: an elimination."""
+    return _fresh(njit(cache=True, nogil=True, error_model="numpy")(loop))
+
+
+def _fresh(loop: Any) -> Any:
+    """The loop, its cache stale as soon as any file it is made of changes: numba looks at the file of the loop only."""
+    index: Any = getattr(getattr(loop, "_cache", None), "_cache_file", None)
+    if hasattr(index, "_source_stamp"):  # documented nowhere: a numba without it caches as it always does
+        index._source_stamp = (index._source_stamp, _stamp(Path(loop.py_func.__code__.co_filename)))
+    return loop
+
+
+@cache
+def _stamp(file: Path) -> str:
+    """Hash of a file and of those it imports that hold loops, or constants and flags of loops."""
+    if not file.is_file():  # in an archive, which does not change
+        return ""
+    text = file.read_text(encoding="utf-8")
+    names = re.findall(r"^from vegglue\.([\w.]+) import", text, re.MULTILINE)
+    below = [file for name in names if _of_loops(file := Path(__file__).parent / f"{name.replace('.', '/')}.py")]
+    return sha256("".join([text, *map(_stamp, below)]).encode()).hexdigest()
+
+
+def _of_loops(file: Path) -> bool:
+    return file.name in SHARED or (file.is_file() and "compilation import compiled" in file.read_text(encoding="utf-8"))

@@ -1,0 +1,75 @@
+"""The cache of compiled loops: stale as soon as a file changes that a loop takes a function or a constant from."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from house import FILES, PACKAGE
+
+from vegglue.compilation import SHARED, _of_loops, _stamp
+
+CHEZY = """
+from vegglue.resistance.plant_laws import baptist_chezy
+print(baptist_chezy(1.0, 0.5, 1.0, 60.0), sum(baptist_chezy.stats.cache_hits.values()))
+"""
+
+
+def chezy(folder: Path, **environment: str) -> tuple[float, int]:
+    """C of a copy of the package in a process of its own, and how many compilations came from the cache."""
+    own = {"PYTHONPATH": str(folder), "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", CHEZY],
+        env=os.environ | own | environment, cwd=folder, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    value, hits = done.stdout.split()
+    return float(value), int(hits)
+
+
+@pytest.mark.parametrize("where", ["beside the code", "in a read-only folder", "where the user says"])
+def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, where: str) -> None:
+    copy = tmp_path / "vegglue"
+    for part in ("__init__.py", "version.py", "compilation.py", "resistance"):
+        source = PACKAGE / part
+        copy.mkdir(exist_ok=True)
+        if source.is_dir():
+            shutil.copytree(source, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(source, copy / part)
+    if where == "in a read-only folder":  # no folder for a cache can be made there
+        (copy / "resistance" / "__pycache__").write_text("")
+    elsewhere = {"NUMBA_CACHE_DIR": str(tmp_path / "own")} if where == "where the user says" else {}
+    first, again = chezy(tmp_path, **elsewhere), chezy(tmp_path, **elsewhere)
+    assert first[0] == again[0]
+    assert (first[1], again[1]) == (0, 1)
+    constants = copy / "resistance" / "physical_constants.py"
+    constants.write_text(constants.read_text().replace("KARMAN = 0.41", "KARMAN = 0.40"))
+    other = chezy(tmp_path, **elsewhere)
+    assert other[0] > first[0]
+    assert other[1] == 0
+
+
+def test_loops_use_nothing_of_the_package_but_loops_and_shared_constants() -> None:
+    """What else a loop took from another file would be frozen in its cache."""
+    for path in filter(_of_loops, FILES):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        foreign = {
+            alias.asname or alias.name
+            for node in tree.body
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vegglue.")
+            and not _of_loops(PACKAGE.parent / f"{node.module.replace('.', '/')}.py")
+            for alias in node.names
+        }  # fmt: skip
+        loops = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.decorator_list]
+        bodies = [part for loop in loops for statement in loop.body for part in ast.walk(statement)]
+        assert not foreign & {part.id for part in bodies if isinstance(part, ast.Name)}, path
+
+
+def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
+    assert {path.name for path in FILES if path.name in SHARED} == set(SHARED)
+    stamps = {name: _stamp(PACKAGE / name) for name in ("flow/kernels.py", "flow/wet_and_dry.py", "solver/batch.py")}
+    assert len(set(stamps.values())) == len(stamps)
+    assert _stamp(tmp_path / "nothing.py") == ""
