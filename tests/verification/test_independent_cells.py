@@ -5,7 +5,8 @@
 marched from the inflow to the first section of the fourth flow, at the true parameters; S such that the discharge is
 kept. A solver that converges has to differ from data that are not converged: here by the last centimetres of water,
 where the law of the bank is held at its floor (12 h / k_s below 1.3, h below 0.032 m) and which mixing over 0.5 m ties
-to the rest. The data's outermost wet cell is 0.07 m deep.
+to the rest. That floor is a convention of the data and of vegglue, which no agreement tests. The data's outermost wet
+cell is 0.07 m deep.
 """
 
 import json
