@@ -7,18 +7,23 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_diagnosis
-from matplotlib.axes import Axes
+from drawings import off_the_sheet, points, texts
 from matplotlib.colors import to_hex
+from matplotlib.image import imread
 
+from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import Rung, held_out, improvement
 from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
 from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones
+from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
 from vegglue.report.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
 from vegglue.report.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
 from vegglue.results.diagnosis import Diagnosis, Step
+from vegglue.site.polygons import corners_of
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 SUSPECTS = pd.DataFrame({
     "name": list("abcde"), "status": list(MARKS), "first": [40.0, -30.0, 9.0, 1.0, 0.5],
     "left": [np.nan, np.nan, 1.5, 0.2, np.nan], "visibility": [0.9, 0.5, 0.4, 0.3, 0.01],
@@ -29,10 +34,6 @@ def stations(**columns: object) -> pd.DataFrame:
     found = a_diagnosis()
     predictions = {"prediction_first": found.prediction_first, "prediction": found.prediction, "error": found.error}
     return found.station.assign(**predictions | columns)
-
-
-def texts(axes: Axes) -> list[str]:
-    return [text.get_text() for text in axes.texts]
 
 
 def test_standings_follow_the_verdict() -> None:
@@ -115,7 +116,24 @@ def test_places_mark_what_was_found() -> None:
 def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
     found = a_diagnosis()
     part = found.map_x[:places], found.map_y[:places], found.map_score[:places]
-    assert draw_places(*part, None, [], np.zeros((0, 2))).axes
+    (axes,) = draw_places(*part, None, [], np.array([[31.0, 0.5]])).axes
+    assert points(axes, ".") == [(31.0, 0.5)]
+    assert not axes.collections, "no contours"
+    assert texts(axes) == [], "no key of contours, and nothing found"
+
+
+def test_places_draw_contours_patches_and_stations() -> None:
+    found = a_diagnosis()
+    corners = np.array([[30.0, 0.0], [34.0, 0.0], [34.0, 0.5], [30.0, 0.5]])
+    spots = np.array([[31.0, 0.5], [35.0, -0.5]])
+    figure = draw_places(found.map_x, found.map_y, 9.0 * found.map_score, None, [Outline("p1", corners)], spots)
+    (axes,) = figure.axes
+    assert len(axes.collections) == 4, "more and less drag, faces and lines"
+    assert points(axes, ".") == [tuple(spot) for spot in spots]
+    assert np.array_equal(axes.patches[0].get_xy()[:4], corners)
+    assert points(axes, "*") == []
+    assert f"largest {9.0 * np.abs(found.map_score).max():.1f}" in " ".join(texts(axes))
+    assert off_the_sheet(figure) == []
 
 
 def test_suspects_differ_by_form_and_not_by_colour_alone() -> None:
@@ -154,8 +172,19 @@ def test_fingerprint_draws_each_experiment_across_each_section() -> None:
 def test_fingerprint_of_one_kind_of_measurement_is_a_file(tmp_path: Path, kind: str) -> None:
     station = a_diagnosis().station
     station = station[station["kind"] == kind]
-    save_fingerprint_figure(np.zeros(len(station)), station, "-", tmp_path / "figures" / "trace.png")
+    trace = np.zeros(len(station))
+    save_fingerprint_figure(trace, station, "-", tmp_path / "figures" / "trace.png")
     assert (tmp_path / "figures" / "trace.png").read_bytes().startswith(b"\x89PNG")
+    figure = draw_fingerprint(trace, station, "-")
+    (axes,) = figure.axes
+    along = "y" if kind == "velocity" else "x"
+    assert sorted(points(axes, ".")) == sorted((float(place), 0.0) for place in station[along])
+    assert axes.get_xlabel() == f"{along} [m]"
+    assert axes.get_ylabel() == ("change of u [m/s]" if kind == "velocity" else "change of level [m]")
+    low, high = axes.get_ylim()
+    assert low < 0.0 < high, "nothing changes, and the line that says so is inside"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["low", "high"]
+    assert off_the_sheet(figure) == []
 
 
 def alone(found: Diagnosis) -> Diagnosis:
@@ -168,13 +197,38 @@ def alone(found: Diagnosis) -> Diagnosis:
 
 @pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, a_diagnosis(where=None, steps=()), alone(a_diagnosis())])
 def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
-    assert diagnosis.sentence.split()[0] in draw_diagnosis(diagnosis, []).get_suptitle()
+    figure = draw_diagnosis(diagnosis, [])
+    assert off_the_sheet(figure) == []
+    assert figure.get_suptitle() == f"{diagnosis.name}: {diagnosis.verdict}. {diagnosis.sentence}"
+    scores, visible, alike, *rest = figure.axes
+    assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
+        one.name for one in diagnosis.suspects
+    }
+    assert sorted(bar.get_width() for bar in visible.patches) == sorted(one.visibility for one in diagnosis.suspects)
+    assert {label.get_text() for label in alike.get_yticklabels()} == set(diagnosis.cosine_names)
+    assert len(rest) == bool(len(diagnosis.zones)) + bool(diagnosis.map_x.size)
+    if len(diagnosis.zones):
+        assert len(texts(rest[0])) == 2 * len(diagnosis.zones)
+    if diagnosis.map_x.size:
+        assert len(points(rest[-1], "*")) == (diagnosis.where is not None)
+        assert set(points(rest[-1], ".")) == set(zip(diagnosis.station["x"], diagnosis.station["y"], strict=True))
+
+
+def test_a_sentence_too_long_for_the_screen_is_broken() -> None:
+    told = "A sentence of many words that goes on " * 12
+    figure = draw_diagnosis(a_diagnosis(sentence=told), [])
+    assert "\n" in figure.get_suptitle()
+    assert off_the_sheet(figure) == []
 
 
 def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
-    case = pytest.importorskip("test_report").a_toy(tmp_path).case
+    case = load_case(CONFIGS / "twin.yaml")
     save_diagnosis_figure(a_diagnosis(), case, tmp_path / "diagnosis.png")
-    assert (tmp_path / "diagnosis.png").read_bytes().startswith(b"\x89PNG")
+    height, width, _ = imread(tmp_path / "diagnosis.png").shape
+    assert (width, height) == (14 * 130, round(8.6 * 130))
+    outlines = [corners_of(patch) for patch in case.plants.patches]
+    drawn = draw_diagnosis(a_diagnosis(), [Outline("", corners) for corners in outlines]).axes[-1].patches
+    assert [patch.get_xy()[:4].tolist() for patch in drawn] == [corners.tolist() for corners in outlines]
 
 
 def a_rung(name: str, error: float, **changes: object) -> Rung:
@@ -216,3 +270,14 @@ def test_ladder_tells_parameters_that_move_from_those_that_stand_still() -> None
 def test_ladder_of_one_rung_is_a_file(tmp_path: Path, rungs: list[Rung]) -> None:
     save_ladder_figure(rungs, tmp_path / "runs" / "ladder.svg")
     assert "<svg" in (tmp_path / "runs" / "ladder.svg").read_text(encoding="utf-8")
+    figure = draw_ladder(rungs)
+    errors, *parameters = [axes for axes in figure.axes if axes.get_visible()]
+    (rung,) = rungs
+    expected = [held_out(rung), rung.rmse["velocity"]]  # in sample is drawn beside what was held out
+    assert points(errors) == [(1.0, value) for value in expected if np.isfinite(value)]
+    assert errors.get_ylim() == pytest.approx((0.0, 1.12 * np.nanmax(expected)))
+    assert [axes.get_title(loc="left").split("\n")[0] for axes in parameters] == list(rung.values)
+    for axes, (middle, low, high) in zip(parameters, rung.values.values(), strict=True):
+        assert points(axes) == [(1.0, middle)]
+        assert axes.collections[0].get_segments()[0][:, 1].tolist() == [low, high]
+    assert off_the_sheet(figure) == []

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from drawings import off_the_sheet, points, texts
 from matplotlib.colors import to_hex
 
 from vegglue.figures.measured import Bands, Vertical, draw_quantiles, draw_section, draw_verticals
@@ -34,6 +35,7 @@ from vegglue.figures.typography import (
     unit_math,
 )
 from vegglue.flow.sensor import FlowFields
+from vegglue.report.pictures import LONGEST_LABEL
 
 Y = np.array([3.0, 1.0, 2.0])  # not in order, as a table need not be
 BANDS = Bands(
@@ -123,7 +125,22 @@ def test_section_shows_what_was_not_used_hollow_and_why() -> None:
 def test_section_needs_no_standard_errors_and_no_total_band() -> None:
     nothing = np.full(3, np.nan)
     bands = Bands(BANDS.median, BANDS.model_50, BANDS.model_95, (nothing, nothing))
-    assert draw_section(stations(standard_error=np.nan), bands, None).axes
+    figure = draw_section(stations(standard_error=np.nan), bands, None)
+    (axes,) = figure.axes
+    assert points(axes) == [(3.0, 0.32), (1.0, 0.12), (2.0, 0.0)]
+    bars = [bar for drawn in axes.containers for bar in drawn.lines[2][0].get_segments()]
+    assert [float(np.ptp(bar[:, 1])) for bar in bars] == [0.0, 0.0, 0.0]
+    assert not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.is_dashed())
+    low, high = axes.get_ylim()
+    assert low < 0.0 < 0.35 < high
+    assert off_the_sheet(figure) == []
+
+
+def test_what_an_edge_cuts_off_is_seen() -> None:
+    figure = draw_weights(np.ones(8))
+    assert off_the_sheet(figure) == []
+    figure.text(0.98, 0.5, "too long a word")
+    assert len(off_the_sheet(figure)) == 1
 
 
 def test_verticals_stand_at_their_y_with_velocity_to_the_right() -> None:
@@ -140,15 +157,27 @@ def test_quantiles_pair_the_smallest_residual_with_the_smallest_quantile() -> No
     points = next(line for line in axes.lines if line.get_marker() == "o")
     assert list(points.get_ydata()) == [-1.0, 0.1, 2.0]
     assert points.get_xdata() == pytest.approx([-0.967, 0.0, 0.967], abs=1e-3)
-    assert {"a", "c"} <= {text.get_text() for text in axes.texts}
+    assert {"a", "c"} <= set(texts(axes))
 
 
 def test_marginal_marks_references_on_the_logarithmic_axis() -> None:
     values = np.geomspace(0.01, 100, 500)
-    figure = draw_marginal(unknown(values, 0.01, 100, True), np.ones(500), [ReferenceValue("paper", 10.0, 0.2, "D")])
-    marks = [line for line in figure.axes[0].lines if line.get_marker() == "D"]
-    assert marks[0].get_xdata() == pytest.approx([1.0])
-    assert figure.axes[0].get_xlim() == pytest.approx((-2, 2))
+    reference = ReferenceValue("A study, Table 3", 10.0, 0.2, "D")
+    figure = draw_marginal(unknown(values, 0.01, 100, True), np.ones(500), [reference])
+    (axes,) = figure.axes
+    assert [x for x, _ in points(axes, "D")] == pytest.approx([1.0])
+    assert "A study, Table 3" in texts(axes)
+    assert axes.get_xlim() == pytest.approx((-2, 2))
+    assert off_the_sheet(figure) == []
+
+
+def test_marginal_keeps_the_longest_label_on_the_sheet() -> None:
+    """A label as long as reports cut a source to, beside values all over the prior."""
+    values, name = np.linspace(0.0, 1.0, 500), "Wunderlich and Meyer (2020)"[:LONGEST_LABEL]
+    for place in (0.02, 0.49, 0.51, 0.98):
+        figure = draw_marginal(unknown(values, 0, 1), np.ones(500), [ReferenceValue(name, place, 0.1, "D")])
+        assert off_the_sheet(figure) == []
+        assert figure.axes[0].get_position().width > 0.8, "the label takes no room from the density"
 
 
 def test_marginal_draws_the_prior_from_its_own_values_or_not_at_all() -> None:
@@ -181,9 +210,19 @@ def test_joint_of_many_draws_shows_some_of_them() -> None:
 def test_all_weight_on_one_member_can_be_drawn() -> None:
     weights = np.eye(8)[3]
     values = np.linspace(1, 2, 8)
-    assert draw_weights(weights).axes
-    assert draw_joint(unknown(values, 0, 5), unknown(values, 0, 5), weights, []).axes
-    assert draw_cylinder(values, weights, values, 0.1, 10.0, "φ").axes
+    drawn = draw_weights(weights), draw_joint(unknown(values, 0, 5), unknown(values, 0, 5), weights, [])
+    (shares,), (joint,) = (figure.axes for figure in drawn)
+    assert texts(shares) == ["50 % in 1 members", "95 % in 1 members"]
+    assert shares.lines[0].get_ydata() == pytest.approx(1.0)
+    assert shares.get_xlim() == (1, 8)
+    assert np.asarray(joint.collections[0].get_offsets()) == pytest.approx(np.array([[values[3], values[3]]]))
+    cylinder = draw_cylinder(values, weights, values, 0.1, 10.0, "φ")
+    assert texts(cylinder.axes[0]) == ["rigid cylinders\n(plant survey)", "inferred\nfrom the flow"]
+    inferred = next(line for line in cylinder.axes[0].lines if line.get_color() == COLOUR["model"])
+    peak = inferred.get_xdata()[np.argmax(inferred.get_ydata())]
+    assert peak == pytest.approx(np.log10(values[3]), abs=0.02)
+    assert cylinder.axes[0].get_xlim() == pytest.approx((-1, 1))
+    assert [off_the_sheet(figure) for figure in (*drawn, cylinder)] == [[], [], []]
 
 
 def test_published_picture_stands_alone(tmp_path: Path) -> None:

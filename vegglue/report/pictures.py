@@ -28,7 +28,7 @@ from vegglue.report.posterior_words import how_known
 from vegglue.report.run import Run, picture
 
 MOST_PAIRS = 6  # of parameters drawn together
-LONGEST_LABEL = 32  # characters beside a mark that fit into half of a marginal
+LONGEST_LABEL = 24  # letters beside a mark, with which the axes of a marginal keep nine tenths of their width
 
 
 def pictures(run: Run) -> dict[str, list[Picture]]:
@@ -75,8 +75,8 @@ def _references(run: Run, name: str) -> list[ReferenceValue]:
 
 
 def _source(reference: Reference) -> str:
-    """Whose values they are, short enough for a label."""
-    return shorten(reference.source, LONGEST_LABEL, placeholder=" …") or "reference"
+    """Whose values they are: the first words of the source, as many as fit beside a mark."""
+    return shorten(reference.source, LONGEST_LABEL, placeholder="").rstrip(" ,;:") or "reference"
 
 
 def _marginal(run: Run, name: str) -> Picture:

@@ -1,0 +1,39 @@
+"""The channel that `vegglue check` draws: what stands in it is what the case and its measurements say."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawings import off_the_sheet, points, texts
+
+from vegglue.case.config import load_case
+from vegglue.figures.channel import MARGIN_OF_BED, draw_channel
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+from vegglue.site.polygons import corners_of
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.parametrize("name", ["twin", "d3a"])
+def test_the_channel_shows_patches_stations_and_boundaries_where_they_are(name: str) -> None:
+    case = load_case(CONFIGS / f"{name}.yaml")
+    site, observations = build_site(case), read_observations(case)
+    figure = draw_channel(case, site, observations)
+    whole, reach, across = figure.axes
+    table, corners = observations.table, [corners_of(patch) for patch in case.plants.patches]
+    for marker, rows in (("o", table[table["used"]]), ("x", table[~table["used"]])):
+        assert sorted(points(reach, marker)) == sorted(zip(rows["x"], rows["y"], strict=True))
+    assert np.array_equal(whole.images[0].get_array(), site.friction_class.T)
+    filled = [patch for patch in reach.patches if patch.get_fill()]
+    assert [patch.get_xy()[:4].tolist() for patch in filled] == [each.tolist() for each in corners]
+    assert {patch.name for patch in case.plants.patches} <= set(texts(reach))
+    assert {"upstream", "outlet"} <= set(texts(whole))
+    assert (whole.get_xlim(), whole.get_ylim()) == (case.grid.x, case.grid.y)
+    along = [*table["x"], *np.concatenate(corners)[:, 0]]
+    expected = max(case.grid.x[0], min(along) - MARGIN_OF_BED), min(case.grid.x[1], max(along) + MARGIN_OF_BED)
+    assert reach.get_xlim() == pytest.approx(expected)
+    middle = int(np.abs(site.grid.x - 0.5 * sum(expected)).argmin())
+    assert np.array_equal(across.lines[0].get_ydata(), site.bed[middle])
+    assert set(case.experiments) <= set(texts(across))
+    assert off_the_sheet(figure) == []
