@@ -210,7 +210,7 @@ def test_an_ensemble_without_a_solved_member_is_told(reach: tuple[Case, Observat
     )
     case = case.model_copy(update={"infer": case.infer.model_copy(update={"sigma": rule})})
     with pytest.raises(InputError, match=f"none of the {len(none.status)} members was solved"):
-        refine(none, case, observations, jobs=1)
+        refine(none, case, observations)
 
 
 def test_ends_of_the_search_are_counted_once() -> None:
