@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.markup import escape
 from rich.table import Table
 
 from vegglue.case.config import load_case
@@ -205,7 +204,7 @@ def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
                 "chi2 / n", "held out (section)", "fell by", "held out (exp.)", "log score", "in 50 %", "in 95 %",
                 "validation")  # fmt: skip
     for heading in headings:
-        table.add_column(escape(heading), justify="left" if heading == "model" else "right")
+        table.add_column(heading, justify="left" if heading == "model" else "right")
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
         table.add_row(
