@@ -80,6 +80,6 @@ def test_held_out_errors_are_those_of_calibrating_without_the_section(slope: Arr
     station = base.model.station.assign(used=~out)
     white, kept = slope[~out] / 0.01, values[~out] / 0.01
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ kept)
-    assert found.sections[out] == pytest.approx(values[out] - slope[out] @ z)
+    assert found.held_out.sections[out] == pytest.approx(values[out] - slope[out] @ z)
     without = rung(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
-    assert without.stations == (~out).sum()
+    assert without.in_sample.stations == (~out).sum()

@@ -2,11 +2,9 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 from rich.table import Table
 
@@ -15,14 +13,15 @@ from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
 from vegglue.cli.options import Config, Jobs, Json, Runs, Trust, console, number_given, say_on
-from vegglue.diagnosis.comparison import Rung, held_out, improvement
+from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement, rung_json
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth
 from vegglue.errors import InputError
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.field_folder import case_from_folder
-from vegglue.results.diagnosis import Diagnosis, diagnosis_json
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.workflow.loop import (
     child_path,
     diagnosed,
@@ -114,7 +113,7 @@ def compare_command(
     picture = folder_of(runs, cases[-1]) / "ladder.png"
     save_ladder_figure(rungs, picture)
     if as_object:
-        told = {"rungs": [_rung_json(one) for one in rungs], "left_out": aside.to_dict("records")}
+        told = {"rungs": [rung_json(one) for one in rungs], "left_out": aside.to_dict("records")}
         print(json.dumps(told, ensure_ascii=False))
         return
     _show_ladder(rungs, exclusion_in_words(aside))
@@ -171,9 +170,9 @@ def _default_target(folder: Path) -> Path:
 
 
 def _tell(found: Diagnosis) -> None:
-    console.print(found.verdict, style="bold", end=": ")
-    console.print(found.sentence)
-    for remark in found.remarks:
+    console.print(found.verdict.kind, style="bold", end=": ")
+    console.print(found.verdict.sentence)
+    for remark in found.verdict.remarks:
         console.print(f"- {remark}")
     table = Table(box=None, pad_edge=False, header_style="bold")
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
@@ -181,19 +180,19 @@ def _tell(found: Diagnosis) -> None:
         table.add_column(heading, justify="left" if heading == "effect" else "right")
     for one in found.suspects[:10]:
         share = f"{found.chances[one.name]:.0%}" if one.name in found.chances else ""
-        low, high = one.interval95
-        p_family = f"< {one.p_family:.1g}" if one.p_family < 5e-4 else f"{one.p_family:.2g}"
-        unit = one.unit.removesuffix("-")
+        amplitude, test, detectability = one.amplitude, one.test, one.detectability
+        low, high = amplitude.interval95
+        p_family = f"< {test.p_family:.1g}" if test.p_family < 5e-4 else f"{test.p_family:.2g}"
+        unit = amplitude.unit.removesuffix("-")
         table.add_row(
-            one.name, share, f"{one.amplitude:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{one.score:+.1f}",
-            p_family, f"{one.visibility:.2f}", f"{one.smallest_detectable:.2g}",
+            one.name, share, f"{amplitude.value:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{test.score:+.1f}",
+            p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
         )  # fmt: skip
     console.print(table)
-    if found.flagged:
-        for row in found.flagged:
-            station = found.station.iloc[row]
-            place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
-            console.print(f"- set aside: {place}, measured {station['value']:g}")
+    for row in found.errors.flagged:
+        station = found.predictions.station.iloc[row]
+        place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
+        console.print(f"- set aside: {place}, measured {station['value']:g}")
 
 
 def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
@@ -204,16 +203,18 @@ def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
         table.add_column(heading, justify="left" if heading == "model" else "right")
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
+        seen, scores = one.in_sample, one.predictive
         table.add_row(
-            one.name, str(one.parameters), f"{one.rmse['velocity']:.4f}", f"{one.rmse['level']:.4f}",
-            f"{one.chi2:.0f} / {one.stations}", f"{held_out(one):.4f}", gain, f"{held_out(one, 'experiments'):.4f}",
-            f"{one.log_score:.2f}", f"{one.inside50:.0%}", f"{one.inside95:.0%}", f"{one.validation:.4f}",
+            one.name, str(len(one.values)), f"{seen.rmse['velocity']:.4f}", f"{seen.rmse['level']:.4f}",
+            f"{seen.chi2:.0f} / {seen.stations}", f"{held_out_rmse(one):.4f}", gain,
+            f"{held_out_rmse(one, 'experiments'):.4f}", f"{scores.log_score:.2f}", f"{scores.inside50:.0%}",
+            f"{scores.inside95:.0%}", f"{one.validation:.4f}",
         )  # fmt: skip
     console.print(table)
     if rungs:
         console.print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
-            f"{rungs[-1].noise_floor:.4f} m/s."
+            f"{rungs[-1].in_sample.noise_floor:.4f} m/s."
         )
     if note:
         console.print(note)
@@ -237,14 +238,6 @@ def _show_next(found: Sequence[tuple[str, Sequence[MeasurementWorth]]]) -> None:
         for one in useful[:4]:
             plan = one.plan
             console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
-
-
-def _rung_json(one: Rung) -> dict[str, Any]:
-    tree = {name: value for name, value in asdict(one).items() if not isinstance(value, np.ndarray) and name != "place"}
-    tree["held_out_sections"], tree["held_out_experiments"] = held_out(one), held_out(one, "experiments")
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
-    }
 
 
 def _question_json(what: str, worths: Sequence[MeasurementWorth]) -> dict[str, Any]:
