@@ -1,5 +1,5 @@
 """What a calibrated model may lack: candidates, the fingerprint each would leave, and score tests of the residual.
 
 May import: effects, case, site, engine, calibration.
-Open first: candidates.py, score_test.py.
+Open first: candidates.py, residual_screening.py.
 """

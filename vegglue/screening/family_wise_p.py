@@ -9,8 +9,13 @@ scores of draw b.
 The fitted one decides: its logarithm still ranks families where no draw reaches T. It is Sidak's (1967,
 doi:10.1080/01621459.1967.10482935; not checked against it) for m independent tests; m is the effective number of tests
 that correlated scores amount to. The counted one is told beside each effect: it assumes no form of the tail, and is
-never below 1 / (1 + draws). Near 0.05 both agree by construction. Above, the fitted one is the larger, and below the
-smaller one, as correlated scores amount to more tests the further out they are compared.
+never below 1 / (1 + draws).
+
+Both agree near 0.05, to the 8 % that 3,000 draws leave open. Further out correlated scores amount to more tests than m:
+against 400,000 draws of configs/twin.yaml the fitted p is 0.97 of the true one at 0.04, 0.87 at 0.01 and 0.78 at 0.002
+for effects, 1.09, 0.88 and 0.68 for spots of drag, and right for stations. So false alarms are as rare as stated at the
+first step and up to half more frequent at later ones. Nearer to 1 the fitted p is the larger one; nothing is decided
+there.
 """
 
 from dataclasses import dataclass, replace
@@ -44,7 +49,7 @@ class Family:
 
     @property
     def effective_tests(self) -> float:
-        """m = -ln(1 - p) / P(chi2_1 >= q), p = FITTED_AT and q the 1 - p point of the maxima [-]."""
+        """m = -ln(1 - p) / P(chi2_1 >= q), to first order in P [-]; p = FITTED_AT, q the 1 - p point of the maxima."""
         point = np.quantile(self.maxima, 1.0 - FITTED_AT)
         return float(-np.log(1.0 - FITTED_AT) / scipy.stats.chi2.sf(point, 1))
 
@@ -77,12 +82,18 @@ def family_of(projected: score_test.Projected, one_sided: np.ndarray, errors: Ar
 
 
 def family_p(score: float, maxima: Array) -> float:
-    """P(max_j T_j^2 >= T^2) under the null, (1 + count) / (1 + draws); maxima: T_b^2 (draws,)."""
+    """P(max_j T_j^2 >= T^2) under the null, (1 + count) / (1 + draws); maxima: T_b^2 (draws,).
+
+    To be told, not to be decided by: uniform under the null, but 1 / (1 + draws) for every T that no draw reaches.
+    """
     return float((1 + np.sum(maxima >= score**2)) / (1 + maxima.size))
 
 
 def log_family_p(score: float, tests: float) -> float:
-    """ln(1 - (1 - P(chi2_1 >= T^2))^m) of a score T and m effective tests; m P(...) where that is small."""
+    """ln(1 - (1 - P(chi2_1 >= T^2))^m) of a score T and m effective tests; m P(...) where that is small.
+
+    To be decided by: agrees with `family_p` near 0.05, and goes on where no draw reaches.
+    """
     log_tail = float(scipy.stats.chi2.logsf(score**2, 1))
     log_p = np.log(tests) + log_tail
     if log_p > -4.0:
