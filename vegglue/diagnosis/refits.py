@@ -33,7 +33,9 @@ IN_SET, HARDLY = 0.95, 0.05
 
 @dataclass(frozen=True)
 class Refit:
-    """The search model with one effect more at its best place; column: its fingerprint; amplitude with its 95 % interval."""
+    """The search model with one effect more at its best place; column: its fingerprint; amplitude with its 95 %
+    interval.
+    """
 
     candidate: Candidate
     column: int
