@@ -6,22 +6,55 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from vegglue.results.diagnosis import Diagnosis, Step, Suspect, Where
+from vegglue.results.diagnosis import (
+    AmplitudeEstimate,
+    Detectability,
+    Diagnosis,
+    DragLocation,
+    DragMap,
+    EstimatedErrors,
+    FirstScreening,
+    Misfit,
+    ParameterEstimates,
+    Predictions,
+    ScoreTest,
+    Step,
+    Suspect,
+    Verdict,
+)
 
 STATIONS = 6
+PARTS = ("verdict", "misfit", "errors", "first_screening", "parameters", "predictions", "drag_map")
+PARTS_OF_SUSPECT = ("amplitude", "test", "detectability")
 
 
-def a_suspect(name: str, **changes: Any) -> Suspect:
+def changed(whole: Any, parts: tuple[str, ...], changes: dict[str, dict[str, Any]]) -> Any:
+    """The value with some fields of some of its parts replaced: changes = {part: {field: value}}."""
+    assert set(changes) <= set(parts)
+    return replace(whole, **{part: replace(getattr(whole, part), **fields) for part, fields in changes.items()})
+
+
+def a_suspect(name: str, shapes: dict[str, float] | None = None, **parts: dict[str, Any]) -> Suspect:
+    """parts: fields to be changed, e.g. test={"score": 0.3}."""
     suspect = Suspect(
-        name=name, title="Störung – größer als 0", unit="m2/s", amplitude=0.1 + 0.2, interval95=(-np.inf, 1 / 3),
-        score=7.3, p_family=0.0002, visibility=0.9, smallest_detectable=0.05, testable=True, refitted=False,
-        objective=210.0, mimicked_by="k_s", likeness=-0.4, shapes={}, off=0.0, scale=0.5,
+        name=name, title="Störung – größer als 0", shapes=shapes or {},
+        amplitude=AmplitudeEstimate(
+            value=0.1 + 0.2, interval95=(-np.inf, 1 / 3), unit="m2/s", off=0.0, scale=0.5, refitted=False,
+            objective=210.0,
+        ),
+        test=ScoreTest(score=7.3, p_family=0.0002),
+        detectability=Detectability(visibility=0.9, smallest=0.05, testable=True, confounder="k_s", cosine=-0.4),
     )  # fmt: skip
-    return replace(suspect, **changes)
+    return changed(suspect, PARTS_OF_SUSPECT, parts)
 
 
-def a_diagnosis(**changes: Any) -> Diagnosis:
-    """Two experiments, one section and a gauge each; an effect accepted, a rival, one less likely, one untestable."""
+def a_diagnosis(
+    suspects: tuple[Suspect, ...] | None = None, steps: tuple[Step, ...] | None = None, **parts: dict[str, Any]
+) -> Diagnosis:
+    """Two experiments, one section and a gauge each; an effect accepted, a rival, one less likely, one untestable.
+
+    parts: fields to be changed, e.g. verdict={"kind": "identified"}.
+    """
     random = np.random.default_rng(3)
     station = pd.DataFrame({
         "experiment": ["low"] * 3 + ["high"] * 3, "kind": ["velocity", "velocity", "level"] * 2,
@@ -34,30 +67,40 @@ def a_diagnosis(**changes: Any) -> Diagnosis:
         "stations": [2, 1, 2], "mean": [0.02, -0.001, np.nan], "standard_error": [0.004, 0.002, 0.004],
         "chi2": [11.0, 0.3, 2.0],
     })  # fmt: skip
-    names = ("eddies", "mixing[D3]", "wind")
-    diagnosis = Diagnosis(
-        name="open-x", verdict="one-of", sentence="Missing: eddies of 0.3 m²/s.", remarks=("Fehler zählen – doppelt.",),
-        suspects=(
-            a_suspect("eddies", refitted=True), a_suspect("mixing[D3]", refitted=True, shapes={"width": 0.1}),
-            a_suspect("wind", testable=False, score=0.3, p_family=1.0), a_suspect("turning", score=-1.0, p_family=0.7),
-        ),
-        steps=(Step("eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0),),
-        not_excluded=(), where=Where(33.0, -0.6, ("low", "high"), 0.4, 12.0),
-        chi2_first=2300.5, chi2=5.1, freedom=3, p_misfit=0.2,
-        correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,), threshold=3.4,
-        first_scores={"eddies": 45.2, "mixing[D3]": 43.0, "wind": 0.3, "turning": -1.0},
-        first_parameters={"n_b": 0.035}, parameters={"n_b": (0.03, 0.02, 0.04)},
-        zones=zones, station=station, prediction_first=random.random(STATIONS), prediction=random.random(STATIONS),
-        error=np.array([0.01, 0.01, 0.002, 0.01, 0.01, np.nan]), map_x=np.repeat([30.0, 33.0, 36.0], 2),
-        map_y=np.tile([-0.6, 0.6], 3), map_score=random.normal(size=6), cosine_names=names,
-        cosine=np.array([[1, 0.96, 0.1], [0.96, 1, 0.2], [0.1, 0.2, 1]]), version="0.1.0",
+    refitted = {"refitted": True}
+    usual = (
+        a_suspect("eddies", amplitude=refitted), a_suspect("mixing[D3]", {"width": 0.1}, amplitude=refitted),
+        a_suspect("wind", test={"score": 0.3, "p_family": 1.0}, detectability={"testable": False}),
+        a_suspect("turning", test={"score": -1.0, "p_family": 0.7}),
     )  # fmt: skip
-    return replace(diagnosis, **changes)
+    step = Step("eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0)
+    diagnosis = Diagnosis(
+        name="open-x", version="0.1.0", suspects=usual if suspects is None else suspects,
+        steps=(step,) if steps is None else steps,
+        verdict=Verdict(
+            "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
+            DragLocation(33.0, -0.6, ("low", "high"), 0.4, 12.0), not_excluded=(),
+        ),
+        misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
+        errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),
+        predictions=Predictions(
+            station, first=random.random(STATIONS), last=random.random(STATIONS),
+            error=np.array([0.01, 0.01, 0.002, 0.01, 0.01, np.nan]),
+        ),
+        drag_map=DragMap(np.repeat([30.0, 33.0, 36.0], 2), np.tile([-0.6, 0.6], 3), random.normal(size=6)),
+        first_screening=FirstScreening(
+            3.4, {"eddies": 45.2, "mixing[D3]": 43.0, "wind": 0.3, "turning": -1.0}, ("eddies", "mixing[D3]", "wind"),
+            cosine=np.array([[1, 0.96, 0.1], [0.96, 1, 0.2], [0.1, 0.2, 1]]),
+        ),
+        parameters=ParameterEstimates({"n_b": 0.035}, {"n_b": (0.03, 0.02, 0.04)}),
+    )  # fmt: skip
+    return changed(diagnosis, PARTS, parts)
 
 
 NOTHING = a_diagnosis(
-    verdict="nothing-missing", suspects=(), steps=(), where=None, flagged=(), remarks=(), parameters={},
-    first_scores={}, first_parameters={},
-    zones=pd.DataFrame(), map_x=np.zeros(0), map_y=np.zeros(0), map_score=np.zeros(0), cosine_names=(),
-    cosine=np.zeros((0, 0)), p_misfit=np.nan,
+    suspects=(), steps=(), verdict={"kind": "nothing-missing", "location": None, "remarks": ()},
+    misfit={"zones": pd.DataFrame(), "p": np.nan}, errors={"flagged": ()}, parameters={"first": {}, "last": {}},
+    first_screening={"scores": {}, "compared": (), "cosine": np.zeros((0, 0))},
+    drag_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
 )  # fmt: skip
+NO_LOCATION = a_diagnosis(verdict={"location": None})

@@ -6,40 +6,24 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.fit import Fitted, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import homogeneity, rung
-from vegglue.engine.interface import Model, Point
-from vegglue.engine.newton import NEWTON
-from vegglue.site.gridded_site import build_site
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 SECTIONS, POINTS = ("A", "B", "C"), 6
 
 
 def stations() -> pd.DataFrame:
-    rows = [
-        {"experiment": experiment, "kind": "velocity", "section": section, "x": 10.0, "y": float(y)}
-        for experiment in CASE.experiments
-        for section in SECTIONS
-        for y in range(POINTS)
-    ]
-    return pd.DataFrame(rows).assign(standard_error=0.01, used=True, reason="", depth=np.nan, device="")
+    return stations_of(CASE, SECTIONS, POINTS)
 
 
-def at_best(values: Array, slope: Array) -> Baseline:
-    """The baseline of prediction = slope z at its best place."""
-    station = stations().assign(value=values)
-    noise = noise_of(station)
-    white = slope / 0.01
-    z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ values / 0.01)
-    point = Point(z, slope @ z, slope, {})
-    fitted = Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), True)
-    return Baseline(Model(CASE, build_site(CASE), station, NEWTON), noise, fitted, None, None)
+def calibrated(values: Array, slope: Array) -> Baseline:
+    return at_best(CASE, stations(), values, slope)
 
 
 @pytest.fixture
@@ -55,11 +39,11 @@ def measured(slope: Array, truth: Array) -> Array:
 
 def test_a_parameter_that_differs_between_experiments_is_named(slope: Array) -> None:
     truth = np.zeros(slope.shape)
-    alike = homogeneity(at_best(measured(slope, truth), slope))
+    alike = homogeneity(calibrated(measured(slope, truth), slope))
     assert set(alike) == set(CASE.parameters)
     assert min(alike.values()) > 0.01
     truth[stations()["experiment"] == "high", 1] = 0.6
-    apart = homogeneity(at_best(measured(slope, truth), slope))
+    apart = homogeneity(calibrated(measured(slope, truth), slope))
     named = list(CASE.parameters)[1]
     assert min(apart, key=lambda name: apart[name]) == named
     assert apart[named] < 1e-6
@@ -68,18 +52,18 @@ def test_a_parameter_that_differs_between_experiments_is_named(slope: Array) -> 
 
 def test_what_an_experiment_does_not_tell_is_left_out(slope: Array) -> None:
     slope[stations()["experiment"] != "high", 0] = 0.0
-    told = homogeneity(at_best(measured(slope, np.zeros(slope.shape)), slope))
+    told = homogeneity(calibrated(measured(slope, np.zeros(slope.shape)), slope))
     assert set(told) == set(CASE.parameters) - {next(iter(CASE.parameters))}
 
 
 def test_held_out_errors_are_those_of_calibrating_without_the_section(slope: Array) -> None:
     values = measured(slope, 0.2 * np.ones(slope.shape))
-    base = at_best(values, slope)
+    base = calibrated(values, slope)
     found = rung(base)
     out = (stations()["section"] == "B").to_numpy()
     station = base.model.station.assign(used=~out)
     white, kept = slope[~out] / 0.01, values[~out] / 0.01
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ kept)
-    assert found.sections[out] == pytest.approx(values[out] - slope[out] @ z)
+    assert found.held_out.sections[out] == pytest.approx(values[out] - slope[out] @ z)
     without = rung(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
-    assert without.stations == (~out).sum()
+    assert without.in_sample.stations == (~out).sum()

@@ -17,6 +17,7 @@ from vegglue.cli.loop_commands import compare_command
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.hdf5 import write_diagnosis
 from vegglue.workflow import loop, run_folder
 
@@ -28,10 +29,12 @@ def model() -> Model:
     return run_folder.model_in(load_case(CONFIG))
 
 
+def flagging(model: Model, *rows: int) -> Diagnosis:
+    return a_diagnosis(predictions={"station": model.station}, errors={"flagged": rows})
+
+
 def test_flagged_measurements_are_not_used_and_all_others_are(model: Model) -> None:
-    aside = excluded_by(
-        a_diagnosis(station=model.station, flagged=(3, 20)), a_diagnosis(station=model.station, flagged=(3,))
-    )
+    aside = excluded_by(flagging(model, 3, 20), flagging(model, 3))
     assert len(aside) == 2
     used = excluding(model, aside).station["used"]
     assert np.flatnonzero(model.station["used"] & ~used).tolist() == [3, 20]
@@ -41,15 +44,13 @@ def test_flagged_measurements_are_not_used_and_all_others_are(model: Model) -> N
 
 
 def test_what_is_left_out_is_said(model: Model) -> None:
-    one = excluded_by(a_diagnosis(station=model.station, flagged=(3,)))
+    one = excluded_by(flagging(model, 3))
     station = model.station.iloc[3]
     assert exclusion_in_words(one) == (
         "1 station is left out of every model, as the diagnosis set it aside: "
         f"{station['experiment']} {station['section']} at x = {station['x']:g}, y = {station['y']:g} m."
     )
-    assert exclusion_in_words(excluded_by(a_diagnosis(station=model.station, flagged=(3, 4)))).startswith(
-        "2 stations are left"
-    )
+    assert exclusion_in_words(excluded_by(flagging(model, 3, 4))).startswith("2 stations are left")
     assert exclusion_in_words(excluded_by()) == ""
 
 
@@ -71,7 +72,7 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
     monkeypatch.setattr("vegglue.workflow.loop.baseline", quickly)
     stations = int(model.station["used"].sum())
     for flagged, said in (((), 0), ((3, 20), 2)):
-        found = a_diagnosis(station=model.station, flagged=flagged)
+        found = flagging(model, *flagged)
         (runs / case.name).mkdir(parents=True, exist_ok=True)
         write_diagnosis(runs / case.name / "diagnosis.h5", found, "", case_hash(case))
         compare_command([CONFIG, child.source], runs)
@@ -85,6 +86,6 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
 def test_a_diagnosis_of_another_state_of_the_case_leaves_nothing_out(model: Model, tmp_path: Path) -> None:
     case = load_case(CONFIG)
     (tmp_path / case.name).mkdir()
-    found = a_diagnosis(station=model.station, flagged=(3,))
+    found = flagging(model, 3)
     write_diagnosis(tmp_path / case.name / "diagnosis.h5", found, "", "e" * 64)
     assert loop.left_out([case], tmp_path).empty

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vegglue.diagnosis import refits
-from vegglue.screening import score_test
+from vegglue.diagnosis.refits import rivals_among
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 
@@ -16,12 +15,8 @@ def kept(fall: list[float], alike: dict[tuple[int, int], float]) -> Kept:
     cosine = np.eye(len(fall))
     for (i, j), value in alike.items():
         cosine[i, j] = cosine[j, i] = value
-    units = np.linalg.cholesky(cosine).T  # unit columns with these cosines
-    seen = SimpleNamespace(
-        projected=score_test.Projected(units, units[0], units, np.ones(len(fall)), np.ones(len(fall)))
-    )
     tried = [SimpleNamespace(column=j, candidate=SimpleNamespace(name="abcdef"[j])) for j in range(len(fall))]
-    return refits._rivals(seen, tried, np.array(fall))
+    return rivals_among(tried, np.array(fall), cosine)
 
 
 def test_what_is_clearly_best_stands_alone() -> None:

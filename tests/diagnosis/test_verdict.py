@@ -1,18 +1,17 @@
 """From what was found to a verdict in words: when it names, when it only remarks, and when it cannot tell."""
 
-from dataclasses import replace
-
 import numpy as np
+import pandas as pd
 import pytest
-from diagnoses import a_diagnosis, a_suspect
+from diagnoses import a_suspect
 
-from vegglue.calibration.noise import noise_of
-from vegglue.diagnosis.verdict import Misfit, judged
-from vegglue.results.diagnosis import Step, Suspect, Where
+from vegglue.diagnosis.conclusion import chance_of_misfit
+from vegglue.diagnosis.verdict import judged
+from vegglue.results.diagnosis import DragLocation, EstimatedErrors, Misfit, Step, Suspect
 
-STATION = a_diagnosis().station
-FITS, MISSES = Misfit(5.0, 5), Misfit(80.0, 5)
-NONE = a_suspect("wind", score=0.4)
+AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
+FITS, MISSES = (Misfit(chi2, chi2, 5, chance_of_misfit(chi2, 5), pd.DataFrame()) for chi2 in (5.0, 80.0))
+NONE = a_suspect("wind", test={"score": 0.4})
 
 
 def step(*rivals: str) -> Step:
@@ -24,15 +23,22 @@ Groups = tuple[tuple[str, ...], ...]
 
 
 def said(
-    steps: list[Step], suspects: list[Suspect], place: Where | None, fit: Misfit, still: Groups = (), alone: str = ""
+    steps: list[Step],
+    suspects: list[Suspect],
+    location: DragLocation | None,
+    misfit: Misfit,
+    still: Groups = (),
+    alone: str = "",
+    errors: EstimatedErrors = AS_STATED,
 ) -> tuple[str, str, str]:
-    verdict, sentence, remarks = judged(noise_of(STATION), steps, suspects, place, fit, (), still, alone)
-    return verdict, sentence, " ".join(remarks)
+    found = judged(errors, misfit, steps, suspects, location, still, alone)
+    assert (found.location, found.not_excluded) == (location, still)
+    return found.kind, found.sentence, " ".join(found.remarks)
 
 
 def test_nothing_is_missing_only_where_it_would_be_seen() -> None:
     assert said([], [NONE], None, FITS)[0] == "nothing-missing"
-    blind = [replace(NONE, testable=False)] * 9
+    blind = [a_suspect("wind", detectability={"testable": False})] * 9
     assert said([], [NONE, *blind], None, FITS)[0] == "cannot-tell"
     assert said([], [NONE], None, MISSES)[0] == "cannot-tell"
 
@@ -72,18 +78,40 @@ def test_rivals_are_told_with_their_chances() -> None:
 
 
 def test_an_implausible_size_is_remarked() -> None:
-    usual, huge = a_suspect("a", amplitude=0.9, scale=0.5), a_suspect("a", amplitude=-0.34, scale=0.1)
+    usual = a_suspect("a", amplitude={"value": 0.9, "scale": 0.5})
+    huge = a_suspect("a", amplitude={"value": -0.34, "scale": 0.1})
     assert "plausible" not in said([step("a")], [usual], None, FITS)[2]
     assert "3.4 times what is plausible" in said([step("a")], [huge], None, FITS)[2]
 
 
 def test_a_place_wins_over_steps() -> None:
-    place = Where(33.0, -0.6, ("low",), 0.4, 12.0)
-    verdict, sentence, _ = said([step("a")], [a_suspect("a")], place, MISSES)
+    location = DragLocation(33.0, -0.6, ("low",), 0.4, 12.0)
+    verdict, sentence, _ = said([step("a")], [a_suspect("a")], location, MISSES)
     assert verdict == "none-of-these"
     assert "after a: the misfit points at x = 33.0, y = -0.6 m" in sentence
 
 
 def test_the_chance_of_a_misfit() -> None:
-    assert Misfit(5.0, 5).p == pytest.approx(0.4159, abs=1e-3)
-    assert np.isfinite(Misfit(0.0, 0).p)
+    assert chance_of_misfit(5.0, 5) == pytest.approx(0.4159, abs=1e-3)
+    assert np.isfinite(chance_of_misfit(0.0, 0))
+
+
+def test_what_is_left_too_large_is_remarked_after_a_step_only() -> None:
+    left = "left is still larger than the errors allow"
+    assert left in said([step("a")], [a_suspect("a")], None, MISSES)[2]
+    assert left not in said([step("a")], [a_suspect("a")], None, FITS)[2]
+    assert left not in said([], [NONE], None, MISSES)[2]
+    assert left not in said([step(*"abcd")], [a_suspect(name) for name in "abcd"], None, MISSES)[2]
+
+
+def test_errors_that_are_not_as_stated_are_remarked() -> None:
+    remarks = said([], [NONE], None, FITS, errors=EstimatedErrors(0.4, 1.5, 0.0, (3, 4)))[2]
+    assert "correlated by 0.40" in remarks
+    assert "too small by a factor of 1.50" in remarks
+    assert "2 stations stand alone" in remarks
+    assert said([], [NONE], None, FITS)[2] == ""
+
+
+def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:
+    hidden = a_suspect("wind", detectability={"testable": False, "cosine": -0.9})
+    assert "wind (looks like a change of k_s)" in said([], [hidden], None, FITS)[2]

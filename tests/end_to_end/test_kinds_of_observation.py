@@ -13,7 +13,7 @@ from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import held_out, rung
+from vegglue.diagnosis.comparison import held_out_rmse, rung
 from vegglue.diagnosis.diagnose import diagnose
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
@@ -141,7 +141,7 @@ def test_check_has_nothing_against_the_stations(line: Line) -> None:
 
 
 def test_a_diagnosis_tells_zones_of_each_kind_apart(line: Line) -> None:
-    zones = line.diagnosis.zones
+    zones = line.diagnosis.misfit.zones
     assert {"floor", "floor (v)", "floor (speed)", "level", "discharge"} <= set(zones["zone"])
     assert set(zones.loc[zones["zone"] == "discharge", "section"]) == {"discharges"}
     assert zones["stations"].sum() == len(places())
@@ -151,8 +151,8 @@ def test_a_diagnosis_tells_zones_of_each_kind_apart(line: Line) -> None:
 def test_models_are_compared_and_measurements_planned(line: Line) -> None:
     base = baseline(model_of(line.case, line.observations))
     found = rung(base)
-    assert found.velocity.sum() == 12, "errors in m/s are those of velocities along x"
-    assert np.isfinite([held_out(found), *found.rmse.values()]).all()
+    assert found.held_out.velocity.sum() == 12, "errors in m/s are those of velocities along x"
+    assert np.isfinite([held_out_rmse(found), *found.in_sample.rmse.values()]).all()
     save_ladder_figure([found], line.folder / "ladder.png")
     wind, *_ = [one for one in candidates_of(line.case, line.observations.table) if one.name == "wind"]
     plans = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [[(wind, {}, 1.0)]])[0]
@@ -194,8 +194,8 @@ def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
     """Scores that speak of velocities along x have nothing to say, and say so."""
     assert other.posterior.marginals.sd["q"] < 0.04
     found = rung(baseline(model_of(other.case, other.observations)))
-    assert np.isnan([held_out(found), found.rmse["velocity"], found.rmse["level"]]).all()
-    assert found.rmse["speed"] < 0.02
+    assert np.isnan([held_out_rmse(found), found.in_sample.rmse["velocity"], found.in_sample.rmse["level"]]).all()
+    assert found.in_sample.rmse["speed"] < 0.02
     save_ladder_figure([found, found], other.folder / "ladder.png")
     save_diagnosis_figure(other.diagnosis, other.case, other.folder / "diagnosis.png")
 

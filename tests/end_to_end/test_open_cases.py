@@ -42,7 +42,7 @@ def extended(case: Case, folder: Path) -> Grown:
 
 def test_where_nothing_is_hidden_nothing_is_found(tmp_path: Path) -> None:
     found = looked_into(imported("open-a", tmp_path), tmp_path)
-    assert found.verdict == "nothing-missing", found.sentence
+    assert found.verdict.kind == "nothing-missing", found.verdict.sentence
 
 
 @pytest.mark.parametrize(
@@ -57,11 +57,11 @@ def test_where_nothing_is_hidden_nothing_is_found(tmp_path: Path) -> None:
 def test_what_is_hidden_is_found_and_added(name: str, hidden: str, true: float, tmp_path: Path) -> None:
     case = imported(name, tmp_path)
     found = looked_into(case, tmp_path)
-    assert found.verdict in ("identified", "one-of"), found.sentence
-    assert len(found.steps) == 1, found.sentence
-    assert hidden in found.set, found.sentence
-    assert len(found.set) == 1 or set(found.set) <= EDDIES, found.sentence
-    low, high = next(one.interval95 for one in found.suspects if one.name == hidden)
+    assert found.verdict.kind in ("identified", "one-of"), found.verdict.sentence
+    assert len(found.steps) == 1, found.verdict.sentence
+    assert hidden in found.set, found.verdict.sentence
+    assert len(found.set) == 1 or set(found.set) <= EDDIES, found.verdict.sentence
+    low, high = found.suspect(hidden).amplitude.interval95
     assert low <= true <= high
     before, after = extended(case, tmp_path).rungs
     assert after.validation < min(before.validation, WANTED)
@@ -69,6 +69,7 @@ def test_what_is_hidden_is_found_and_added(name: str, hidden: str, true: float, 
 
 def test_something_unlisted_is_none_of_these_and_has_a_place(tmp_path: Path) -> None:
     found = looked_into(imported("open-f", tmp_path), tmp_path)
-    assert found.verdict == "none-of-these", found.sentence
-    assert found.where is not None
-    assert ((found.where.x - 33.0) ** 2 + (found.where.y + 0.6) ** 2) ** 0.5 < 1.5
+    location = found.verdict.location
+    assert found.verdict.kind == "none-of-these", found.verdict.sentence
+    assert location is not None
+    assert ((location.x - 33.0) ** 2 + (location.y + 0.6) ** 2) ** 0.5 < 1.5

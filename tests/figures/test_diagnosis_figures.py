@@ -1,18 +1,22 @@
 """Figures of a diagnosis and of the ladder: what is drawn is what was found, and nothing missing breaks them."""
 
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_diagnosis
+from diagnoses import NOTHING, a_diagnosis, a_suspect
 from drawings import off_the_sheet, points, texts
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
+from matplotlib.transforms import Bbox
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.comparison import Rung, held_out, improvement
+from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung, held_out_rmse, improvement
 from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
 from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones
 from vegglue.figures.plan_view import Outline
@@ -20,7 +24,7 @@ from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
 from vegglue.report.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
 from vegglue.report.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
-from vegglue.results.diagnosis import Diagnosis, Step
+from vegglue.results.diagnosis import Diagnosis, Predictions, Step
 from vegglue.site.polygons import corners_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -31,9 +35,7 @@ SUSPECTS = pd.DataFrame({
 
 
 def stations(**columns: object) -> pd.DataFrame:
-    found = a_diagnosis()
-    predictions = {"prediction_first": found.prediction_first, "prediction": found.prediction, "error": found.error}
-    return found.station.assign(**predictions | columns)
+    return a_diagnosis().predictions.table.assign(**columns)
 
 
 def test_standings_follow_the_verdict() -> None:
@@ -41,17 +43,18 @@ def test_standings_follow_the_verdict() -> None:
     said = {one.name: standing_of(found, one) for one in found.suspects}
     assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
     assert [one.name for one in ranked(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
-    louder = replace(found, first_scores=found.first_scores | {"turning": -9.0})
+    louder = a_diagnosis(first_screening={"scores": found.first_screening.scores | {"turning": -9.0}})
     assert standing_of(louder, found.suspects[3]) == "less likely"
 
 
 def test_errors_leave_out_what_does_not_count() -> None:
     found = a_diagnosis()
-    value = found.station["value"].to_numpy(float)
+    station = found.predictions.station
+    value = station["value"].to_numpy(float)
     off = np.array([0.03, 9.0, 9.0, 0.04, 0.0, 9.0])  # row 1 is flagged, 2 and 5 are levels
     assert error_of(found, value - off) == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 3))
     assert error_of(found, value - off, "level") == pytest.approx(9.0)
-    assert np.isnan(error_of(replace(found, station=found.station.assign(used=False)), value))
+    assert np.isnan(error_of(a_diagnosis(predictions={"station": station.assign(used=False)}), value))
 
 
 def test_words_tell_scores_before_and_after() -> None:
@@ -98,7 +101,7 @@ def test_gauges_show_millimetres() -> None:
 
 @pytest.mark.parametrize("rows", [1, 3])
 def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
-    zones = a_diagnosis().zones.head(rows)
+    zones = a_diagnosis().misfit.zones.head(rows)
     axes = draw_zones(zones).axes[0]
     assert texts(axes)[:2] == ["2.3", "+5.0"]  # sqrt(11 / 2) and 0.02 / 0.004
     faces = [to_hex(squares.get_facecolor()[0]) for squares in axes.collections if len(squares.get_facecolor())]
@@ -106,8 +109,8 @@ def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
 
 
 def test_places_mark_what_was_found() -> None:
-    found = a_diagnosis()
-    axes = draw_places(found.map_x, found.map_y, found.map_score, (33.0, -0.6), [], np.zeros((1, 2))).axes[0]
+    drag = a_diagnosis().drag_map
+    axes = draw_places(drag.x, drag.y, drag.score, (33.0, -0.6), [], np.zeros((1, 2))).axes[0]
     assert "x = 33.0, y = −0.6 m" in texts(axes)
     assert any(line.get_marker() == "*" and list(line.get_xdata()) == [33.0] for line in axes.lines)
 
@@ -115,7 +118,8 @@ def test_places_mark_what_was_found() -> None:
 @pytest.mark.parametrize("places", [1, 2])
 def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
     found = a_diagnosis()
-    part = found.map_x[:places], found.map_y[:places], found.map_score[:places]
+    drag = found.drag_map
+    part = drag.x[:places], drag.y[:places], drag.score[:places]
     (axes,) = draw_places(*part, None, [], np.array([[31.0, 0.5]])).axes
     assert points(axes, ".") == [(31.0, 0.5)]
     assert not axes.collections, "no contours"
@@ -126,13 +130,15 @@ def test_places_draw_contours_patches_and_stations() -> None:
     found = a_diagnosis()
     corners = np.array([[30.0, 0.0], [34.0, 0.0], [34.0, 0.5], [30.0, 0.5]])
     spots = np.array([[31.0, 0.5], [35.0, -0.5]])
-    figure = draw_places(found.map_x, found.map_y, 9.0 * found.map_score, None, [Outline("p1", corners)], spots)
+    figure = draw_places(
+        found.drag_map.x, found.drag_map.y, 9.0 * found.drag_map.score, None, [Outline("p1", corners)], spots
+    )
     (axes,) = figure.axes
     assert len(axes.collections) == 4, "more and less drag, faces and lines"
     assert points(axes, ".") == [tuple(spot) for spot in spots]
     assert np.array_equal(axes.patches[0].get_xy()[:4], corners)
     assert points(axes, "*") == []
-    assert f"largest {9.0 * np.abs(found.map_score).max():.1f}" in " ".join(texts(axes))
+    assert f"largest {9.0 * np.abs(found.drag_map.score).max():.1f}" in " ".join(texts(axes))
     assert off_the_sheet(figure) == []
 
 
@@ -159,9 +165,9 @@ def test_alike_effects_stand_together_in_a_frame() -> None:
 
 
 def test_fingerprint_draws_each_experiment_across_each_section() -> None:
-    found = a_diagnosis()
+    station = a_diagnosis().predictions.station
     trace = np.array([0.1, 0.2, 0.003, 0.3, 0.4, 0.004])
-    section, gauges = draw_fingerprint(trace, found.station, "m2/s").axes
+    section, gauges = draw_fingerprint(trace, station, "m2/s").axes
     lines = [list(line.get_ydata()) for line in section.lines if line.get_marker() == "."]
     assert sorted(lines) == [[0.1, 0.2], [0.3, 0.4]]
     assert section.get_ylabel() == "change of u [m/s per m2/s]"
@@ -170,7 +176,7 @@ def test_fingerprint_draws_each_experiment_across_each_section() -> None:
 
 @pytest.mark.parametrize("kind", ["velocity", "level"])
 def test_fingerprint_of_one_kind_of_measurement_is_a_file(tmp_path: Path, kind: str) -> None:
-    station = a_diagnosis().station
+    station = a_diagnosis().predictions.station
     station = station[station["kind"] == kind]
     trace = np.zeros(len(station))
     save_fingerprint_figure(trace, station, "-", tmp_path / "figures" / "trace.png")
@@ -189,36 +195,60 @@ def test_fingerprint_of_one_kind_of_measurement_is_a_file(tmp_path: Path, kind: 
 
 def alone(found: Diagnosis) -> Diagnosis:
     """One experiment, one section, no gauges."""
-    kept = (found.station["experiment"] == "low") & (found.station["kind"] == "velocity")
-    rows = np.flatnonzero(kept)
-    arrays = {name: getattr(found, name)[rows] for name in ("prediction_first", "prediction", "error")}
-    return replace(found, station=found.station[kept].reset_index(drop=True), zones=found.zones.head(1), **arrays)
+    every = found.predictions
+    kept = (every.station["experiment"] == "low") & (every.station["kind"] == "velocity")
+    arrays = (array[kept.to_numpy()] for array in (every.first, every.last, every.error))
+    few = Predictions(every.station[kept].reset_index(drop=True), *arrays)
+    return replace(found, predictions=few, misfit=replace(found.misfit, zones=found.misfit.zones.head(1)))
 
 
-@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, a_diagnosis(where=None, steps=()), alone(a_diagnosis())])
+def crowded() -> Diagnosis:
+    """As much as a screen has to hold: 70 effects with long names, three steps and a long sentence, many zones."""
+    names = [f"outlet_level_error[campaign {number}]" for number in range(70)]
+    steps = tuple(Step(name, (name,), (1.0,), ((name,),), 2300.5, 248.1, 0.0) for name in names[:3])
+    suspects = tuple(a_suspect(name, test={"score": 40.0 / (1 + number)}) for number, name in enumerate(names))
+    cosine = np.full((12, 12), 0.3) + 0.7 * np.eye(12)
+    rows = [(experiment, f"D{number}", zone) for experiment in ("low", "mid", "high") for number in range(6)
+            for zone in ("floor", "bank", "plants", "edge")]  # fmt: skip
+    zones = pd.DataFrame(rows, columns=["experiment", "section", "zone"])
+    zones = zones.assign(stations=3, mean=0.02, standard_error=0.004, chi2=np.linspace(1.0, 900.0, len(zones)))
+    sentence = f"Missing: {'; and '.join(names[:3])}, {8 * 'each of so and so much, '}"
+    return a_diagnosis(
+        suspects, steps, verdict={"sentence": sentence}, misfit={"zones": zones},
+        first_screening={"scores": {}, "compared": tuple(names[:12]), "cosine": cosine},
+    )  # fmt: skip
+
+
+SCREENS = {
+    "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()), "crowded": crowded(),
+    "no location": a_diagnosis(steps=(), verdict={"location": None}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("diagnosis", SCREENS.values(), ids=SCREENS)
 def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
+    """The whole sentence is on it, nothing is cut off at its edge, and no panel covers another or the sentence."""
     figure = draw_diagnosis(diagnosis, [])
-    assert off_the_sheet(figure) == []
-    assert figure.get_suptitle() == f"{diagnosis.name}: {diagnosis.verdict}. {diagnosis.sentence}"
-    scores, visible, alike, *rest = figure.axes
-    assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
-        one.name for one in diagnosis.suspects
-    }
-    assert sorted(bar.get_width() for bar in visible.patches) == sorted(one.visibility for one in diagnosis.suspects)
-    assert {label.get_text() for label in alike.get_yticklabels()} == set(diagnosis.cosine_names)
-    assert len(rest) == bool(len(diagnosis.zones)) + bool(diagnosis.map_x.size)
-    if len(diagnosis.zones):
-        assert len(texts(rest[0])) == 2 * len(diagnosis.zones)
-    if diagnosis.map_x.size:
-        assert len(points(rest[-1], "*")) == (diagnosis.where is not None)
-        assert set(points(rest[-1], ".")) == set(zip(diagnosis.station["x"], diagnosis.station["y"], strict=True))
+    FigureCanvasAgg(figure).draw()
+    verdict = diagnosis.verdict
+    assert figure.get_suptitle().split() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}".split()
+    title = next(text for text in figure.texts if text.get_text() == figure.get_suptitle())
+    panels = {"sentence": title.get_window_extent()}
+    panels |= {f"panel {number}": axes.get_tightbbox() for number, axes in enumerate(figure.findobj(Axes))}
+    screen = figure.bbox.padded(1.0)
+    assert [name for name, box in panels.items() if not within(box, screen)] == []
+    pairs = combinations(panels, 2)
+    assert [pair for pair in pairs if overlap(*(panels[name] for name in pair)) > 1.0] == []
 
 
-def test_a_sentence_too_long_for_the_screen_is_broken() -> None:
-    told = "A sentence of many words that goes on " * 12
-    figure = draw_diagnosis(a_diagnosis(sentence=told), [])
-    assert "\n" in figure.get_suptitle()
-    assert off_the_sheet(figure) == []
+def within(box: Bbox, outer: Bbox) -> bool:
+    return box.x0 >= outer.x0 and box.y0 >= outer.y0 and box.x1 <= outer.x1 and box.y1 <= outer.y1
+
+
+def overlap(one: Bbox, other: Bbox) -> float:
+    """By how many pixels two boxes lie over each other, the shorter way."""
+    common = Bbox.intersection(one, other)
+    return 0.0 if common is None else float(min(common.width, common.height))
 
 
 def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
@@ -233,25 +263,30 @@ def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
 
 def a_rung(name: str, error: float, **changes: object) -> Rung:
     pattern = np.array([1.0, -1.0, 1.0, -1.0]) * error
+    clusters = ("low D0", "low D3", "high D0", "high D3")
     rung = Rung(
-        name=name, title=name, effects=(), parameters=2, rmse={"velocity": 0.8 * error, "level": 0.001}, chi2=4.0,
-        stations=4, noise_floor=0.01, sections=pattern, experiments=np.full(4, np.nan), log_score=1.0, inside50=0.5,
-        inside95=0.95, values={"n_b": (0.03, 0.02, 0.04), "k_s": (0.5, 0.01, 3.0)},
-        homogeneity={"n_b": 0.001 if error > 0.02 else 0.4}, validation=float("nan"), velocity=np.ones(4, bool),
-        place=("low D0", "low D3", "high D0", "high D3"),
+        name=name, title=name, effects=(), values={"n_b": (0.03, 0.02, 0.04), "k_s": (0.5, 0.01, 3.0)},
+        in_sample=InSample({"velocity": 0.8 * error, "level": 0.001}, chi2=4.0, stations=4, noise_floor=0.01),
+        held_out=HeldOut(pattern, np.full(4, np.nan), np.ones(4, bool), clusters),
+        predictive=PredictiveScores(log_score=1.0, inside50=0.5, inside95=0.95),
+        homogeneity={"n_b": 0.001 if error > 0.02 else 0.4}, validation=float("nan"),
     )  # fmt: skip
     return replace(rung, **changes)
 
 
+def with_sections(rung: Rung, errors: np.ndarray) -> Rung:
+    return replace(rung, held_out=replace(rung.held_out, sections=errors))
+
+
 def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
     before, after = a_rung("a", 0.05), a_rung("b", 0.012, effects=("eddies",))
-    before = replace(before, sections=before.sections * np.array([1.0, 1.1, 0.9, 1.2]))
+    before = with_sections(before, before.held_out.sections * np.array([1.0, 1.1, 0.9, 1.2]))
     figure = draw_ladder([before, after])
     axes = figure.axes[0]
     solid = next(line for line in axes.lines if line.get_linestyle() == "-" and line.get_marker() == "o")
-    assert list(solid.get_ydata()) == [held_out(before), held_out(after)]
+    assert list(solid.get_ydata()) == [held_out_rmse(before), held_out_rmse(after)]
     bar = axes.collections[0].get_segments()[1]
-    assert (bar[1, 1] - bar[0, 1]) / 2 == pytest.approx(improvement(before, after)[1] / (2 * held_out(after)))
+    assert (bar[1, 1] - bar[0, 1]) / 2 == pytest.approx(improvement(before, after)[1] / (2 * held_out_rmse(after)))
     assert "+ eddies" in axes.get_xticklabels()[1].get_text()
     assert {"held out by section", "in sample", "error of measuring"} <= set(texts(axes))
     assert "not seen by any fit" not in texts(axes)
@@ -265,7 +300,8 @@ def test_ladder_tells_parameters_that_move_from_those_that_stand_still() -> None
 
 
 @pytest.mark.parametrize(
-    "rungs", [[a_rung("a", 0.05)], [a_rung("a", 0.05, values={}, homogeneity={}, sections=np.full(4, np.nan))]]
+    "rungs",
+    [[a_rung("a", 0.05)], [with_sections(a_rung("a", 0.05, values={}, homogeneity={}), np.full(4, np.nan))]],
 )
 def test_ladder_of_one_rung_is_a_file(tmp_path: Path, rungs: list[Rung]) -> None:
     save_ladder_figure(rungs, tmp_path / "runs" / "ladder.svg")
@@ -273,7 +309,7 @@ def test_ladder_of_one_rung_is_a_file(tmp_path: Path, rungs: list[Rung]) -> None
     figure = draw_ladder(rungs)
     errors, *parameters = [axes for axes in figure.axes if axes.get_visible()]
     (rung,) = rungs
-    expected = [held_out(rung), rung.rmse["velocity"]]  # in sample is drawn beside what was held out
+    expected = [held_out_rmse(rung), rung.in_sample.rmse["velocity"]]  # in sample is drawn beside what was held out
     assert points(errors) == [(1.0, value) for value in expected if np.isfinite(value)]
     assert errors.get_ylim() == pytest.approx((0.0, 1.12 * np.nanmax(expected)))
     assert [axes.get_title(loc="left").split("\n")[0] for axes in parameters] == list(rung.values)

@@ -143,12 +143,13 @@ def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) 
     for bed in ("confluence", "confluence-flat"):
         model = model_in(load_case(target.with_stem(bed)))
         found = diagnose(model)
-        velocity = (found.station["kind"] == "velocity").to_numpy()
-        error = found.station["value"].to_numpy(float) - found.prediction_first
+        predictions, verdict = found.predictions, found.verdict
+        velocity = (predictions.station["kind"] == "velocity").to_numpy()
+        error = predictions.station["value"].to_numpy(float) - predictions.first
         left[bed] = float(np.sqrt(np.mean(error[velocity] ** 2)))
-        assert found.verdict == "none-of-these", found.sentence
-        assert found.where is not None
-        assert abs(found.where.x) < 0.6
-        assert found.where.y < 0.3
+        assert verdict.kind == "none-of-these", verdict.sentence
+        assert verdict.location is not None
+        assert abs(verdict.location.x) < 0.6
+        assert verdict.location.y < 0.3
     assert left["confluence"] < 0.6 * left["confluence-flat"], left
     assert flat_bed(PUBLISHED, target)["extends"] == "confluence.yaml"

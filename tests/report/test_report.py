@@ -302,14 +302,14 @@ def test_a_run_without_flow_fields_has_a_page(tmp_path: Path) -> None:
 
 
 def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
-    found = a_diagnosis(sentence="Missing: eddies <b>or so</b>.")
+    found = a_diagnosis(verdict={"sentence": "Missing: eddies <b>or so</b>."})
     run = replace(a_toy(tmp_path), diagnosis=found)
     page = Page(text := written(run))
     assert page.open == []
     assert page.unlabelled == 0
     assert len(page.ids) == len(set(page.ids))
     assert "Missing: eddies &lt;b&gt;or so&lt;/b&gt;." in text
-    assert found.remarks[0] in text
+    assert found.verdict.remarks[0] in text
     assert all(f"<b>{one.name}</b>" in text for one in found.suspects)
     assert "Stations set aside" in text
     drawn = {path.stem for path in (tmp_path / "figures").glob("missing-*.svg")}
@@ -321,7 +321,7 @@ def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
 
 def test_an_empty_diagnosis_is_a_sentence_and_no_figure_breaks(tmp_path: Path) -> None:
     text = written(replace(a_toy(tmp_path), diagnosis=NOTHING))
-    assert NOTHING.sentence in text
+    assert NOTHING.verdict.sentence in text
     assert "Stations set aside" not in text
     assert 'id="missing-suspects"' not in text
 

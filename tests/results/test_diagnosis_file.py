@@ -1,35 +1,75 @@
 """diagnosis.h5: what is written comes back exactly, and xarray reads it."""
 
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_diagnosis
+from diagnoses import NO_LOCATION, NOTHING, a_diagnosis
 
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import Diagnosis, diagnosis_json
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.storage.hdf5 import diagnosis_that_fits, read_diagnosis, write_diagnosis
 
 HASH = "d" * 64
+ATTRIBUTES = {
+    "chi2", "chi2_first", "config", "config_hash", "correlation", "first_parameters", "first_scores", "flagged",
+    "format", "freedom", "grid_error", "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence",
+    "steps", "threshold", "verdict", "version", "where",
+}  # fmt: skip
+OF_STATIONS = [
+    "experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device",
+]  # fmt: skip
+OF_AN_EFFECT = [
+    "name", "title", "unit", "amplitude", "interval95", "score", "p_family", "visibility", "smallest_detectable",
+    "testable", "refitted", "objective", "mimicked_by", "likeness", "shapes", "off", "scale",
+]  # fmt: skip
+DATASETS = {
+    "stations": ["station", *OF_STATIONS, "prediction_first", "prediction", "error"],
+    "suspects": ["suspect", *(name for name in OF_AN_EFFECT if name != "interval95"), "low95", "high95"],
+    "zones": ["zone_number", "experiment", "section", "zone", "stations", "mean", "standard_error", "chi2"],
+    "places": ["place", "x", "y", "score"],
+    "alike": ["name", "other", "cosine"],
+}
+IN_JSON = [
+    "verdict", "sentence", "set", "groups", "not_excluded", "where", "effects", "steps", "remarks", "chi2", "threshold",
+    "noise", "flagged", "parameters", "first_parameters", "zones",
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, a_diagnosis(where=None)])
+@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, NO_LOCATION])
 def test_diagnosis_comes_back_as_it_went(tmp_path: Path, diagnosis: Diagnosis) -> None:
     write_diagnosis(tmp_path / "diagnosis.h5", diagnosis, "name: open-x\n", HASH)
     back = read_diagnosis(tmp_path / "diagnosis.h5", HASH)
-    for field in fields(Diagnosis):
-        one, other = getattr(diagnosis, field.name), getattr(back, field.name)
-        assert type(one) is type(other), field.name
-        if isinstance(one, pd.DataFrame):
-            pd.testing.assert_frame_equal(other, one, check_column_type=False)
-        elif isinstance(one, np.ndarray | float):
-            np.testing.assert_array_equal(other, one)
-        else:
-            assert one == other
+    assert_same(back, diagnosis)
     assert diagnosis_json(back) == diagnosis_json(diagnosis)
+
+
+def assert_same(back: object, there: object) -> None:
+    """Equal in every field of every part, and of the same types."""
+    assert type(back) is type(there)
+    if is_dataclass(there):
+        for field in fields(there):
+            assert_same(getattr(back, field.name), getattr(there, field.name))
+    elif isinstance(there, pd.DataFrame):
+        pd.testing.assert_frame_equal(back, there, check_column_type=False)
+    elif isinstance(there, np.ndarray | float):
+        np.testing.assert_array_equal(back, there)
+    else:
+        assert back == there
+
+
+def test_the_layout_of_the_file_is_the_one_agreed(tmp_path: Path) -> None:
+    """What other programs read by name: attributes, and datasets by group in their order."""
+    write_diagnosis(tmp_path / "diagnosis.h5", a_diagnosis(), "", HASH)
+    with h5py.File(tmp_path / "diagnosis.h5") as file:
+        assert set(file.attrs) == ATTRIBUTES
+        assert {name: list(group) for name, group in file.items()} == DATASETS
+    assert list(diagnosis_json(a_diagnosis())) == IN_JSON
+    assert list(diagnosis_json(a_diagnosis())["effects"][0]) == OF_AN_EFFECT
 
 
 def test_diagnosis_of_another_config_is_refused(tmp_path: Path) -> None:
@@ -69,4 +109,4 @@ def test_xarray_opens_every_group_of_a_diagnosis(tmp_path: Path, diagnosis: Diag
             if group == "stations":
                 assert data["prediction_first"].dims == ("station",)
             if group == "alike":
-                assert data["cosine"].values.tolist() == diagnosis.cosine.tolist()
+                assert data["cosine"].values.tolist() == diagnosis.first_screening.cosine.tolist()

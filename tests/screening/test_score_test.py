@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.stats
 
 from vegglue.screening import score_test
 
@@ -50,20 +49,6 @@ def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.n
     one_sided[3] = True
     assert score_test.scores(projected, one_sided)[3] == 0.0
     assert score_test.scores(projected, ~one_sided)[3] < -5.0
-
-
-def test_family_wise_chances_are_uniform_under_the_null(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    slopes, prints = problem
-    random = np.random.default_rng(11)
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    errors = random.standard_normal((score_test.NULL_DRAWS, ROWS))
-    maxima = (score_test.null_draws(projected, np.zeros(PRINTS, bool), errors, 3) ** 2).max(axis=1)
-    chances = []
-    for _ in range(400):
-        again = score_test.project(slopes, random.standard_normal(ROWS), random.standard_normal(SLOPES), prints)
-        strongest = np.abs(score_test.scores(again, np.zeros(PRINTS, bool))).max()
-        chances.append(score_test.family_p(float(strongest), maxima))
-    assert scipy.stats.kstest(chances, "uniform").pvalue > 1e-3
 
 
 def test_the_likeliest_rival_is_true_as_often_as_told(

@@ -149,7 +149,8 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
 
 
 def _said(answer: Answer, found: Diagnosis) -> dict[str, Any]:
-    names, cosine = found.cosine_names, np.asarray(found.cosine)
+    names, cosine = found.first_screening.compared, found.first_screening.cosine
+    verdict, errors = found.verdict, found.errors
     alike = {
         hidden.name: {
             names[j]: round(float(cosine[names.index(hidden.name), j]), 3)
@@ -166,12 +167,12 @@ def _said(answer: Answer, found: Diagnosis) -> dict[str, Any]:
              "amplitude": mark.amplitude, "away": None if np.isnan(mark.away) else mark.away}
             for mark in marks(answer, found)
         ],
-        "verdict": found.verdict, "set": found.set, "not_excluded": found.not_excluded,
+        "verdict": verdict.kind, "set": found.set, "not_excluded": verdict.not_excluded,
         "steps": [asdict(step) for step in found.steps],
-        "where": None if found.where is None else asdict(found.where), "flagged": len(found.flagged),
-        "correlation": found.correlation, "scale": found.scale, "p_misfit": found.p_misfit,
-        "threshold": found.threshold, "alike": alike,
-        "scores": {one.name: one.score for one in found.suspects[:8]},
+        "where": None if verdict.location is None else asdict(verdict.location), "flagged": len(errors.flagged),
+        "correlation": errors.correlation, "scale": errors.scale, "p_misfit": found.misfit.p,
+        "threshold": found.first_screening.threshold, "alike": alike,
+        "scores": {one.name: one.test.score for one in found.suspects[:8]},
     }  # fmt: skip
 
 
@@ -185,17 +186,17 @@ def with_accepted(model: Model, found: Diagnosis) -> Model:
     """The model with all effects that the diagnosis accepted."""
     case: Case = model.case
     for step in found.steps:
-        suspect = next(one for one in found.suspects if one.name == step.accepted)
-        case = with_effect(case, candidate_named(case, model.station, step.accepted), suspect.shapes)
+        candidate = candidate_named(case, model.station, step.accepted)
+        case = with_effect(case, candidate, found.suspect(step.accepted).shapes)
     return replace(model, case=case)
 
 
 def held_out(model: Model, found: Diagnosis) -> dict[str, Any]:
     """Errors of held-out sections without and with what was accepted [m/s], and by how much their squares fall."""
-    theta = {name: three[0] for name, three in found.parameters.items()}
-    before = rung(calibrated(model, found, found.first_parameters))
+    theta = {name: three[0] for name, three in found.parameters.last.items()}
+    before = rung(calibrated(model, found, found.parameters.first))
     after = rung(calibrated(with_accepted(model, found), found, theta))
-    errors = [one.sections[after.velocity] for one in (before, after)]
+    errors = [one.held_out.sections[after.held_out.velocity] for one in (before, after)]
     known = np.isfinite(errors[0]) & np.isfinite(errors[1])
     return {
         "gain": improvement(before, after)[0],
@@ -207,7 +208,7 @@ def measured_again(
     ground: TwinBase, model: Model, answer: Answer, found: Diagnosis, seed: int
 ) -> dict[str, Any] | None:
     """The best next measurement, made and added: groups of the first step before and after; None if none is of use."""
-    base = calibrated(model, found, found.first_parameters)
+    base = calibrated(model, found, found.parameters.first)
     rivals = rivals_of(model.case, found, found.steps[0].rivals)
     best = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals])[0][0]
     if best.then < SEPARATES:
@@ -225,7 +226,7 @@ def measured_again(
     again = diagnose(replace(model, case=case, station=station), base.fitted.point.z)
     return {
         "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
-        "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict, "set": again.set,
+        "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict.kind, "set": again.set,
     }  # fmt: skip
 
 

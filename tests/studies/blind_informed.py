@@ -17,7 +17,7 @@ DRAWS, SMALL = 40, 3
 
 
 def silent(ground: TwinBase) -> Screening:
-    """A look where nothing is hidden: for its traces, and the errors they are seen against."""
+    """A screening where nothing is hidden: for its fingerprints, and the errors they are seen against."""
     station, _ = measured(ground, (), 0.0, "white", 1)
     return screen(baseline(replace(ground.model, station=station), ground.here.z))
 
@@ -31,7 +31,8 @@ def informed(looks: list[Screening], signal: float, level: float) -> tuple[float
 
 def _sets(seen: Screening, signal: float, level: float, random: np.random.Generator) -> Array:
     """Whether the truth is in the set, and its groups, (data sets, 2); each effect that may be as long is hidden."""
-    units, family, may_be = seen.projected.units, seen.traces.columns, seen.may_be(signal, LARGEST_SIZE)
+    units, family = seen.projected.units, seen.fingerprints.columns
+    may_be = seen.possible_signs(signal, LARGEST_SIZE)
     found = []
     for true, columns in enumerate(family):
         ways = [(sign, int(column)) for column in columns for sign in (0, 1) if may_be[sign, column]]

@@ -13,7 +13,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.diagnosis.comparison import held_out, rung
+from vegglue.diagnosis.comparison import held_out_rmse, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
@@ -59,11 +59,12 @@ def row_of(title: str, case: Case, runs: Path) -> Row:
     assert unseen is not None
     there = linearise(unseen, base.fitted.point.z)
     found = rung(base)
+    seen = found.in_sample
     return Row(
         title,
         by_section(base.model, base.fitted.point.prediction),
         {} if there is None else by_section(unseen, there.prediction),
-        {"levels": found.rmse["level"], "chi2": found.chi2, "stations": found.stations, "left out": held_out(found)},
+        {"levels": seen.rmse["level"], "chi2": seen.chi2, "stations": seen.stations, "left out": held_out_rmse(found)},
         found.values,
     )
 
@@ -76,11 +77,12 @@ def folder_of(case: Case, runs: Path) -> Path:
 
 def with_object(case: Case, found: Diagnosis) -> Case:
     """The case with something of unknown kind at the place the diagnosis points at."""
-    assert found.where is not None
+    location = found.verdict.location
+    assert location is not None
     site = build_site(case)
     radius = max(SPOT_RADIUS * half_width(site), 1.5 * max(site.grid.dx, site.grid.dy))
-    candidate = candidate_named(case, found.station, "unlisted_object")
-    shapes = {"x": round(found.where.x, 3), "y": round(found.where.y, 3), "radius": round(radius, 3)}
+    candidate = candidate_named(case, found.predictions.station, "unlisted_object")
+    shapes = {"x": round(location.x, 3), "y": round(location.y, 3), "radius": round(radius, 3)}
     return write_child(case, child_path(case.source, [candidate]), [(candidate, shapes)])
 
 
@@ -95,12 +97,13 @@ def climb(path: Path, title: str, runs: Path, jobs: int, objects: int = 1) -> tu
     for step in found.steps[: len(cases) - 1]:
         titles.append(f"{titles[-1]}, {step.accepted}")
     rows = [row_of(name, one, runs) for name, one in zip(titles, cases, strict=True)]
-    said = [f"**{title}** ({found.verdict}): {found.sentence}"]
-    if grown.reason != found.sentence:
-        said.append(f"Of this, {grown.reason}".replace(found.sentence, "").strip())
-    if found.where is None or objects == 0:
+    verdict = found.verdict
+    said = [f"**{title}** ({verdict.kind}): {verdict.sentence}"]
+    if grown.reason != verdict.sentence:
+        said.append(f"Of this, {grown.reason}".replace(verdict.sentence, "").strip())
+    if verdict.location is None or objects == 0:
         return rows, said
-    name = f"{titles[-1]}, object at x = {found.where.x:.2f}, y = {found.where.y:.2f} m"
+    name = f"{titles[-1]}, object at x = {verdict.location.x:.2f}, y = {verdict.location.y:.2f} m"
     more, words = climb(with_object(cases[-1], found).source, name, runs, jobs, objects - 1)
     return rows + more, said + words
 

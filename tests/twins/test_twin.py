@@ -15,7 +15,7 @@ from vegglue.cli.main import main
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import Step, Where
+from vegglue.results.diagnosis import DragLocation, Step
 from vegglue.screening.candidates import with_effect
 from vegglue.screening.score_test import project
 from vegglue.storage.hdf5 import write_diagnosis
@@ -160,11 +160,12 @@ def test_marks_of_every_kind() -> None:
     assert not third.found, "the verdict was one-of"
     assert fourth.found, "row 1 is flagged"
     step = Step("eddies", ("eddies",), (1.0,), (("eddies",),), 9.0, 1.0, 0.0)
-    alone = a_diagnosis(verdict="identified", steps=(step,))
+    alone = a_diagnosis(verdict={"kind": "identified"}, steps=(step,))
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].amplitude is False
-    nowhere = a_diagnosis(verdict="none-of-these", where=Where(30.0, 0.4, ("low",), 1.0, 5.0))
+    location = DragLocation(30.0, 0.4, ("low",), 1.0, 5.0)
+    nowhere = a_diagnosis(verdict={"kind": "none-of-these", "location": location})
     assert marks(an_answer(thing), nowhere)[0].found
 
 
@@ -175,7 +176,7 @@ def test_what_reveal_says() -> None:
     assert "correlated by 0.5" in said
     assert "the interval holds the true size" in said
     assert "Nothing was hidden" in "\n".join(in_words(an_answer(), None))
-    silent = a_diagnosis(verdict="nothing-missing", suspects=(a_suspect("wind"),), steps=())
+    silent = a_diagnosis(verdict={"kind": "nothing-missing"}, suspects=(a_suspect("wind"),), steps=())
     assert "right" in in_words(an_answer(), silent)[-1]
     assert "missed" in in_words(an_answer(effect), silent)[-1]
     wide = Hidden("mixing[D3]", 0.3, {"width": 0.6}, 6.0)
@@ -211,9 +212,9 @@ def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     monkeypatch.setattr("sys.argv", ["vegglue", "reveal", "play"])
     case = load_case(tmp_path / "play" / "play.yaml")
     steps = (Step("gauge_datum", ("gauge_datum",), (1.0,), (("gauge_datum",),), 900.0, 90.0, 0.0),)
-    suspect = a_suspect("gauge_datum", amplitude=0.1, interval95=(0.09, 0.11))
+    suspect = a_suspect("gauge_datum", amplitude={"value": 0.1, "interval95": (0.09, 0.11)})
     (tmp_path / "runs" / "play").mkdir(parents=True)
-    found = a_diagnosis(verdict="identified", steps=steps, suspects=(suspect,))
+    found = a_diagnosis(verdict={"kind": "identified"}, steps=steps, suspects=(suspect,))
     write_diagnosis(tmp_path / "runs" / "play" / "diagnosis.h5", found, resolved_yaml(case), case_hash(case))
 
     with pytest.raises(SystemExit) as ended:

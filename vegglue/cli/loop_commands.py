@@ -1,8 +1,7 @@
 """The shell of the loop: import, diagnose, extend, compare, next, run. What they do stands in `loop`."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +14,7 @@ from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
 from vegglue.cli.options import Config, Jobs, Json, Runs, Trust, console, number_given, say_on
-from vegglue.diagnosis.comparison import Rung, held_out, improvement
+from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement, rung_json
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth
 from vegglue.errors import InputError
@@ -23,7 +22,8 @@ from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
-from vegglue.results.diagnosis import Diagnosis, diagnosis_json
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.workflow.loop import (
     child_path,
     diagnosed,
@@ -115,7 +115,7 @@ def compare_command(
     picture = folder_of(runs, cases[-1]) / "ladder.png"
     save_ladder_figure(rungs, picture)
     if as_object:
-        told = {"rungs": [_rung_json(one) for one in rungs], "left_out": aside.to_dict("records")}
+        told = {"rungs": [rung_json(one) for one in rungs], "left_out": aside.to_dict("records")}
         print(json.dumps(told, ensure_ascii=False))
         return
     _show_ladder(rungs, exclusion_in_words(aside))
@@ -172,9 +172,9 @@ def _default_target(folder: Path) -> Path:
 
 
 def _tell(found: Diagnosis) -> None:
-    console.print(found.verdict, style="bold", end=": ")
-    console.print(found.sentence)
-    for remark in found.remarks:
+    console.print(found.verdict.kind, style="bold", end=": ")
+    console.print(found.verdict.sentence)
+    for remark in found.verdict.remarks:
         console.print(f"- {remark}")
     table = Table(box=None, pad_edge=False, header_style="bold")
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
@@ -182,19 +182,19 @@ def _tell(found: Diagnosis) -> None:
         table.add_column(heading, justify="left" if heading == "effect" else "right")
     for one in found.suspects[:10]:
         share = f"{found.chances[one.name]:.0%}" if one.name in found.chances else ""
-        low, high = one.interval95
-        p_family = f"< {one.p_family:.1g}" if one.p_family < 5e-4 else f"{one.p_family:.2g}"
-        unit = one.unit.removesuffix("-")
+        amplitude, test, detectability = one.amplitude, one.test, one.detectability
+        low, high = amplitude.interval95
+        p_family = f"< {test.p_family:.1g}" if test.p_family < 5e-4 else f"{test.p_family:.2g}"
+        unit = amplitude.unit.removesuffix("-")
         table.add_row(
-            one.name, share, f"{one.amplitude:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{one.score:+.1f}",
-            p_family, f"{one.visibility:.2f}", f"{one.smallest_detectable:.2g}",
+            one.name, share, f"{amplitude.value:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{test.score:+.1f}",
+            p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
         )  # fmt: skip
     console.print(table)
-    if found.flagged:
-        for row in found.flagged:
-            station = found.station.iloc[row]
-            place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
-            console.print(f"- set aside: {place}, measured {station['value']:g}")
+    for row in found.errors.flagged:
+        station = found.predictions.station.iloc[row]
+        place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
+        console.print(f"- set aside: {place}, measured {station['value']:g}")
 
 
 def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
@@ -207,17 +207,18 @@ def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
         table.add_column(heading, justify="left" if heading == "model" else "right")
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
+        seen, scores = one.in_sample, one.predictive
         table.add_row(
-            one.name, str(one.parameters), f"{one.rmse[STREAMWISE]:.4f}", f"{one.rmse[WATER_LEVEL]:.4f}",
-            *(f"{one.rmse[kind.name]:.4f}" for kind in others), f"{one.chi2:.0f} / {one.stations}",
-            f"{held_out(one):.4f}", gain, f"{held_out(one, 'experiments'):.4f}", f"{one.log_score:.2f}",
-            f"{one.inside50:.0%}", f"{one.inside95:.0%}", f"{one.validation:.4f}",
+            one.name, str(len(one.values)), f"{seen.rmse[STREAMWISE]:.4f}", f"{seen.rmse[WATER_LEVEL]:.4f}",
+            *(f"{seen.rmse[kind.name]:.4f}" for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
+            f"{held_out_rmse(one):.4f}", gain, f"{held_out_rmse(one, 'experiments'):.4f}",
+            f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}", f"{one.validation:.4f}",
         )  # fmt: skip
     console.print(table)
     if rungs:
         console.print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
-            f"{rungs[-1].noise_floor:.4f} m/s."
+            f"{rungs[-1].in_sample.noise_floor:.4f} m/s."
         )
     if note:
         console.print(note)
@@ -230,7 +231,7 @@ def _show_ladder(rungs: Sequence[Rung], note: str) -> None:
 def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
     """What was measured besides velocities along x and levels."""
     others = (kind for kind in KINDS.values() if kind.name not in (STREAMWISE, WATER_LEVEL))
-    return [kind for kind in others if any(np.isfinite(one.rmse[kind.name]) for one in rungs)]
+    return [kind for kind in others if any(np.isfinite(one.in_sample.rmse[kind.name]) for one in rungs)]
 
 
 def _show_next(found: Sequence[tuple[str, Sequence[MeasurementWorth]]]) -> None:
@@ -247,20 +248,6 @@ def _show_next(found: Sequence[tuple[str, Sequence[MeasurementWorth]]]) -> None:
         for one in useful[:4]:
             plan = one.plan
             console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
-
-
-def _rung_json(one: Rung) -> dict[str, Any]:
-    tree = {name: value for name, value in asdict(one).items() if not isinstance(value, np.ndarray) and name != "place"}
-    tree["held_out_sections"], tree["held_out_experiments"] = held_out(one), held_out(one, "experiments")
-    tree["rmse"] = _known_numbers(one.rmse)
-    return _known_numbers(tree)
-
-
-def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """null instead of NaN, which JSON does not know."""
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
-    }
 
 
 def _question_json(what: str, worths: Sequence[MeasurementWorth]) -> dict[str, Any]:

@@ -5,7 +5,9 @@ Held out: each section, or each experiment, is left out in turn and the model ca
     dz = (J' C^-1 J + 1)^-1 (J' C^-1 r - z)   over the rows kept,   error r - J dz of those left out.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 import numpy as np
 import scipy.stats
@@ -19,35 +21,62 @@ from vegglue.inference.homogeneity import alike, told_by_data
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 
+# What is left out in turn.
+By = Literal["sections", "experiments"]
+
+
+@dataclass(frozen=True)
+class InSample:
+    """Errors at what the calibration has seen: root mean square by kind [m/s or m], chi2 of independent errors [-] over
+    so many stations, and the root mean square error of measuring a velocity [m/s].
+    """
+
+    rmse: dict[str, float]
+    chi2: float
+    stations: int
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
+    nothing could be left out. velocity: which are velocities [m/s], the others are levels [m]; clusters: the
+    experiment and the section of each.
+    """
+
+    sections: Array
+    experiments: Array
+    velocity: np.ndarray
+    clusters: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PredictiveScores:
+    """How well held-out velocities are predicted with their spread: mean log predictive density by sections, and the
+    share within the 50 % and the 95 % band [-]; NaN where nothing could be left out.
+    """
+
+    log_score: float
+    inside50: float
+    inside95: float
+
 
 @dataclass(frozen=True)
 class Rung:
-    """One model of the ladder. Errors [m/s] of velocities along x unless said; stations (n,) are the used ones.
-
-    rmse: by kind, NaN for what was not measured; sections, experiments: held-out error of each station, NaN where
-    nothing could be left out; log_score: mean log predictive density of held-out sections; inside50, inside95: share of
-    held-out measurements within the bands [-]; homogeneity: chance that a parameter is the same in all experiments, by
-    name; validation: root mean square error of velocities that no calibration has seen, NaN without them.
+    """One model of the ladder. values: parameters with their 95 % intervals; homogeneity: chance that a parameter is
+    the same in all experiments, by name; validation: root mean square error of velocities that no calibration has seen
+    [m/s], NaN without them.
     """
 
     name: str
     title: str
     effects: tuple[str, ...]
-    parameters: int
-    rmse: dict[str, float]
-    chi2: float
-    stations: int
-    noise_floor: float
-    sections: Array
-    experiments: Array
-    log_score: float
-    inside50: float
-    inside95: float
     values: dict[str, tuple[float, float, float]]
+    in_sample: InSample
+    held_out: HeldOut
+    predictive: PredictiveScores
     homogeneity: dict[str, float]
     validation: float
-    velocity: np.ndarray
-    place: tuple[str, ...]
 
 
 def rung(base: Baseline, validation: Model | None = None) -> Rung:
@@ -55,45 +84,60 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     model, noise, point = base.model, base.noise, base.fitted.point
     used = model.station.iloc[noise.rows]
     velocity = (used["kind"] == STREAMWISE).to_numpy()
-    left = noise.residual(point.prediction)
     section, spread = _held_out(base, used["section"].astype(str).to_numpy())
     experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
-    surprise = np.abs(section[velocity] / spread[velocity])
-    density = scipy.stats.norm.logpdf(section[velocity], scale=spread[velocity])
+    clusters = tuple(f"{e} {s}" for e, s in zip(used["experiment"], used["section"], strict=True))
     return Rung(
         name=model.case.name,
         title=model.case.title,
         effects=tuple(model.case.effects),
-        parameters=len(model.names),
-        rmse={kind: root_mean_square(left[(used["kind"] == kind).to_numpy()]) for kind in KINDS},
-        chi2=float(np.sum((left / noise.error) ** 2)),
-        stations=int(noise.rows.size),
-        noise_floor=root_mean_square(noise.error[velocity]),
-        sections=section,
-        experiments=experiment,
-        log_score=float(np.nanmean(density)) if np.isfinite(density).any() else float("nan"),
-        inside50=_share(surprise, 0.5),
-        inside95=_share(surprise, 0.95),
         values={name: interval95(model, base.fitted, name) for name in model.names},
+        in_sample=_in_sample(noise, noise.residual(point.prediction), used["kind"].to_numpy()),
+        held_out=HeldOut(section, experiment, velocity, clusters),
+        predictive=_predictive_scores(section[velocity], spread[velocity]),
         homogeneity=homogeneity(base),
         validation=float("nan") if validation is None else _validated(base, validation),
-        velocity=velocity,
-        place=tuple(f"{e} {s}" for e, s in zip(used["experiment"], used["section"], strict=True)),
     )
 
 
-def held_out(rung: Rung, by: str = "sections") -> float:
+def held_out_rmse(rung: Rung, by: By = "sections") -> float:
     """Root mean square held-out error of velocities [m/s]."""
-    error = getattr(rung, by)[rung.velocity]
+    error = _of_velocities(rung, by)
     return root_mean_square(error[np.isfinite(error)])
 
 
-def improvement(before: Rung, after: Rung, by: str = "sections") -> tuple[float, float]:
+def rung_json(rung: Rung) -> dict[str, Any]:
+    """One object with every number of a model that is printed; what is not a number is null."""
+    tree = {
+        "name": rung.name,
+        "title": rung.title,
+        "effects": rung.effects,
+        "parameters": len(rung.values),
+        **asdict(rung.in_sample),
+        "rmse": _known_numbers(rung.in_sample.rmse),
+        **asdict(rung.predictive),
+        "values": rung.values,
+        "homogeneity": rung.homogeneity,
+        "validation": rung.validation,
+        "held_out_sections": held_out_rmse(rung),
+        "held_out_experiments": held_out_rmse(rung, "experiments"),
+    }
+    return _known_numbers(tree)
+
+
+def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """null instead of NaN, which JSON does not know."""
+    return {
+        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
+    }
+
+
+def improvement(before: Rung, after: Rung, by: By = "sections") -> tuple[float, float]:
     """Mean of e_before^2 - e_after^2 over held-out velocities, and its standard error by clusters (experiment and
     section), both in (m/s)^2.
     """
-    gain = (getattr(before, by) ** 2 - getattr(after, by) ** 2)[after.velocity]
-    names = np.array(after.place)[after.velocity]
+    gain = _of_velocities(before, by) ** 2 - _of_velocities(after, by) ** 2
+    names = np.array(after.held_out.clusters)[after.held_out.velocity]
     known = np.isfinite(gain)
     if not known.any():
         return float("nan"), float("nan")
@@ -117,6 +161,29 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     value, error = (np.array(part) for part in zip(*told, strict=True))
     chances = {name: alike(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
     return {name: p for name, p in chances.items() if np.isfinite(p)}
+
+
+def _of_velocities(rung: Rung, by: By) -> Array:
+    held_out = rung.held_out
+    error = held_out.sections if by == "sections" else held_out.experiments
+    return error[held_out.velocity]
+
+
+def _in_sample(noise: Noise, left: Array, kind: np.ndarray) -> InSample:
+    return InSample(
+        rmse={name: root_mean_square(left[kind == name]) for name in KINDS},
+        chi2=float(np.sum((left / noise.error) ** 2)),
+        stations=int(noise.rows.size),
+        noise_floor=root_mean_square(noise.error[kind == STREAMWISE]),
+    )
+
+
+def _predictive_scores(error: Array, spread: Array) -> PredictiveScores:
+    """Of held-out errors (v,) that were predicted with a spread (v,)."""
+    density = scipy.stats.norm.logpdf(error, scale=spread)
+    log_score = float(np.nanmean(density)) if np.isfinite(density).any() else float("nan")
+    surprise = np.abs(error / spread)
+    return PredictiveScores(log_score, _share(surprise, 0.5), _share(surprise, 0.95))
 
 
 def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:

@@ -13,7 +13,9 @@ MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
 
 def excluded_by(*found: Diagnosis) -> pd.DataFrame:
     """The measurements that any of the diagnoses has flagged."""
-    flagged = [one.station.iloc[list(one.flagged)][MEASUREMENT] for one in found if one.flagged]
+    flagged = [
+        one.predictions.station.iloc[list(one.errors.flagged)][MEASUREMENT] for one in found if one.errors.flagged
+    ]
     return pd.concat(flagged, ignore_index=True).drop_duplicates() if flagged else pd.DataFrame(columns=MEASUREMENT)
 
 

@@ -1,7 +1,7 @@
-"""Suspects calibrated in earnest: the best of them, the rivals that may be it instead, the model that follows; then
-backwards, which effects accepted earlier a later one has made superfluous."""
+"""Suspects calibrated: the best of them, the rivals that may be it instead, and the model that follows; then backward
+elimination, of effects accepted earlier that a later one has made superfluous."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,8 +23,9 @@ from vegglue.screening.residual_screening import Screening, refit_start
 
 # Suspects that are refitted in one round, and steps each of them may take.
 REFITTED, REFIT_STEPS = 6, 8
-# Scores this much below the best one's (in squares, and as a share of it) are not refitted.
-BEHIND, BEHIND_SHARE = 15.0, 0.45
+# Scores this much below the best one's (in squares, and as a share of it) are not refitted, nor is one below 2 standard
+# errors: errors alone make every twentieth effect as strong.
+BEHIND, BEHIND_SHARE, LEAST_SQUARE = 15.0, 0.45, 4.0
 # Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
 # others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
 IN_SET, HARDLY = 0.95, 0.05
@@ -32,7 +33,9 @@ IN_SET, HARDLY = 0.95, 0.05
 
 @dataclass(frozen=True)
 class Refit:
-    """The quick model with one effect more at its best place; column: its trace; amplitude with its 95 % interval."""
+    """The search model with one effect more at its best place; column: its fingerprint; amplitude with its 95 %
+    interval.
+    """
 
     candidate: Candidate
     column: int
@@ -40,93 +43,97 @@ class Refit:
     amplitude: float
     interval95: tuple[float, float]
 
-    def told(self, suspect: Suspect) -> Suspect:
-        """The suspect with what its refit says of it."""
-        told = replace(suspect, amplitude=self.amplitude, interval95=self.interval95, refitted=True)
-        return replace(told, objective=self.fitted.objective)
+    def of(self, suspect: Suspect) -> Suspect:
+        """The suspect with the amplitude of its refit."""
+        first_order = replace(suspect.amplitude, value=self.amplitude, interval95=self.interval95)
+        return replace(suspect, amplitude=replace(first_order, refitted=True, objective=self.fitted.objective))
 
 
-def refits_of(seen: Screening, say: Callable[[str], None]) -> list[Refit]:
+def refits_of(screening: Screening, say: Callable[[str], None]) -> list[Refit]:
     """The most suspect effects refitted, the best first; those that find no flow are left out."""
-    tried = _handful(seen)
-    say(f"refitting with {', '.join(seen.traces.candidates[j].name for j in tried)}")
-    found = in_threads(partial(_refit, seen), [(j,) for j in tried])
+    tried = _worth_refitting(screening)
+    say(f"refitting with {', '.join(screening.fingerprints.candidates[j].name for j in tried)}")
+    found = in_threads(partial(_refit, screening), [(j,) for j in tried])
     return sorted((one for one in found if one is not None), key=lambda one: one.fitted.objective)
 
 
 def accepted(
-    seen: Screening, refits: list[Refit], later: bool, say: Callable[[str], None]
+    screening: Screening, refits: list[Refit], later: bool, say: Callable[[str], None]
 ) -> tuple[Step, Baseline] | None:
     """The best refit as a step, with the rivals that may be it instead, and the baseline it leads to.
 
     None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
     say nothing, or when no flow is found with it.
     """
-    search = search_model(seen.base)
+    search = search_model(screening.base)
     fall = [objective(search.noise, search.point) - one.fitted.objective for one in refits]
     if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
         return None
-    best, chance, groups = refits[0], *_rivals(seen, refits, np.array(fall))
+    best, chance, groups = refits[0], *rivals_among(refits, np.array(fall), score_test.cosines(screening.projected))
     if later and len(groups) > MOST_GROUPS:
         return None
     say(f"calibrating with {best.candidate.name}")
-    further = _onward(seen, best)
+    further = _calibrated_with(screening, best)
     if further is None:
         return None
-    before, p_family = chi2(seen.noise, seen.base.fitted.point), float(np.exp(seen.effects.log_p()))
+    base, p_family = screening.base, float(np.exp(screening.effects.log_p()))
+    before = chi2(base.noise, base.fitted.point)
     rivals, chances = tuple(chance), tuple(chance.values())
     return Step(best.candidate.name, rivals, chances, groups, before, further.fitted.chi2, p_family), further
 
 
-def _rivals(seen: Screening, refits: list[Refit], fall: Array) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+def rivals_among(
+    refits: Sequence[Refit], fall: Array, cosine: Array
+) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
     """The chance of each refit in the fewest groups that hold IN_SET of it, the likeliest first, and these groups.
 
-    fall (k,): by how much each lowers the objective.
+    fall (k,): by how much each lowers the objective; cosine (c, c): between projected fingerprints.
     """
     columns, names = [one.column for one in refits], [one.candidate.name for one in refits]
     chance = score_test.chances_of_rivals(fall)
     near = chance >= HARDLY * chance.max()
-    alike = np.where(near & near[:, None], score_test.cosines(seen.projected)[np.ix_(columns, columns)], 0.0)
+    alike = np.where(near & near[:, None], cosine[np.ix_(columns, columns)], 0.0)
     kept = score_test.fewest(score_test.alike_groups(range(len(refits)), alike), chance, IN_SET)
     likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
 
-def _onward(seen: Screening, best: Refit) -> Baseline | None:
+def _calibrated_with(screening: Screening, best: Refit) -> Baseline | None:
     """The model with the accepted effect as the next baseline, the error of its grid looked at again; None where it
     finds no flow.
     """
-    base, place = seen.base, best.fitted.point
-    model = _with(base.model, seen, best)
+    base, place = screening.base, best.fitted.point
+    model = _with(base.model, screening, best)
     if base.coarse is None:
         return Baseline(model, base.noise, best.fitted, None, None)
     on_own_grid = search_model(base).model is base.model
     start = place if on_own_grid else linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
         return None
-    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, seen, best)
+    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, screening, best)
     on_coarse = linearise(coarse, fitted.point.z, base.on_coarse)
     noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
     return Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse)
 
 
-def _with(model: Model, seen: Screening, one: Refit) -> Model:
-    return replace(model, case=with_effect(model.case, one.candidate, seen.traces.settings[one.column]))
+def _with(model: Model, screening: Screening, one: Refit) -> Model:
+    return replace(model, case=with_effect(model.case, one.candidate, screening.fingerprints.settings[one.column]))
 
 
-def _handful(seen: Screening) -> list[int]:
-    """Candidates worth a refit, the best score first."""
-    squares = {j: seen.best_score(j) ** 2 for j in seen.order}
+def _worth_refitting(screening: Screening) -> list[int]:
+    """Candidates whose score is not far behind the best one's, the best first."""
+    ranking = screening.ranking
+    squares = {j: screening.best_score(j) ** 2 for j in ranking}
     most = max(squares.values())
     least = min(most - BEHIND, BEHIND_SHARE * most)
-    return [j for j in seen.order[:REFITTED] if squares[j] >= max(least, 4.0)] or seen.order[:1]
+    return [j for j in ranking[:REFITTED] if squares[j] >= max(least, LEAST_SQUARE)] or ranking[:1]
 
 
-def _refit(seen: Screening, candidate: int) -> Refit | None:
-    one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
-    search = search_model(seen.base)
-    model = replace(search.model, case=with_effect(search.model.case, one, seen.traces.settings[column]))
-    start = linearise(model, refit_start(seen, candidate, model.case), search.point)
+def _refit(screening: Screening, candidate: int) -> Refit | None:
+    one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
+    search = search_model(screening.base)
+    model = replace(search.model, case=with_effect(search.model.case, one, screening.fingerprints.settings[column]))
+    start = linearise(model, refit_start(screening, candidate, model.case), search.point)
     if start is None:
         return None
     fitted = fit(model, search.noise, start, REFIT_STEPS)

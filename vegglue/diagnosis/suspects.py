@@ -1,73 +1,99 @@
-"""Effects under suspicion as a look sees them: how large to first order, how surely, and what hides them."""
+"""Effects under suspicion as score tests see them: how large to first order, how surely, what confounds them."""
 
 import numpy as np
 
-from vegglue.results.diagnosis import Suspect
+from vegglue.diagnosis.detection import FALSE_ALARMS_OF_EFFECTS
+from vegglue.results.diagnosis import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 from vegglue.screening import score_test
 from vegglue.screening.residual_screening import Screening
 
-# Length of a trace, in standard errors, that hides more often than not: the alarm is near a score of 3.2.
-HIDING = 3.0
+# Length of a fingerprint, in standard errors, that is missed more often than not: thresholds are near a score of 3.2.
+UNDETECTED_LENGTH = 3.0
 # Share of the chances that the effects listed as not excluded hold together.
-HELD = 0.9
-# Standard deviations of an effect's prior beyond which its size is not believed.
-BEYOND_BELIEF = 3.0
-# By how many standard errors a trace must be longer than the score of the alarm, to be seen 19 times of 20.
-SEEN_SURELY = 1.645
-# Standard deviations of its prior within which an effect must be seen to be testable.
+NOT_EXCLUDED_CHANCE = 0.9
+# Standard deviations of an effect's prior beyond which its size is not taken to be possible.
+LARGEST_POSSIBLE = 3.0
+# By how many standard errors a fingerprint must be longer than the threshold to be detected 19 times of 20: the 95 %
+# point of a standard normal score.
+POWER_QUANTILE = 1.645
+# Standard deviations of its prior within which an effect must be detectable to be testable.
 TESTABLE = 2.0
 
 
-def suspects_of(seen: Screening) -> dict[str, Suspect]:
-    """All effects of a look by name, none of them refitted."""
-    return {one.name: _suspect(seen, j) for j, one in enumerate(seen.traces.candidates)}
+def suspects_of(screening: Screening) -> dict[str, Suspect]:
+    """All effects of a screening by name, none of them refitted."""
+    threshold = screening.effects.threshold(FALSE_ALARMS_OF_EFFECTS)
+    candidates = screening.fingerprints.candidates
+    return {one.name: _suspect(screening, j, threshold) for j, one in enumerate(candidates)}
 
 
-def _suspect(seen: Screening, candidate: int) -> Suspect:
-    one, column = seen.traces.candidates[candidate], seen.best_column(candidate)
-    amplitude, length = one.effect.amplitude, max(float(seen.projected.length[column]), 1e-300)
-    gain = float(seen.scores[column]) / length
-    smallest = amplitude.size((seen.threshold + SEEN_SURELY) / length)
-    mimic, likeness = _mimic(seen, column)
+def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
+    """Groups of effects among which one that is there undetected is in nine of ten cases, the likeliest first.
+
+    One is taken to be there, as long as is missed more often than not, and at a possible size.
+    """
+    families = screening.fingerprints.columns
+    names = [one.name for one in screening.fingerprints.candidates]
+    possible = screening.possible_signs(UNDETECTED_LENGTH, LARGEST_POSSIBLE)
+    chance = score_test.chances(screening.projected, families, possible, UNDETECTED_LENGTH)
+    groups = score_test.likely(screening.projected, families, chance, NOT_EXCLUDED_CHANCE)
+    return tuple(tuple(names[j] for j in group) for group in groups)
+
+
+def _suspect(screening: Screening, candidate: int, threshold: float) -> Suspect:
+    one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
+    score = screening.best_score(candidate)
     return Suspect(
         name=one.name,
         title=one.effect.title,
-        unit=amplitude.unit,
-        amplitude=amplitude.at(gain),
-        interval95=(amplitude.at(gain - 1.96 / length), amplitude.at(gain + 1.96 / length)),
-        score=float(seen.scores[column]),
-        p_family=seen.family_p(candidate),
-        visibility=float(seen.projected.visible[column]),
-        smallest_detectable=smallest,
-        testable=smallest < TESTABLE * amplitude.scale,
-        refitted=False,
-        objective=seen.base.fitted.objective - float(seen.scores[column] ** 2),
-        mimicked_by=mimic,
-        likeness=likeness,
-        shapes=seen.traces.settings[column],
-        off=amplitude.off,
-        scale=amplitude.scale,
+        shapes=screening.fingerprints.settings[column],
+        amplitude=_first_order_estimate(screening, column),
+        test=ScoreTest(score, screening.effects.p_of(score)),
+        detectability=_detectability(screening, column, threshold),
     )
 
 
-def hiding(seen: Screening) -> tuple[tuple[str, ...], ...]:
-    """Groups of effects among which one that hides is in nine of ten cases, the likeliest first.
+def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimate:
+    """gain = T / |S_perp|, with a standard error of 1 / |S_perp|."""
+    amplitude, length = screening.fingerprints.amplitudes[column], _length(screening, column)
+    score = screening.effects.scores[column]
+    gain = float(score) / length
+    return AmplitudeEstimate(
+        value=amplitude.at(gain),
+        interval95=(amplitude.at(gain - 1.96 / length), amplitude.at(gain + 1.96 / length)),
+        unit=amplitude.unit,
+        off=amplitude.off,
+        scale=amplitude.scale,
+        refitted=False,
+        objective=screening.base.fitted.objective - float(score**2),
+    )
 
-    One is taken to be there, as long as hides more often than not, and at a size that may be believed.
-    """
-    family, names = seen.traces.columns, [one.name for one in seen.traces.candidates]
-    chance = score_test.chances(seen.projected, family, seen.may_be(HIDING, BEYOND_BELIEF), HIDING)
-    return tuple(tuple(names[j] for j in group) for group in score_test.likely(seen.projected, family, chance, HELD))
+
+def _detectability(screening: Screening, column: int, threshold: float) -> Detectability:
+    amplitude = screening.fingerprints.amplitudes[column]
+    smallest = amplitude.size((threshold + POWER_QUANTILE) / _length(screening, column))
+    confounder, cosine = _confounder(screening, column)
+    return Detectability(
+        visibility=float(screening.projected.visible[column]),
+        smallest=smallest,
+        testable=smallest < TESTABLE * amplitude.scale,
+        confounder=confounder,
+        cosine=cosine,
+    )
 
 
-def _mimic(seen: Screening, column: int) -> tuple[str, float]:
-    """The parameter whose slope is most like a trace, and the cosine between both."""
-    names = seen.base.model.names
+def _length(screening: Screening, column: int) -> float:
+    return max(float(screening.projected.length[column]), 1e-300)
+
+
+def _confounder(screening: Screening, column: int) -> tuple[str, float]:
+    """The parameter whose slope is most like a fingerprint, and the cosine between both."""
+    names = screening.base.model.names
     if not names:
         return "", 0.0
-    alike = _unit(seen.white[:, column]) @ _unit(seen.slopes)
-    nearest = int(np.argmax(np.abs(alike)))
-    return names[nearest], float(alike[nearest])
+    cosines = _unit(screening.prints[:, column]) @ _unit(screening.slopes)
+    nearest = int(np.argmax(np.abs(cosines)))
+    return names[nearest], float(cosines[nearest])
 
 
 def _unit(columns: np.ndarray) -> np.ndarray:

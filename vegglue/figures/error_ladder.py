@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.comparison import Rung, held_out, improvement
+from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.figures.typography import fixed, short
 from vegglue.measurements.kinds import STREAMWISE
@@ -53,9 +53,10 @@ def draw_ladder(rungs: Sequence[Rung]) -> Figure:
 
 def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
     place = np.arange(1, len(rungs) + 1)
-    held, alone = (np.array([held_out(rung, by) for rung in rungs]) for by in ("sections", "experiments"))
-    inside = np.array([rung.rmse[STREAMWISE] for rung in rungs])
-    unseen, floor = (np.array([getattr(rung, name) for rung in rungs]) for name in ("validation", "noise_floor"))
+    held = np.array([held_out_rmse(rung) for rung in rungs])
+    alone = np.array([held_out_rmse(rung, "experiments") for rung in rungs])
+    inside = np.array([rung.in_sample.rmse[STREAMWISE] for rung in rungs])
+    unseen, floor = np.array([(rung.validation, rung.in_sample.noise_floor) for rung in rungs]).T
     bars = np.array([np.nan, *(_spread(*pair) for pair in pairwise(rungs))])
     axes.errorbar(place, held, np.nan_to_num(bars), fmt="o-", color=COLOUR["model"], markersize=6, linewidth=1.6,
                   elinewidth=1.1, capsize=3)  # fmt: skip
@@ -79,7 +80,7 @@ def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
 
 def _spread(before: Rung, after: Rung) -> float:
     """Standard error of the fall of the held-out error: that of the mean square, over 2 RMSE [m/s]."""
-    return improvement(before, after)[1] / (2.0 * held_out(after))
+    return improvement(before, after)[1] / (2.0 * held_out_rmse(after))
 
 
 def _name_lines(axes: Axes, x: float, lines: dict[str, tuple[Array, str]]) -> None:
@@ -99,7 +100,7 @@ def _name_lines(axes: Axes, x: float, lines: dict[str, tuple[Array, str]]) -> No
 def _step_name(rungs: Sequence[Rung], k: int) -> str:
     new = [name for name in rungs[k].effects if k == 0 or name not in rungs[k - 1].effects]
     added = "".join(f"\n+ {name}" for name in new)
-    return f"{k + 1}  {rungs[k].name}{added}\n{rungs[k].parameters} parameters"
+    return f"{k + 1}  {rungs[k].name}{added}\n{len(rungs[k].values)} parameters"
 
 
 def _paint_parameter(axes: Axes, rungs: Sequence[Rung], name: str) -> None:

@@ -143,8 +143,8 @@ def groundwork(model: Model, ensemble: Ensemble, rule: str) -> Groundwork:
     for _ in range(TURNS if rule != "known" else 0):
         noise = _sized(noise, fits[0], model.station)
         fits = _again(model, noise, fits)
-    seen = screen(Baseline(model, noise, fits[0], coarse, on_coarse))
-    noise = seen.noise if rule == "known" else replace(seen.noise, scale=1.0)
+    estimated = screen(Baseline(model, noise, fits[0], coarse, on_coarse)).base.noise
+    noise = estimated if rule == "known" else replace(estimated, scale=1.0)
     fits = _again(model, noise, fits)
     surprise = unexplained_residual(noise, fits[0].point)
     return Groundwork(model, noise, tuple(fits), modes.starts, surprise, rule == "known" and on_coarse is not None)

@@ -25,8 +25,8 @@ from vegglue.site.polygons import corners_of
 
 # Effects drawn at once, and sections side by side.
 SECTIONS_DRAWN, PANELS_ACROSS = 16, 4
-# Letters of the verdict in a line; with more than these it may run off the screen.
-LINE = 135
+# Letters in a line above the screen: with 150, lines of wide letters were cut off at its right edge.
+SENTENCE = 140
 
 
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
@@ -49,16 +49,16 @@ def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str,
 def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
     figure = Figure(figsize=(14, 8.6), layout="constrained")
-    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict}. {diagnosis.sentence}", LINE)
+    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", SENTENCE)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
-    paint_suspects(scores, visible, _table(diagnosis), diagnosis.threshold)
-    paint_alike(alike.subplots(), diagnosis.cosine_names, diagnosis.cosine)
-    if len(diagnosis.zones):
-        paint_zones(zones.subplots(), diagnosis.zones)
-    if diagnosis.map_x.size:
+    paint_suspects(scores, visible, _table(diagnosis), diagnosis.first_screening.threshold)
+    paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
+    if len(diagnosis.misfit.zones):
+        paint_zones(zones.subplots(), diagnosis.misfit.zones)
+    if diagnosis.drag_map.x.size:
         place = lower.subplots()
         paint_places(place, *_map(diagnosis), patches, _stations(diagnosis))
     return figure
@@ -74,26 +74,20 @@ def _table(diagnosis: Diagnosis) -> pd.DataFrame:
     drawn = [one for k, one in enumerate(order) if k < SECTIONS_DRAWN or one.name in diagnosis.set]
     rows = [
         {"name": one.name, "status": standing_of(diagnosis, one), "first": first_score(diagnosis, one),
-         "left": last_score(diagnosis, one), "visibility": one.visibility}
+         "left": last_score(diagnosis, one), "visibility": one.detectability.visibility}
         for one in drawn
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=["name", "status", "first", "left", "visibility"])
 
 
-def _with_predictions(diagnosis: Diagnosis) -> pd.DataFrame:
-    return diagnosis.station.assign(
-        prediction_first=diagnosis.prediction_first, prediction=diagnosis.prediction, error=diagnosis.error
-    )
-
-
 def _stations(diagnosis: Diagnosis) -> np.ndarray:
-    return diagnosis.station[["x", "y"]].drop_duplicates().to_numpy(float)
+    return diagnosis.predictions.station[["x", "y"]].drop_duplicates().to_numpy(float)
 
 
 def _map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
-    where = diagnosis.where
-    found = None if where is None else (where.x, where.y)
-    return diagnosis.map_x, diagnosis.map_y, diagnosis.map_score, found
+    location, drag = diagnosis.verdict.location, diagnosis.drag_map
+    found = None if location is None else (location.x, location.y)
+    return drag.x, drag.y, drag.score, found
 
 
 def _outlines(case: Case) -> list[Outline]:
@@ -104,29 +98,30 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     table = _table(diagnosis)
     if table.empty:
         return
-    out = sum(abs(first_score(diagnosis, one)) > diagnosis.threshold for one in diagnosis.suspects)
+    threshold = diagnosis.first_screening.threshold
+    out = sum(abs(first_score(diagnosis, one)) > threshold for one in diagnosis.suspects)
     left = [last_score(diagnosis, one) for one in diagnosis.suspects]
     caption = (
         f"<b>Suspects.</b> Of {count(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
-        f"errors alone seldom do ({fixed(diagnosis.threshold, 1)} standard errors, dashed)"
+        f"errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
     )
     if diagnosis.steps:
-        still = int(np.sum(np.abs(np.nan_to_num(left)) > diagnosis.threshold))
+        still = int(np.sum(np.abs(np.nan_to_num(left)) > threshold))
         after = f"{still} still {'does' if still == 1 else 'do'}" if still else "none does any more"
         caption += f"; with {html.escape(added(diagnosis))} added, {after} (rings)"
     caption += ". Visibility: the share of its trace that no change of the calibrated parameters can mimic."
     alt = "Effects ranked by score: " + ", ".join(
         f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
     )
-    yield picture(run, draw_suspects(table, diagnosis.threshold), "missing-suspects", caption, alt)
+    yield picture(run, draw_suspects(table, threshold), "missing-suspects", caption, alt)
 
 
 def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    stations = _with_predictions(diagnosis)
+    stations = diagnosis.predictions.table
     velocity = stations[stations["kind"] == STREAMWISE]
     sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
     names = added(diagnosis)
-    before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
+    before, after = (error_of(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last))
     told = f"The model misses the velocities by {short(after, 2)} m/s (root mean square)"
     if names:
         told = f"With {html.escape(names)} the error falls from {short(before, 2)} to {short(after, 2)} m/s"
@@ -137,19 +132,18 @@ def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
             f"<b>Where it fails, {html.escape(part)}.</b> {told}. Below each section what is left, in standard errors; "
             f"shaded: what errors alone seldom leave."
         )
-        figure = draw_profiles(shown, names, diagnosis.flagged)
+        figure = draw_profiles(shown, names, diagnosis.errors.flagged)
         yield picture(
             run, figure, f"missing-profiles-{start // PANELS_ACROSS + 1}", caption, f"Velocities of {part}. {told}."
         )
 
 
 def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    stations = _with_predictions(diagnosis)
+    stations = diagnosis.predictions.table
     if not (stations["kind"] == WATER_LEVEL).any():
         return
-    before, after = (
-        1000 * error_of(diagnosis, each, WATER_LEVEL) for each in (diagnosis.prediction_first, diagnosis.prediction)
-    )
+    both = diagnosis.predictions.first, diagnosis.predictions.last
+    before, after = (1000 * error_of(diagnosis, each, WATER_LEVEL) for each in both)
     told = f"{short(after, 2)} mm"
     if diagnosis.steps:
         told = f"{short(before, 2)} mm before (hollow) and {told} with {html.escape(added(diagnosis))} (full)"
@@ -158,14 +152,15 @@ def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
 
 
 def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    if not diagnosis.map_x.size:
+    if not diagnosis.drag_map.x.size:
         return
-    where = diagnosis.where
-    if where is not None:
+    location = diagnosis.verdict.location
+    if location is not None:
         given = f"With {html.escape(added(diagnosis))} in the model, a" if diagnosis.steps else "A"
         told = (
-            f"{given} spot of drag at x = {fixed(where.x, 1)} m, y = {fixed(where.y, 1)} m would explain most "
-            f"({fixed(abs(where.score), 1)} standard errors); {html.escape(', '.join(where.experiments))} point at it"
+            f"{given} spot of drag at x = {fixed(location.x, 1)} m, y = {fixed(location.y, 1)} m would explain most "
+            f"({fixed(abs(location.score), 1)} standard errors); {html.escape(', '.join(location.experiments))} point "
+            "at it"
         )
     elif diagnosis.steps:
         told = f"Before {html.escape(added(diagnosis))} is added; no place explains as much as that does"
@@ -184,7 +179,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    zones = diagnosis.zones
+    zones = diagnosis.misfit.zones
     if zones.empty:
         return
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
@@ -201,12 +196,14 @@ def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
 
 
 def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    if len(diagnosis.cosine_names) < 2:
+    names, cosine = diagnosis.first_screening.compared, diagnosis.first_screening.cosine
+    if len(names) < 2:
         return
-    families = [group for group in alike_groups(diagnosis.cosine_names, diagnosis.cosine) if len(group) > 1]
+    families = [group for group in alike_groups(names, cosine) if len(group) > 1]
     told = "No two of the strongest suspects leave the same trace"
     if families:
         told = f"These data cannot tell apart {'; nor '.join(_listed(group) for group in families)}"
     caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(told)}."
-    figure = draw_alike(diagnosis.cosine_names, diagnosis.cosine)
-    yield picture(run, figure, "missing-alike", caption, f"Cosines between traces of effects. {told}.")
+    yield picture(
+        run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {told}."
+    )

@@ -64,10 +64,9 @@ class Told:
 def diagnosis_in_words(diagnosis: Diagnosis) -> Told:
     """Everything the report says of a diagnosis."""
     first, others = _suspect_rows(diagnosis)
-    flagged = [_flagged(diagnosis, row) for row in diagnosis.flagged]
-    return Told(
-        diagnosis.sentence, diagnosis.remarks, _numbers(diagnosis), first, others, bool(diagnosis.steps), flagged
-    )
+    flagged = [_flagged(diagnosis, row) for row in diagnosis.errors.flagged]
+    verdict, numbers = diagnosis.verdict, _numbers(diagnosis)
+    return Told(verdict.sentence, verdict.remarks, numbers, first, others, bool(diagnosis.steps), flagged)
 
 
 def standing_of(diagnosis: Diagnosis, suspect: Suspect) -> str:
@@ -76,19 +75,20 @@ def standing_of(diagnosis: Diagnosis, suspect: Suspect) -> str:
         return "accepted"
     if suspect.name in diagnosis.set:
         return "rival"
-    if not suspect.testable:
+    if not suspect.detectability.testable:
         return "untestable"
-    return "less likely" if abs(first_score(diagnosis, suspect)) > diagnosis.threshold else "no sign"
+    threshold = diagnosis.first_screening.threshold
+    return "less likely" if abs(first_score(diagnosis, suspect)) > threshold else "no sign"
 
 
 def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
     """Its score before anything was added [standard errors]."""
-    return diagnosis.first_scores.get(suspect.name, suspect.score)
+    return diagnosis.first_screening.scores.get(suspect.name, suspect.test.score)
 
 
 def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
     """Its score at the last look, NaN where that was the first or it was refitted instead."""
-    return float("nan") if suspect.refitted or not diagnosis.steps else suspect.score
+    return float("nan") if suspect.amplitude.refitted or not diagnosis.steps else suspect.test.score
 
 
 def ranked(diagnosis: Diagnosis) -> list[Suspect]:
@@ -107,9 +107,9 @@ def added(diagnosis: Diagnosis) -> str:
 
 def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
     """Root mean square of measured minus predicted over the stations that count [unit of the kind], NaN without."""
-    station = diagnosis.station
+    station = diagnosis.predictions.station
     counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
-    counted[list(diagnosis.flagged)] = False
+    counted[list(diagnosis.errors.flagged)] = False
     return root_mean_square((station["value"].to_numpy(float) - prediction)[counted])
 
 
@@ -121,22 +121,24 @@ def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectR
 
 
 def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
-    unit = unit_html(suspect.unit)
+    estimate, detectability = suspect.amplitude, suspect.detectability
+    unit = unit_html(estimate.unit)
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
     scores = first_score(diagnosis, suspect), last_score(diagnosis, suspect)
-    alike = abs(suspect.likeness) > LOOKS_LIKE and suspect.mimicked_by in diagnosis.first_parameters
+    parameter = detectability.confounder
+    alike = abs(detectability.cosine) > LOOKS_LIKE and parameter in diagnosis.parameters.first
     return SuspectRow(
         name=html.escape(suspect.name),
         title=html.escape(suspect.title),
         standing=standing_of(diagnosis, suspect),
         chance=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
-        amplitude=short(suspect.amplitude, 3) + unit,
-        interval=interval(*suspect.interval95),
-        p_family=p_value(suspect.p_family),
+        amplitude=short(estimate.value, 3) + unit,
+        interval=interval(*estimate.interval95),
+        p_family=p_value(suspect.test.p_family),
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
-        visibility=fixed(suspect.visibility, 2),
-        detectable=short(suspect.smallest_detectable, 2) + unit,
-        looks_like=html.escape(suspect.mimicked_by) if alike else "",
+        visibility=fixed(detectability.visibility, 2),
+        detectable=short(detectability.smallest, 2) + unit,
+        looks_like=html.escape(parameter) if alike else "",
     )
 
 
@@ -146,7 +148,8 @@ def p_value(p: float) -> str:
 
 
 def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
-    station, predicted = diagnosis.station.iloc[row], float(diagnosis.prediction[row])
+    station = diagnosis.predictions.station.iloc[row]
+    predicted = float(diagnosis.predictions.last[row])
     value = float(station["value"])
     return FlaggedRow(
         experiment=str(station["experiment"]),
@@ -161,15 +164,16 @@ def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
 
 def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     """How much the misfit fell, and what the errors were taken to be."""
-    before, after = (error_of(diagnosis, each) for each in (diagnosis.prediction_first, diagnosis.prediction))
+    misfit, errors = diagnosis.misfit, diagnosis.errors
+    before, after = (error_of(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last))
     fell = bool(diagnosis.steps)
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
-    misfit = f"{diagnosis.chi2_first:,.0f} → {diagnosis.chi2:,.0f}" if fell else f"{diagnosis.chi2:,.0f}"
-    apart = len(diagnosis.suspects) - sum(one.testable for one in diagnosis.suspects)
+    chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
+    apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)
     return [
-        KeyNumber("chi², correlated errors", misfit, f"for {diagnosis.freedom} degrees of freedom"),
+        KeyNumber("chi², correlated errors", chi2, f"for {misfit.freedom} degrees of freedom"),
         KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
         KeyNumber("effects tried", f"{len(diagnosis.suspects)}", f"{apart} of them untestable with these data"),
-        KeyNumber("correlation of neighbours", fixed(diagnosis.correlation, 2), "of the errors along a section"),
-        KeyNumber("error of the grid", f"{short(1000 * diagnosis.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
+        KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),
+        KeyNumber("error of the grid", f"{short(1000 * errors.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
     ]

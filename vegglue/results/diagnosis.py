@@ -1,59 +1,78 @@
-"""What a diagnosis says: the verdict, the effects that explain the misfit, where it lies, and all numbers behind it."""
+"""What a diagnosis says, as values: the verdict, the effects that explain the misfit, where it lies, and all numbers.
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal
+How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
+"""
 
-import numpy as np
+from dataclasses import dataclass
+from typing import Literal
+
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
-from vegglue.results.layout import Group, Variable, table_group
 
-Verdict = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
-# Sum over families of what the data may accuse without cause: listed effects and unlisted places.
-ALARM, ALARM_OF_PLACES = 0.04, 0.01
-# Fields that are lists or tables of plain values.
-LISTS = ("remarks", "not_excluded", "flagged", "first_scores", "first_parameters", "parameters")
-# Fields that have one value for each station.
-AT_STATIONS = ("prediction_first", "prediction", "error")
+VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
+
+
+@dataclass(frozen=True)
+class AmplitudeEstimate:
+    """How large an effect is, in the unit of its amplitude.
+
+    value, interval95: from its own refit when there was one (refitted), else to first order. off, scale: where the
+    amplitude does nothing, and how far from there is plausible. objective: the least sum of squares with the effect,
+    |W (y - f)|^2 + |z|^2 [-], predicted where it was not refitted.
+    """
+
+    value: float
+    interval95: tuple[float, float]
+    unit: str
+    off: float
+    scale: float
+    refitted: bool
+    objective: float
+
+    @property
+    def relative_size(self) -> float:
+        """|value - off| / scale [-]."""
+        return abs(self.value - self.off) / self.scale
+
+
+@dataclass(frozen=True)
+class ScoreTest:
+    """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
+
+    p_family: counted among bootstrap draws, never below one over their number; see `score_test.family_p`.
+    """
+
+    score: float
+    p_family: float
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """Whether these data could show an effect.
+
+    visibility: share of its fingerprint that calibration cannot mimic [-]. smallest: distance of the amplitude from off
+    that is detected 19 times of 20; testable: that is less than twice a plausible one. confounder: the parameter whose
+    slope is most like the fingerprint; cosine: between both [-].
+    """
+
+    visibility: float
+    smallest: float
+    testable: bool
+    confounder: str
+    cosine: float
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """One effect as the data see it at the last baseline at which it was looked at.
-
-    amplitude, interval95: from its own refit when there was one, else to first order; unit of the amplitude. p_family:
-    chance that errors alone make any effect look as strong. visibility: share of its trace that calibration cannot
-    mimic [-]. smallest_detectable: distance of the amplitude from off that stands out 19 times of 20; testable: that
-    is less than twice a plausible one; mimicked_by: the parameter most alike; off, scale: where the amplitude does
-    nothing, and how far from there is plausible.
-    """
+    """One effect as the data see it, in the last model in which it was tested; shapes: at which it scores best."""
 
     name: str
     title: str
-    unit: str
-    amplitude: float
-    interval95: tuple[float, float]
-    score: float
-    p_family: float
-    visibility: float
-    smallest_detectable: float
-    testable: bool
-    refitted: bool
-    objective: float
-    mimicked_by: str
-    likeness: float
     shapes: dict[str, float]
-    off: float
-    scale: float
-
-    @property
-    def stretch(self) -> float:
-        """Amplitude over a plausible one [-]."""
-        return abs(self.amplitude - self.off) / self.scale
+    amplitude: AmplitudeEstimate
+    test: ScoreTest
+    detectability: Detectability
 
 
 @dataclass(frozen=True)
@@ -61,7 +80,8 @@ class Step:
     """One round of the search: what was accepted, what it may be instead, chi2 before and after.
 
     rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
-    one of those that were refitted.
+    one of those that were refitted. p_family: chance that errors alone make any effect score as high as the best one
+    [-], the value that was decided by; see `score_test.log_family_p`.
     """
 
     accepted: str
@@ -79,8 +99,10 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Where:
-    """A place [m] and the experiments that point at it."""
+class DragLocation:
+    """Where [m] more or less drag than the model has would explain most: how much [1/m], its score [standard errors],
+    and the experiments that point at it.
+    """
 
     x: float
     y: float
@@ -90,46 +112,106 @@ class Where:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """Everything a diagnosis found. chi2, freedom: of the last model, whitened; flagged: rows of stations that no
-    effect explains and that stand alone; zones: misfit by experiment, section and zone; prediction_first,
-    prediction: (station,) of the baseline and of the last model; map_x, map_y, map_score: scores of a spot of drag
-    everywhere, of the model in which `where` was found, else of the first.
-    not_excluded: where nothing stood out, groups of effects among which one that hides is, nine times of ten.
-    threshold, first_scores: score that errors alone reach once in 1 / ALARM, and those of the effects at the baseline.
+class Verdict:
+    """What was concluded. location: of drag that no listed effect explains, None without; not_excluded: where nothing
+    was detected, groups of effects among which one that is there undetected is, nine times of ten.
     """
 
-    name: str
-    verdict: Verdict
+    kind: VerdictKind
     sentence: str
     remarks: tuple[str, ...]
-    suspects: tuple[Suspect, ...]
-    steps: tuple[Step, ...]
-    where: Where | None
+    location: DragLocation | None
     not_excluded: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """chi2 = |W (y - f)|^2 of the first and of the last model [-]; freedom: degrees of the last; p: chance of a chi2 as
+    large under errors alone; zones: mean misfit of the first by experiment, section and zone.
+    """
+
     chi2_first: float
     chi2: float
     freedom: int
-    p_misfit: float
+    p: float
+    zones: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class EstimatedErrors:
+    """What the errors were taken to be: correlation of neighbours [-], true over stated errors [-], root mean square
+    error of the grid, and rows of the stations rejected as outliers.
+    """
+
     correlation: float
     scale: float
     grid_error: float
     flagged: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FirstScreening:
+    """Score tests of the first model. threshold: score that errors alone reach at the false-alarm rate of effects;
+    scores: by name [standard errors]; cosine (c, c): between the fingerprints of the strongest effects `compared` (c,).
+    """
+
     threshold: float
-    first_scores: dict[str, float]
-    first_parameters: dict[str, float]
-    parameters: dict[str, tuple[float, float, float]]
-    zones: pd.DataFrame
-    station: pd.DataFrame
-    prediction_first: Array
-    prediction: Array
-    error: Array
-    map_x: Array
-    map_y: Array
-    map_score: Array
-    cosine_names: tuple[str, ...]
+    scores: dict[str, float]
+    compared: tuple[str, ...]
     cosine: Array
+
+
+@dataclass(frozen=True)
+class ParameterEstimates:
+    """Calibrated parameters by name: of the first model, and of the last one with their 95 % intervals."""
+
+    first: dict[str, float]
+    last: dict[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """The table of stations, what the first and the last model predict there, and the standard errors of what was
+    measured, NaN where it was not used; (station,) each [m/s or m].
+    """
+
+    station: pd.DataFrame
+    first: Array
+    last: Array
+    error: Array
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Stations with columns prediction_first, prediction and error."""
+        return self.station.assign(prediction_first=self.first, prediction=self.last, error=self.error)
+
+
+@dataclass(frozen=True)
+class DragMap:
+    """Scores [standard errors] of a spot of drag at x, y [m], (spot,) each: of the model in which a location was
+    found, else of the first.
+    """
+
+    x: Array
+    y: Array
+    score: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found in the case `name`, by which version."""
+
+    name: str
     version: str
+    verdict: Verdict
+    suspects: tuple[Suspect, ...]
+    steps: tuple[Step, ...]
+    misfit: Misfit
+    errors: EstimatedErrors
+    first_screening: FirstScreening
+    parameters: ParameterEstimates
+    predictions: Predictions
+    drag_map: DragMap
 
     @property
     def set(self) -> list[str]:
@@ -141,137 +223,14 @@ class Diagnosis:
         """Chance of each effect of the set, in the step that accepted it or the first that names it."""
         own = {step.accepted: step.chance[step.accepted] for step in self.steps}
         first = {name: chance for step in reversed(self.steps) for name, chance in step.chance.items()}
-        told = first | own
-        return {name: told[name] for step in self.steps for name in step.rivals}
+        of_each = first | own
+        return {name: of_each[name] for step in self.steps for name in step.rivals}
 
     @property
     def groups(self) -> list[list[str]]:
+        """Of effects that the data cannot tell apart, over all steps."""
         return [list(group) for step in self.steps for group in step.groups]
 
-
-def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """One object with every number that is printed."""
-    told = {
-        "verdict": diagnosis.verdict,
-        "sentence": diagnosis.sentence,
-        "set": diagnosis.set,
-        "groups": diagnosis.groups,
-        "not_excluded": diagnosis.not_excluded,
-        "where": None if diagnosis.where is None else asdict(diagnosis.where),
-        "effects": [asdict(suspect) for suspect in diagnosis.suspects],
-        "steps": [asdict(step) for step in diagnosis.steps],
-        "remarks": diagnosis.remarks,
-        "chi2": {"first": diagnosis.chi2_first, "last": diagnosis.chi2, "freedom": diagnosis.freedom,
-                 "p": diagnosis.p_misfit},
-        "threshold": diagnosis.threshold,
-        "noise": {"correlation": diagnosis.correlation, "scale": diagnosis.scale, "grid_error": diagnosis.grid_error},
-        "flagged": [_flagged(diagnosis, row) for row in diagnosis.flagged],
-        "parameters": diagnosis.parameters,
-        "first_parameters": diagnosis.first_parameters,
-        "zones": diagnosis.zones.to_dict("records"),
-    }  # fmt: skip
-    return {name: _plain(value) for name, value in told.items()}
-
-
-def _flagged(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
-    station = diagnosis.station.iloc[row]
-    place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
-    return place | {name: float(station[name]) for name in ("x", "y", "value")}
-
-
-def _plain(tree: Any) -> Any:
-    """Numbers as JSON knows them: no NaN, no infinity, no tuples."""
-    if isinstance(tree, Mapping):
-        return {key: _plain(value) for key, value in tree.items()}
-    if isinstance(tree, list | tuple):
-        return [_plain(value) for value in tree]
-    if isinstance(tree, float | np.floating):
-        return float(tree) if np.isfinite(tree) else None
-    return tree
-
-
-def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
-    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places."""
-    stations = table_group(diagnosis.station, "station", STATION_UNITS)
-    values = {name: Variable(("station",), getattr(diagnosis, name), VALUE_UNIT) for name in AT_STATIONS}
-    suspects = pd.DataFrame([_row(suspect) for suspect in diagnosis.suspects])
-    places = {
-        "x": Variable(("place",), diagnosis.map_x, "m"),
-        "y": Variable(("place",), diagnosis.map_y, "m"),
-        "score": Variable(("place",), diagnosis.map_score),
-    }
-    names = np.array(diagnosis.cosine_names, object)
-    return {
-        "stations": Group(stations.coordinates, {**stations.variables, **values}),
-        "suspects": table_group(suspects, "suspect", {}),
-        "zones": table_group(diagnosis.zones, "zone_number", {}),
-        "places": Group({"place": np.arange(diagnosis.map_x.size)}, places),
-        "alike": Group({"name": names, "other": names}, {"cosine": Variable(("name", "other"), diagnosis.cosine)}),
-    }
-
-
-def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
-    """For the attributes of the file: one number or word as it is, what is neither that nor an array as JSON."""
-    return {name: getattr(diagnosis, name) for name in _plain_names()} | {
-        "steps": json.dumps([asdict(step) for step in diagnosis.steps]),
-        "where": json.dumps(None if diagnosis.where is None else asdict(diagnosis.where)),
-        **{name: json.dumps(getattr(diagnosis, name)) for name in LISTS},
-    }
-
-
-def diagnosis_from(read: Mapping[str, Mapping[str, Any]], stated: Mapping[str, Any]) -> Diagnosis:
-    """The diagnosis whose file has these groups and attributes."""
-    stations, places = read["stations"], read["places"]
-    told = {name: json.loads(stated[name]) for name in ("steps", "where", *LISTS)}
-    where = told["where"]
-    return Diagnosis(
-        **{name: kind(stated[name]) for name, kind in _plain_names().items()},
-        remarks=tuple(told["remarks"]),
-        not_excluded=tuple(tuple(group) for group in told["not_excluded"]),
-        suspects=_suspects_from(read["suspects"]),
-        steps=tuple(_step_from(step) for step in told["steps"]),
-        where=None if where is None else Where(**where | {"experiments": tuple(where["experiments"])}),
-        flagged=tuple(told["flagged"]),
-        first_scores=told["first_scores"],
-        first_parameters=told["first_parameters"],
-        parameters={name: tuple(values) for name, values in told["parameters"].items()},
-        zones=_table_from(read["zones"], "zone_number"),
-        station=_table_from(stations, "station", *AT_STATIONS),
-        **{name: stations[name] for name in AT_STATIONS},
-        map_x=places["x"],
-        map_y=places["y"],
-        map_score=places["score"],
-        cosine_names=tuple(read["alike"]["name"]),
-        cosine=read["alike"]["cosine"],
-    )
-
-
-def _plain_names() -> dict[str, type]:
-    """Fields of a diagnosis that are one number or word."""
-    kinds = {each.name: each.type for each in fields(Diagnosis)}
-    return {
-        name: str if kind is Verdict else kind for name, kind in kinds.items() if kind in (str, int, float, Verdict)
-    }
-
-
-def _table_from(group: Mapping[str, Any], *others: str) -> pd.DataFrame:
-    return pd.DataFrame({name: values for name, values in group.items() if name not in others})
-
-
-def _step_from(step: dict[str, Any]) -> Step:
-    lists = {name: tuple(step[name]) for name in ("rivals", "chances")}
-    return Step(**step | lists | {"groups": tuple(tuple(group) for group in step["groups"])})
-
-
-def _row(suspect: Suspect) -> dict[str, Any]:
-    row = asdict(suspect)
-    low, high = row.pop("interval95")
-    return row | {"low95": low, "high95": high, "shapes": json.dumps(suspect.shapes)}
-
-
-def _suspects_from(group: Mapping[str, Any]) -> tuple[Suspect, ...]:
-    found = []
-    for row in _table_from(group, "suspect").to_dict("records"):
-        interval = row.pop("low95"), row.pop("high95")
-        found.append(Suspect(**row | {"interval95": interval, "shapes": json.loads(row["shapes"])}))
-    return tuple(found)
+    def suspect(self, name: str) -> Suspect:
+        """The effect of that name; KeyError without."""
+        return {one.name: one for one in self.suspects}[name]

@@ -1,18 +1,18 @@
-"""One look at a calibrated model: which effect, place or single station the misfit points at, and how surely."""
+"""Score tests of a calibrated model: which effect, spot of drag or single station its residual points at."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.calibration.noise import Noise, drawn_errors, estimated
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
-from vegglue.results.diagnosis import ALARM
+from vegglue.engine.interface import Point
 from vegglue.screening import score_test
 from vegglue.screening.candidates import start_of
+from vegglue.screening.family_wise_p import Family, family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
 
 # Size [1/m] of unlisted drag that is set aside when the noise is estimated: twenty times the friction of a bed of
@@ -25,154 +25,109 @@ FREE = 1e4
 
 
 @dataclass(frozen=True)
-class Family:
-    """Scores T of fingerprints that are one hypothesis; many: how many independent ones they amount to under errors
-    alone, so that the chance of the best is 1 - (1 - sf(T^2))^many.
-    """
-
-    scores: Array
-    many: float
-
-    @property
-    def best(self) -> int:
-        return int(np.argmax(self.scores**2))
-
-    def log_p(self, slack: float = 0.0) -> float:
-        """ln of the family-wise p of a best score that is too large by `slack`, beyond what a bootstrap counts."""
-        score = max(float(np.abs(self.scores).max()) - slack, 0.0)
-        log_tail = float(scipy.stats.chi2.logsf(score**2, 1))
-        log_p = np.log(self.many) + log_tail
-        if log_p > -4.0:
-            log_p = np.log(-np.expm1(self.many * np.log1p(-min(np.exp(log_tail), 1.0 - 1e-12))))
-        return float(min(log_p, 0.0))
-
-
-@dataclass(frozen=True)
 class Screening:
-    """What the residual of a baseline says of all that could be missing. base: with the errors as estimated here.
+    """What the residual of a baseline says of all that could be missing.
 
-    white, slopes: whitened traces of candidates (n, c) and slopes (n, p); flagged: stations that count for nothing,
-    places among the used ones; maxima: largest squares of scores under errors alone.
+    base: with the errors as estimated here; flagged: stations rejected as outliers, places among the used ones.
+    slopes (n, p), prints (n, c): of parameters and candidates, whitened; projected: the candidates' once calibration
+    is projected out. effects, spots, stations: score tests of candidates, of spots of drag, of single stations.
     """
 
     base: Baseline
     flagged: tuple[int, ...]
-    traces: Fingerprints
-    white: Array
+    fingerprints: Fingerprints
     slopes: Array
+    prints: Array
     projected: score_test.Projected
-    scores: Array
-    maxima: Array
     effects: Family
-    places: Family
+    spots: Family
     stations: Family
-    spot_length: Array
-
-    @property
-    def noise(self) -> Noise:
-        return self.base.noise
 
     def best_column(self, candidate: int) -> int:
-        columns = self.traces.columns[candidate]
-        return int(columns[np.argmax(self.scores[columns] ** 2)])
+        """The fingerprint of a candidate that scores highest, of the settings of its shapes."""
+        columns = self.fingerprints.columns[candidate]
+        return int(columns[np.argmax(self.effects.scores[columns] ** 2)])
 
     def best_score(self, candidate: int) -> float:
-        return float(self.scores[self.best_column(candidate)])
-
-    def family_p(self, candidate: int) -> float:
-        return score_test.family_p(self.best_score(candidate), self.maxima)
+        return float(self.effects.scores[self.best_column(candidate)])
 
     @property
-    def threshold(self) -> float:
-        """Score that errors alone reach once in 1 / ALARM."""
-        return float(np.sqrt(np.quantile(self.maxima, 1.0 - ALARM)))
-
-    def may_be(self, length: float, most: float) -> np.ndarray:
-        """Whether traces may be `length` standard errors long, with either sign, (2, c): see `Amplitude.may_be`."""
-        return self.traces.may_be(length / np.maximum(self.projected.length, 1e-300), most)
-
-    @property
-    def order(self) -> list[int]:
+    def ranking(self) -> list[int]:
         """Candidates, the best score first."""
-        squares = [self.best_score(j) ** 2 for j in range(len(self.traces.candidates))]
+        squares = [self.best_score(j) ** 2 for j in range(len(self.fingerprints.candidates))]
         return [int(j) for j in np.argsort(-np.array(squares))]
+
+    def possible_signs(self, length: float, most: float) -> np.ndarray:
+        """Whether fingerprints may be `length` standard errors long, with either sign, (2, c); see `Amplitude.may_be`.
+
+        most: how large an amplitude may be, in plausible ones.
+        """
+        return self.fingerprints.may_be(length / np.maximum(self.projected.length, 1e-300), most)
 
 
 def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | None = None, seed: int = 1) -> Screening:
-    """Traces of all candidates, of spots everywhere and of single stations, against the residual.
+    """Score tests of all candidates, of spots of drag everywhere and of single stations, against the residual.
 
-    The correlation of the errors is estimated first, with all that could be missing set aside. before: an earlier look,
-    whose traces are taken if they are those of the same point.
+    The correlation of the errors is estimated first, with all that could be missing set aside. before: an earlier
+    screening, whose fingerprints are taken if they are those of the same point.
     """
     point = search_model(base).point
-    traces = before.traces if before is not None and before.traces.point is point else fingerprints_of(base)
-    slope, prints, spots = (base.noise.used(values) for values in (point.slope, traces.prints, traces.spots.traces))
+    fingerprints = _earlier(before, point) or fingerprints_of(base)
+    changes = point.slope, fingerprints.prints, fingerprints.spots.traces
+    slope, prints, spots = (base.noise.used(values) for values in changes)
     left, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
-    noise = _noise(base.noise, traces, (slope, prints, spots), left, z)
+    noise = _estimated_noise(base.noise, fingerprints, (slope, prints, spots), left, z)
+    errors = drawn_errors(noise, score_test.NULL_DRAWS, np.random.default_rng((seed, 1)))
 
     def against(values: Array) -> score_test.Projected:
         return score_test.project(noise.whiten(slope), noise.whiten(left), z, noise.whiten(values))
 
-    projected, of_spots, of_stations = against(prints), against(spots), against(np.eye(left.size))
-    errors = drawn_errors(noise, score_test.NULL_DRAWS, np.random.default_rng((seed, 1)))
-    maxima, scores = _maxima(projected, traces.one_sided, errors, seed), score_test.scores(projected, traces.one_sided)
+    def of_either_sign(values: Array) -> Family:
+        return family_of(against(values), np.zeros(values.shape[1], bool), errors, seed)
+
+    projected = against(prints)
     return Screening(
         base=replace(base, noise=noise),
         flagged=flagged,
-        traces=traces,
-        white=noise.whiten(prints),
+        fingerprints=fingerprints,
         slopes=noise.whiten(slope),
+        prints=noise.whiten(prints),
         projected=projected,
-        scores=scores,
-        maxima=maxima,
-        effects=_family(scores, maxima),
-        places=_both_ways(of_spots, (), errors, seed),
-        stations=_both_ways(of_stations, flagged, errors, seed),
-        spot_length=of_spots.length,
+        effects=family_of(projected, fingerprints.one_sided, errors, seed),
+        spots=of_either_sign(spots),
+        stations=of_either_sign(np.eye(left.size)).without(flagged),
     )
 
 
-def _noise(noise: Noise, traces: Fingerprints, used: tuple[Array, Array, Array], left: Array, z: Array) -> Noise:
+def _earlier(before: Screening | None, point: Point) -> Fingerprints | None:
+    """Fingerprints of an earlier screening, if they are those of this point."""
+    return before.fingerprints if before is not None and before.fingerprints.point is point else None
+
+
+def _estimated_noise(
+    noise: Noise, fingerprints: Fingerprints, used: tuple[Array, Array, Array], left: Array, z: Array
+) -> Noise:
     """The noise of a residual `left` with all that could be missing set aside, slopes, prints and spots (n, ...).
 
-    Estimated twice: for good with the one trace that the residual points at set aside whatever its size.
+    Estimated twice: for good with the one fingerprint that the residual points at set aside whatever its size.
     """
     slope, prints, spots = used
-    sizes = np.array([amplitude.plausible for amplitude in traces.amplitudes])
+    sizes = np.array([amplitude.plausible for amplitude in fingerprints.amplitudes])
     explained = np.hstack([slope, prints * sizes, spots * PLAUSIBLE_SPOT])
     first = estimated(noise, left, explained)
-    seen = score_test.project(first.whiten(slope), first.whiten(left), z, first.whiten(explained))
-    best = int(np.argmax((seen.units.T @ seen.residual) ** 2))
-    free = explained[:, best : best + 1] * (FREE / max(float(seen.length[best]), 1e-300))
+    projected = score_test.project(first.whiten(slope), first.whiten(left), z, first.whiten(explained))
+    best = int(np.argmax((projected.units.T @ projected.residual) ** 2))
+    free = explained[:, best : best + 1] * (FREE / max(float(projected.length[best]), 1e-300))
     return estimated(first, left, np.hstack([explained, free]))
 
 
-def _maxima(projected: score_test.Projected, one_sided: np.ndarray, errors: Array, seed: int) -> Array:
-    return np.asarray((score_test.null_draws(projected, one_sided, errors, seed) ** 2).max(axis=1))
-
-
-def _both_ways(projected: score_test.Projected, flagged: tuple[int, ...], errors: Array, seed: int) -> Family:
-    """Traces of either sign; those flagged score nothing."""
-    two = np.zeros(projected.length.size, bool)
-    scores = score_test.scores(projected, two)
-    scores[list(flagged)] = 0.0
-    return _family(scores, _maxima(projected, two, errors, seed))
-
-
-def refit_start(seen: Screening, candidate: int, changed: Case) -> Array:
+def refit_start(screening: Screening, candidate: int, changed: Case) -> Array:
     """Where in z (p + 1,) to begin the refit with a candidate: the joint linear step of all parameters."""
-    column, one = seen.best_column(candidate), seen.traces.candidates[candidate]
-    gain = float(seen.scores[column] / max(seen.projected.length[column], 1e-300))
-    point, slope, noise = seen.base.fitted.point, seen.slopes, seen.noise
-    left = noise.whiten(noise.residual(point.prediction)) - seen.white[:, column] * gain
+    column, one = screening.best_column(candidate), screening.fingerprints.candidates[candidate]
+    gain = float(screening.effects.scores[column] / max(screening.projected.length[column], 1e-300))
+    point, slope, noise = screening.base.fitted.point, screening.slopes, screening.base.noise
+    left = noise.whiten(noise.residual(point.prediction)) - screening.prints[:, column] * gain
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ left - point.z)
     step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
     return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_of(one.effect, gain)))
-
-
-def _family(scores: Array, maxima: Array) -> Family:
-    """Such that the tail fits the bootstrap at 95 %."""
-    if scores.size == 0:
-        return Family(np.zeros(1), 1.0)
-    return Family(scores, float(-np.log(0.95) / scipy.stats.chi2.sf(np.quantile(maxima, 0.95), 1)))

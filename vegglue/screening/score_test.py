@@ -63,11 +63,6 @@ def null_draws(projected: Projected, one_sided: np.ndarray, errors: Array, seed:
     return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
 
 
-def family_p(score: float, maxima: Array) -> float:
-    """P(max_j T_j^2 >= T^2) under the null, (1 + count) / (1 + draws)."""
-    return float((1 + np.sum(maxima >= score**2)) / (1 + maxima.size))
-
-
 def chances_of_rivals(fall: Array) -> Array:
     """Chance of each of a few calibrated rivals (k,) to be what is missing, were it one of them [-].
 

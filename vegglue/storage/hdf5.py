@@ -17,7 +17,8 @@ import h5py
 import numpy as np
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.diagnosis import Diagnosis, diagnosis_attributes, diagnosis_from, diagnosis_groups
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from, diagnosis_groups
 from vegglue.results.ensemble import ROWS, Ensemble, Header, ensemble_from, unsolved
 from vegglue.results.fields import Fields, fields_from, fields_group
 from vegglue.results.layout import Group

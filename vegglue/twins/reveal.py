@@ -32,26 +32,27 @@ def marks(answer: Answer, diagnosis: Diagnosis) -> list[Mark]:
 
 def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
     if hidden.name == BAD_PROBE:
-        there = hidden.station in diagnosis.flagged
+        there = hidden.station in diagnosis.errors.flagged
         return Mark(hidden, False, there, False, None, float("nan"), there)
     if not hidden.listed:
         away = _away(hidden, diagnosis)
-        found = diagnosis.verdict == "none-of-these"
+        found = diagnosis.verdict.kind == "none-of-these"
         return Mark(hidden, False, False, False, None, away, found)
     inside = hidden.name in diagnosis.set
-    named = diagnosis.verdict == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
-    still = hidden.name in [name for group in diagnosis.not_excluded for name in group]
+    named = diagnosis.verdict.kind == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
+    still = hidden.name in [name for group in diagnosis.verdict.not_excluded for name in group]
     amplitude = None
     if inside:
-        low, high = next(one.interval95 for one in diagnosis.suspects if one.name == hidden.name)
+        low, high = diagnosis.suspect(hidden.name).amplitude.interval95
         amplitude = bool(low <= hidden.amplitude <= high)
     return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
 
 
 def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
-    if diagnosis.where is None:
+    location = diagnosis.verdict.location
+    if location is None:
         return float("nan")
-    return float(np.hypot(diagnosis.where.x - hidden.shapes["x"], diagnosis.where.y - hidden.shapes["y"]))
+    return float(np.hypot(location.x - hidden.shapes["x"], location.y - hidden.shapes["y"]))
 
 
 def groups_of(diagnosis: Diagnosis) -> list[int]:
@@ -69,8 +70,8 @@ def in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
     if not answer.hidden:
         lines.append("Nothing was hidden.")
         if diagnosis is not None:
-            right = "right" if diagnosis.verdict == "nothing-missing" else "a false alarm, or too shy"
-            lines.append(f"The diagnosis said {diagnosis.verdict}: {right}.")
+            right = "right" if diagnosis.verdict.kind == "nothing-missing" else "a false alarm, or too shy"
+            lines.append(f"The diagnosis said {diagnosis.verdict.kind}: {right}.")
         return lines
     if diagnosis is None:
         return lines + [f"Hidden: {_truth(one)}." for one in answer.hidden]
@@ -89,12 +90,13 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     if mark.hidden.name == BAD_PROBE:
         return truth + ("It was set aside." if mark.found else "It was not noticed.")
     if not mark.hidden.listed:
-        told = f"The verdict was {diagnosis.verdict}"
+        told = f"The verdict was {diagnosis.verdict.kind}"
         return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")
     if mark.open:
-        return truth + f"The diagnosis said {diagnosis.verdict}, and lists it among what is not excluded."
+        return truth + f"The diagnosis said {diagnosis.verdict.kind}, and lists it among what is not excluded."
     if not mark.inside:
-        return truth + f"The diagnosis missed it; it said {diagnosis.verdict} {', '.join(diagnosis.set)}".rstrip() + "."
+        said = f"{diagnosis.verdict.kind} {', '.join(diagnosis.set)}".rstrip()
+        return f"{truth}The diagnosis missed it; it said {said}."
     alone = "It was named alone" if mark.named else f"It is in the set, one of {groups_of(diagnosis)} group(s) by step"
     told = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size."
     others = _other_shapes(mark.hidden, diagnosis)
@@ -103,6 +105,6 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
 
 def _other_shapes(hidden: Hidden, diagnosis: Diagnosis) -> str:
     """Settings of shape the effect was found with, where they differ from those of the truth by a twentieth or more."""
-    found = next(one.shapes for one in diagnosis.suspects if one.name == hidden.name)
+    found = diagnosis.suspect(hidden.name).shapes
     others = [name for name, true in hidden.shapes.items() if not np.isclose(found.get(name, true), true, rtol=0.05)]
     return " and ".join(f"{name} = {found[name]:.3g} instead of {hidden.shapes[name]:.3g}" for name in others)

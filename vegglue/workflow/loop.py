@@ -21,7 +21,7 @@ from vegglue.diagnosis.diagnose import diagnose
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding
 from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.refits import NEEDED
-from vegglue.diagnosis.suspects import SEEN_SURELY
+from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.errors import InputError
@@ -60,7 +60,7 @@ def diagnosed(case: Case, folder: Path, jobs: int, say: Say) -> Diagnosis:
         found = diagnose(model_in(case), known_place(case, folder), say)
     write_diagnosis(path, found, resolved_yaml(case), wanted)
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
-    remember_place(case, folder, found.first_parameters)
+    remember_place(case, folder, found.parameters.first)
     return found
 
 
@@ -113,8 +113,8 @@ def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
     paths, rungs = [case.source], [_rung(case, runs / case.name, aside)]
     parent, added = case, []
     for step in found.steps:
-        suspect = next(one for one in found.suspects if one.name == step.accepted)
-        added.append((candidate_named(case, found.station, step.accepted), suspect.shapes))
+        candidate = candidate_named(case, found.predictions.station, step.accepted)
+        added.append((candidate, found.suspect(step.accepted).shapes))
         say(f"adding {step.accepted}")
         child = write_child(case, child_path(case.source, [one for one, _ in added]), added)
         _start_child(child, runs / child.name, found, added)
@@ -127,7 +127,8 @@ def grow(case: Case, runs: Path, jobs: int, say: Say) -> Grown:
         rungs.append(next_rung)
         parent = child
     unneeded = [name for name in parent.effects if not _needed(parent, rungs[-1], name)]
-    ended = f"{found.sentence} No longer needed: {', '.join(unneeded)}." if unneeded else found.sentence
+    sentence = found.verdict.sentence
+    ended = f"{sentence} No longer needed: {', '.join(unneeded)}." if unneeded else sentence
     return Grown(tuple(paths), tuple(rungs), aside, ended)
 
 
@@ -137,14 +138,14 @@ def _worse(before: Rung, after: Rung) -> str:
     if not gain > 0:
         return "held-out errors did not fall"
     # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
-    return "" if after.chi2 < before.chi2 else "the misfit with what was seen rose"
+    return "" if after.in_sample.chi2 < before.in_sample.chi2 else "the misfit with what was seen rose"
 
 
 def _start_child(
     child: Case, folder: Path, found: Diagnosis, added: Sequence[tuple[Candidate, Mapping[str, float]]]
 ) -> None:
     """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
-    theta = {name: values[0] for name, values in found.parameters.items() if name in child.parameters}
+    theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.plausible))
     remember_place(child, folder, theta)
@@ -208,30 +209,33 @@ def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple
     """In words, and the rivals of each."""
     if len(names) > 1:
         return [(" from ".join(names), rivals_of(case, found, names))]
-    hidden = [one for one in found.suspects if not one.testable and not found.steps]
+    hidden = [one for one in found.suspects if not one.detectability.testable and not found.steps]
     # What calibration hides best, of all that would leave a trace without it.
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
     single = [one for one in found.suspects if list(names) == [one.name]] or strongest
-    return [
-        (f"{one.name} from a change of {one.mimicked_by}", rivals_of(case, found, [one.name], plausible=True))
-        for one in single
-    ]
+    return [(_what_hides(one), rivals_of(case, found, [one.name], plausible=True)) for one in single]
+
+
+def _what_hides(suspect: Suspect) -> str:
+    return f"{suspect.name} from a change of {suspect.detectability.confounder}"
 
 
 def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
     """Length of the trace of a plausible amplitude before projection, in standard errors."""
-    amplitude = candidate_named(case, found.station, suspect.name).effect.amplitude
-    seen = amplitude.gain(amplitude.off + suspect.smallest_detectable)
-    return (found.threshold + SEEN_SURELY) * amplitude.plausible / seen / max(suspect.visibility, 1e-6)
+    amplitude = candidate_named(case, found.predictions.station, suspect.name).effect.amplitude
+    detectability = suspect.detectability
+    gain = amplitude.gain(amplitude.off + detectability.smallest)
+    length = found.first_screening.threshold + POWER_QUANTILE
+    return length * amplitude.plausible / gain / max(detectability.visibility, 1e-6)
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
     """Effects of a diagnosis by name, at the size it found or a plausible one."""
     rivals: list[Rival] = []
     for suspect in (one for one in found.suspects if one.name in names):
-        candidate = candidate_named(case, found.station, suspect.name)
+        candidate = candidate_named(case, found.predictions.station, suspect.name)
         amplitude = candidate.effect.amplitude
-        gain = amplitude.plausible if plausible else amplitude.gain(suspect.amplitude)
+        gain = amplitude.plausible if plausible else amplitude.gain(suspect.amplitude.value)
         rivals.append((candidate, suspect.shapes, gain))
     return rivals
 

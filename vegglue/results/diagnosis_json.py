@@ -1,0 +1,74 @@
+"""A diagnosis as the object that `vegglue diagnose --json` prints."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from vegglue.results.diagnosis import Diagnosis, Suspect
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """One object with every number that is printed."""
+    verdict, misfit, errors = diagnosis.verdict, diagnosis.misfit, diagnosis.errors
+    tree = {
+        "verdict": verdict.kind,
+        "sentence": verdict.sentence,
+        "set": diagnosis.set,
+        "groups": diagnosis.groups,
+        "not_excluded": verdict.not_excluded,
+        "where": None if verdict.location is None else asdict(verdict.location),
+        "effects": [flat_suspect(suspect) for suspect in diagnosis.suspects],
+        "steps": [asdict(step) for step in diagnosis.steps],
+        "remarks": verdict.remarks,
+        "chi2": {"first": misfit.chi2_first, "last": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p},
+        "threshold": diagnosis.first_screening.threshold,
+        "noise": {"correlation": errors.correlation, "scale": errors.scale, "grid_error": errors.grid_error},
+        "flagged": [_flagged(diagnosis, row) for row in errors.flagged],
+        "parameters": diagnosis.parameters.last,
+        "first_parameters": diagnosis.parameters.first,
+        "zones": misfit.zones.to_dict("records"),
+    }
+    return {name: _plain(value) for name, value in tree.items()}
+
+
+def flat_suspect(suspect: Suspect) -> dict[str, Any]:
+    """All numbers of a suspect by the names they have in JSON and in diagnosis.h5."""
+    amplitude, test, detectability = suspect.amplitude, suspect.test, suspect.detectability
+    return {
+        "name": suspect.name,
+        "title": suspect.title,
+        "unit": amplitude.unit,
+        "amplitude": amplitude.value,
+        "interval95": amplitude.interval95,
+        "score": test.score,
+        "p_family": test.p_family,
+        "visibility": detectability.visibility,
+        "smallest_detectable": detectability.smallest,
+        "testable": detectability.testable,
+        "refitted": amplitude.refitted,
+        "objective": amplitude.objective,
+        "mimicked_by": detectability.confounder,
+        "likeness": detectability.cosine,
+        "shapes": suspect.shapes,
+        "off": amplitude.off,
+        "scale": amplitude.scale,
+    }
+
+
+def _flagged(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
+    station = diagnosis.predictions.station.iloc[row]
+    place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
+    return place | {name: float(station[name]) for name in ("x", "y", "value")}
+
+
+def _plain(tree: Any) -> Any:
+    """Numbers as JSON knows them: no NaN, no infinity, no tuples."""
+    if isinstance(tree, Mapping):
+        return {key: _plain(value) for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [_plain(value) for value in tree]
+    if isinstance(tree, float | np.floating):
+        return float(tree) if np.isfinite(tree) else None
+    return tree
