@@ -14,6 +14,7 @@ from vegglue.arrays import Array
 from vegglue.effects.surroundings import across
 from vegglue.flow.equations import Faces, faces
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
+from vegglue.resistance.physical_constants import FILM_ON_LAND
 from vegglue.site.grid import Grid
 
 
@@ -188,7 +189,7 @@ def _wet_share(flow: GriddedFlow, face: int) -> Array:
     if problem.lift.size:
         above = above - problem.lift[sides, :, 0]
     reach = problem.reach[sides].mean(axis=0)
-    return np.clip(0.5 * (above.mean(axis=0) - 0.1 * problem.film) / reach + 0.5, 0.0, 1.0)
+    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / reach + 0.5, 0.0, 1.0)
 
 
 def _no_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
