@@ -17,7 +17,7 @@ from vegglue.cli.loop_commands import compare_command
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point
-from vegglue.storage.hdf5 import write_diagnosis
+from vegglue.storage.result_files import write_diagnosis
 from vegglue.workflow import loop, run_folder
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"

@@ -19,7 +19,7 @@ from vegglue.ensemble.simulate import chunk_size, simulate
 from vegglue.errors import StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 # So many that a run is still on its way when it is stopped, on a busy machine too: some second.
 CHUNKS = 16
@@ -239,7 +239,7 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("vegglue.storage.hdf5.os.fsync", lambda handle: fill_up(handle) if chunks else None)
+        patch.setattr("vegglue.storage.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
         with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* run the same command again"):
             simulate(case, observations, path, 1, chunks.append)
     assert [progress.solved for progress in chunks] == [0, CHUNK]

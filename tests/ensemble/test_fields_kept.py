@@ -25,7 +25,7 @@ from vegglue.site.grid import Grid, build_grid
 from vegglue.site.gridded_site import build_site
 from vegglue.solver import batch
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import read_ensemble, read_fields
+from vegglue.storage.result_files import read_ensemble, read_fields
 from vegglue.workflow.check import check_case
 
 SMALL = ("members: 1024, seed: 7", "members: 16, seed: 7, fields: {x: [8, 20]}")

@@ -30,7 +30,7 @@ from vegglue.report.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior, Transfer
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import read_ensemble, read_posterior, write_posterior
+from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
 
 KNOWN = ("simulate: {members: 1024, seed: 7}", "simulate: {members: 64, seed: 7}\ninfer: {sigma: known}")
 ERRORS = ("velocities.csv, experiment: June}", "velocities.csv, experiment: June, standard_error: 0.01}")

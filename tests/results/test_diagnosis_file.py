@@ -11,7 +11,7 @@ from diagnoses import NOTHING, a_diagnosis
 
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Diagnosis, diagnosis_json
-from vegglue.storage.hdf5 import diagnosis_that_fits, read_diagnosis, write_diagnosis
+from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, write_diagnosis
 
 HASH = "d" * 64
 

@@ -22,7 +22,7 @@ from vegglue.solver.batch import NEIGHBOURHOOD, blend, solve_members
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.parameter_metric import axes, leaves
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 CHUNK = LARGEST_CHUNK
 # The outlet level becomes a parameter; far below the bed, no steady state is found.

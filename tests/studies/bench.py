@@ -27,7 +27,7 @@ from vegglue.solver.parameter_metric import leaves, parameter_metric
 from vegglue.solver.reference_member import settled
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
 from vegglue.solver.wet_band import rows_inside
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {

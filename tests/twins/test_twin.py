@@ -18,7 +18,7 @@ from vegglue.errors import InputError
 from vegglue.results.diagnosis import Step, Where
 from vegglue.screening.candidates import with_effect
 from vegglue.screening.score_test import project
-from vegglue.storage.hdf5 import write_diagnosis
+from vegglue.storage.result_files import write_diagnosis
 from vegglue.twins.reveal import in_words, marks
 from vegglue.twins.twin import Answer, Hidden, TwinBase, errors_named, measured, opened, sealed, true_place, twin_base
 from vegglue.twins.twin_files import config_in, write_twin

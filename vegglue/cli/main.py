@@ -31,7 +31,13 @@ from vegglue.report.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.site.gridded_site import build_site
-from vegglue.storage.hdf5 import diagnosis_that_fits, read_ensemble, read_posterior, stored_hash, write_posterior
+from vegglue.storage.result_files import (
+    diagnosis_that_fits,
+    read_ensemble,
+    read_posterior,
+    stored_hash,
+    write_posterior,
+)
 from vegglue.version import VERSION
 from vegglue.workflow.check import check_case
 from vegglue.workflow.run_folder import folder_of

@@ -10,7 +10,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.cli.options import Runs, console
 from vegglue.errors import InputError
-from vegglue.storage.hdf5 import diagnosis_that_fits
+from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.twins.reveal import in_words
 from vegglue.twins.twin import measured, opened, sealed, true_place, twin_base
 from vegglue.twins.twin_files import SEAL, config_in, write_twin

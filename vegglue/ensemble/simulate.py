@@ -33,7 +33,7 @@ from vegglue.solver.batch import NEIGHBOURHOOD, solve_members
 from vegglue.solver.parameter_metric import leaves, parameter_metric
 from vegglue.solver.reference_member import SolvedMember, known_middle
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import ensemble_writer
+from vegglue.storage.resume import ensemble_writer
 from vegglue.version import VERSION
 
 # Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.

@@ -31,7 +31,7 @@ from vegglue.progress import Say
 from vegglue.report.diagnosis_pictures import save_diagnosis_figure
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.screening.candidates import Candidate, cause_of, start_of
-from vegglue.storage.hdf5 import diagnosis_that_fits, write_diagnosis
+from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.run_folder import MAKE_ROOM, known_place, model_in, remember_place, validation_of
 
 # Effects hidden behind calibration that measurements are proposed for.

@@ -14,7 +14,7 @@ from vegglue.case.text_files import write_text
 from vegglue.engine.interface import Model
 from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
-from vegglue.storage.hdf5 import read_posterior, stored_hash
+from vegglue.storage.result_files import read_posterior, stored_hash
 
 MAKE_ROOM = "make room and run it again"
 
