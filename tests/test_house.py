@@ -20,7 +20,7 @@ HOMES = {
     "matplotlib": {"figures", "report"},
     "numba": {"compilation"},
     "pandas": {
-        "calibration", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report", "results",
+        "calibration", "checks", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report", "results",
         "screening", "twins", "workflow",
     },
     "pydantic": {"case"},

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from reach import COARSE, write_reach
+from vegglue.workflow.check import check_case
 
 from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
@@ -32,9 +33,8 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.screening.candidates import candidates_of, cause_of
 from vegglue.site.gridded_site import build_site
-from vegglue.storage.hdf5 import read_ensemble, read_posterior, write_posterior
+from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
 from vegglue.twins.twin_files import write_twin
-from vegglue.workflow.check import check_case
 
 TRUTH = {"n_b": 0.05, "q": 2.13, "phi": 8.0}
 # A discharge that only those know who measured it.

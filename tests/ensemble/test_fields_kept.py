@@ -14,6 +14,7 @@ from stored import HASH, MEMBERS, X, Y
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
+from vegglue.checks.case_check import check_case
 from vegglue.ensemble.simulate import simulate, solve_chunk, solve_flow
 from vegglue.errors import InputError
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
@@ -26,7 +27,6 @@ from vegglue.site.gridded_site import build_site
 from vegglue.solver import batch
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble, read_fields
-from vegglue.workflow.check import check_case
 
 SMALL = ("members: 1024, seed: 7", "members: 16, seed: 7, fields: {x: [8, 20]}")
 Finished = tuple[Case, Ensemble, Fields]

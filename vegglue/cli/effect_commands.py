@@ -9,13 +9,13 @@ import typer
 from vegglue.case.config import load_case
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case
+from vegglue.checks.effect_contract import breaches
 from vegglue.cli.options import Json, Runs, console
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import effects_of, library
 from vegglue.errors import InputError
 from vegglue.report.diagnosis_pictures import save_fingerprint_figure
 from vegglue.report.effect_page import by_stage, effect_json, page, work_in_case
-from vegglue.workflow.effect_contract import breaches
 from vegglue.workflow.loop import trace_of
 
 

@@ -13,6 +13,7 @@ from rich.progress import Progress as Bar
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.checks.case_check import check_case
 from vegglue.cli.effect_commands import effects_command
 from vegglue.cli.loop_commands import LOOP_COMMANDS, loop
 from vegglue.cli.options import Config, Jobs, Runs, Trust, console
@@ -39,7 +40,6 @@ from vegglue.storage.result_files import (
     write_posterior,
 )
 from vegglue.version import VERSION
-from vegglue.workflow.check import check_case
 from vegglue.workflow.run_folder import folder_of
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)

@@ -1,6 +1,5 @@
-"""The steps on files: check, the loop from misfit to a child config, and what every effect must keep.
+"""The steps on files: the loop from misfit to a child config.
 
-May import: resistance, effects, case, site, measurements, flow, solver, engine, results, calibration, screening,
-storage, diagnosis, report.
-Open first: loop.py, check.py.
+May import: effects, case, measurements, engine, results, calibration, screening, storage, diagnosis, report.
+Open first: loop.py, run_folder.py.
 """
