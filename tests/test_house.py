@@ -20,8 +20,8 @@ HOMES = {
     "matplotlib": {"figures", "report"},
     "numba": {"compilation"},
     "pandas": {
-        "calibration", "checks", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report", "results",
-        "screening", "twins", "workflow",
+        "calibration", "checks", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report",
+        "results", "screening", "twins", "workflow",
     },
     "pydantic": {"case"},
     "rich": {"cli"},

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.twins.twin import TwinBase, measured, true_place, twin_base
@@ -41,7 +41,7 @@ def grounds(model: Model) -> list[TwinBase]:
 def diagnosed(ground: TwinBase, hide: tuple[str, ...], snr: float, noise: str, seed: int) -> Diagnosis:
     """From the true parameters, as after an `infer`: the search for them is tested elsewhere."""
     station, _ = measured(ground, hide, snr, noise, seed)
-    return diagnose(replace(ground.model, station=station), known=ground.here.z)
+    return diagnose_model(replace(ground.model, station=station), known=ground.here.z)
 
 
 @pytest.mark.parametrize("noise", ["white", "ar1:0.5"])

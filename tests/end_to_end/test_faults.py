@@ -15,7 +15,7 @@ import pytest
 from reach import COARSE, begin, said_to, vegglue, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.ensemble.simulate import chunk_size, simulate
+from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.errors import StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
@@ -153,7 +153,7 @@ def simulated(folder: Path) -> None:
     """A finished ensemble of sixteen members."""
     config = write_reach(folder, *SIXTEEN)
     case = load_case(config)
-    simulate(case, read_observations(case), folder / ENSEMBLE, 1, lambda progress: None)
+    solve_ensemble(case, read_observations(case), folder / ENSEMBLE, 1, lambda progress: None)
 
 
 @pytest.fixture
@@ -241,10 +241,10 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
     with monkeypatch.context() as patch:
         patch.setattr("vegglue.storage.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
         with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* run the same command again"):
-            simulate(case, observations, path, 1, chunks.append)
+            solve_ensemble(case, observations, path, 1, chunks.append)
     assert [progress.solved for progress in chunks] == [0, CHUNK]
     again = []
-    simulate(case, observations, path, 1, again.append)
+    solve_ensemble(case, observations, path, 1, again.append)
     assert (again[0].resumed, again[-1].solved) == (CHUNK, CHUNKS * CHUNK)
     assert (read_ensemble(path).status == 0).all()
 

@@ -8,18 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from reach import COARSE, write_reach
-from vegglue.workflow.check import check_case
 
 from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
+from vegglue.checks.case_check import check_case
 from vegglue.diagnosis.comparison import held_out, rung
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
 from vegglue.engine.model import model_of
-from vegglue.ensemble.simulate import simulate, solve_flow
+from vegglue.ensemble.solve_ensemble import solve_ensemble, solve_flow
 from vegglue.figures.channel import save_channel_figure
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.inference.glue import glue
@@ -99,9 +99,9 @@ class Line:
 def whole_line(folder: Path, names: tuple[str, ...]) -> Line:
     case = measured_case(folder, names)
     observations = read_observations(case)
-    simulate(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
+    solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
     ensemble = read_ensemble(folder / "ensemble.h5")
-    found = diagnose(model_of(case, observations))
+    found = diagnose_model(model_of(case, observations))
     return Line(folder, case, observations, ensemble, refine(ensemble, case, observations), found)
 
 

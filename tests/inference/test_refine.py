@@ -18,7 +18,7 @@ from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Point, linearise, predict
 from vegglue.engine.model import model_of
-from vegglue.ensemble.simulate import simulate
+from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.inference.homogeneity import alike, only, told_by_data, transfer
 from vegglue.inference.map_and_errors import distinct, groundwork, starting_places, unexplained_residual
@@ -39,7 +39,7 @@ ERRORS = ("velocities.csv, experiment: June}", "velocities.csv, experiment: June
 def made(folder: Path, *changes: tuple[str, str]) -> tuple[Case, Observations, Ensemble]:
     case = load_case(write_reach(folder, *changes))
     observations = read_observations(case)
-    simulate(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
+    solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
     return case, observations, read_ensemble(folder / "ensemble.h5")
 
 

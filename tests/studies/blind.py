@@ -29,7 +29,7 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.comparison import improvement, rung
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding
 from vegglue.diagnosis.next_measurement import SEPARATES, worth_of_measurements
 from vegglue.engine.interface import Model, linearise
@@ -48,7 +48,7 @@ from vegglue.twins.twin import (
     true_place,
     twin_base,
 )
-from vegglue.workflow.loop import rivals_of
+from vegglue.workflow.next_measurement import rivals_of
 from vegglue.workflow.run_folder import model_in
 
 ROOT = Path(__file__).parents[2]
@@ -139,7 +139,7 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     except InputError as error:
         return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)
-    found = diagnose(model, ground.here.z)
+    found = diagnose_model(model, ground.here.z)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
     if found.steps and trial.number % LOOKED_INTO == 0:
         record |= held_out(model, found)
@@ -222,7 +222,7 @@ def measured_again(
     values += error * np.random.default_rng((seed, 3)).standard_normal(len(more))
     station = pd.concat([model.station, more.assign(value=values, standard_error=error, used=True)], ignore_index=True)
     case = model.case.model_copy(update={"experiments": experiments})
-    again = diagnose(replace(model, case=case, station=station), base.fitted.point.z)
+    again = diagnose_model(replace(model, case=case, station=station), base.fitted.point.z)
     return {
         "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
         "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict, "set": again.set,

@@ -38,7 +38,7 @@ BESIDE = 0.1
 CLEARLY = 3.0
 
 
-def diagnose(model: Model, known: Array | None = None, say: Say = lambda text: None) -> Diagnosis:
+def diagnose_model(model: Model, known: Array | None = None, say: Say = lambda text: None) -> Diagnosis:
     """Find out what a calibrated model lacks. known (p,): a good place of the prior, if there is one.
 
     Errors: InputError when the model finds no flow, or a station has no standard error.

@@ -1,5 +1,6 @@
-"""The steps on files: the loop from misfit to a child config.
+"""The verbs of `import vegglue`, one file each: from a case to its results, kept in the folder of the run.
 
-May import: effects, case, measurements, engine, results, calibration, screening, storage, diagnosis, report.
-Open first: loop.py, run_folder.py.
+May import: effects, case, site, measurements, importers, engine, results, calibration, screening, storage, ensemble,
+inference, diagnosis, figures, twins, report, checks.
+Open first: run.py, run_folder.py.
 """

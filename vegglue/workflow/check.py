@@ -1,0 +1,50 @@
+"""case -> remarks: what is odd about a case, before hours are spent on it; and about a file of effects."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from vegglue.case.schema import Case
+from vegglue.checks.case_check import check_case
+from vegglue.checks.effect_contract import breaches
+from vegglue.effects.library import effects_of
+from vegglue.errors import InputError
+from vegglue.figures.channel import save_channel_figure
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow.run_folder import folder_of
+
+
+@dataclass(frozen=True)
+class CheckedCase:
+    """What a check has found: remarks in sentences, sizes, and where the channel is drawn."""
+
+    remarks: tuple[str, ...]
+    cells: int
+    stations: int
+    used_stations: int
+    picture: Path
+
+
+def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
+    """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png.
+
+    Errors: InputError for a file that cannot be read.
+    """
+    observations, site = read_observations(case), build_site(case)
+    picture = folder_of(runs, case) / "channel.png"
+    remarks = check_case(case, site, observations)
+    save_channel_figure(case, site, observations, picture)
+    table = observations.table
+    return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
+
+
+def check_effects(file: Path, *, trust: bool = False) -> dict[str, list[str]]:
+    """What each effect of a Python file breaks of the contract, in sentences, by its name; none for a good one.
+
+    trust: whether the file may be run. Errors: InputError when it may not, or is not there.
+    """
+    if not trust:
+        raise InputError(f"{file}: runs as code when it is checked: read it, and add --trust if you trust it.")
+    if not file.is_file():
+        raise InputError(f"{file}: expected an existing Python file of effects; correct the path.")
+    return {effect.name: breaches(effect, file.resolve()) for effect in effects_of(file.resolve())}
