@@ -26,8 +26,8 @@ from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
-from vegglue.report.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report.page import write_report
+from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report_page.page import write_report
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

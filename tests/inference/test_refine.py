@@ -25,8 +25,8 @@ from vegglue.inference.map_and_errors import distinct, groundwork, starting_plac
 from vegglue.inference.refine import log_posterior, refinable, refine
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
-from vegglue.report.homogeneity_words import homogeneity_in_words
-from vegglue.report.posterior_words import describe
+from vegglue.report_page.homogeneity_words import homogeneity_in_words
+from vegglue.report_page.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior, Transfer
 from vegglue.solver.status import FAILED

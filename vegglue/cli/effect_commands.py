@@ -13,7 +13,7 @@ from vegglue.cli.options import Json, Runs, console
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.report.effect_page import by_stage, effect_json, page, work_in_case
+from vegglue.report_page.effect_page import by_stage, effect_json, page, work_in_case
 from vegglue.workflow.check import check_effects
 from vegglue.workflow.diagnose import draw_fingerprint_of
 

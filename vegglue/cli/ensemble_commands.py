@@ -9,7 +9,7 @@ from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.cli.options import Config, Jobs, Members, Runs, Trust, console, progress_bars, say_on
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
-from vegglue.report.posterior_words import describe
+from vegglue.report_page.posterior_words import describe
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

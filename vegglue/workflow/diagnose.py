@@ -13,7 +13,7 @@ from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
-from vegglue.report.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis

@@ -8,7 +8,7 @@ from vegglue.ensemble.solve_ensemble import solve_flow
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
-from vegglue.report.page import write_report
+from vegglue.report_page.page import write_report
 from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.workflow.run_folder import folder_of, of_size
 
