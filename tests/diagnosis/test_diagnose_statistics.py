@@ -12,7 +12,8 @@ from vegglue.case.config import load_case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.twins.twin import TwinBase, measured, true_place, twin_base
+from vegglue.twins.hidden_effect import TwinBase
+from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -40,7 +41,7 @@ def grounds(model: Model) -> list[TwinBase]:
 
 def diagnosed(ground: TwinBase, hide: tuple[str, ...], snr: float, noise: str, seed: int) -> Diagnosis:
     """From the true parameters, as after an `infer`: the search for them is tested elsewhere."""
-    station, _ = measured(ground, hide, snr, noise, seed)
+    station, _ = measured_twin(ground, hide, snr, noise, seed)
     return diagnose_model(replace(ground.model, station=station), known=ground.here.z)
 
 

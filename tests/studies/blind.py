@@ -37,17 +37,10 @@ from vegglue.errors import InputError
 from vegglue.parallel import as_finished
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of, with_effect
+from vegglue.twins.hidden_effect import TwinBase, VisibilityError, candidate_of, case_hiding
 from vegglue.twins.reveal import marks
-from vegglue.twins.twin import (
-    Answer,
-    TwinBase,
-    VisibilityError,
-    candidate_of,
-    case_hiding,
-    measured,
-    true_place,
-    twin_base,
-)
+from vegglue.twins.sealed_answer import Answer
+from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.next_measurement import rivals_of
 from vegglue.workflow.run_folder import model_in
 
@@ -135,7 +128,7 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     record: dict[str, Any] = {"key": trial.key, **asdict(trial)}
     began = time.process_time()
     try:
-        station, answer = measured(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
+        station, answer = measured_twin(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
     except InputError as error:
         return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)

@@ -9,8 +9,9 @@ from vegglue.case.schema import Case
 from vegglue.errors import InputError
 from vegglue.parallel import one_thread
 from vegglue.storage.result_files import diagnosis_that_fits
-from vegglue.twins.reveal import in_words
-from vegglue.twins.twin import measured, opened, sealed, true_place, twin_base
+from vegglue.twins.reveal import guess_in_words
+from vegglue.twins.sealed_answer import opened_answer, sealed_answer
+from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.twins.twin_files import SEAL, config_in, write_twin
 from vegglue.workflow.run_folder import model_in
 
@@ -34,8 +35,8 @@ def make_twin(
     model = model_in(case)
     if not case.parameters:
         raise InputError(f"{case.source}: `parameters` expected a prior or more, got none; add one.")
-    station, answer = measured(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
-    return load_case(write_twin(case, Path(to), station, sealed(answer)))
+    station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
+    return load_case(write_twin(case, Path(to), station, sealed_answer(answer)))
 
 
 def reveal(folder: Path | str, *, runs: Path | str = "runs") -> list[str]:
@@ -43,11 +44,11 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs") -> list[str]:
     each. Errors: InputError when there is no seal, or it is broken.
     """
     folder = Path(folder)
-    answer = opened(folder / SEAL)
+    answer = opened_answer(folder / SEAL)
     case = load_case(config_in(folder))
     there = Path(runs) / case.name
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
-    lines = in_words(answer, diagnosis)
+    lines = guess_in_words(answer, diagnosis)
     if diagnosis is None:
         lines.append(f"No diagnosis of it in {there}: `vegglue diagnose {config_in(folder)}` makes one.")
     return lines
