@@ -43,7 +43,8 @@ def _folder(path: Path) -> Folder:
     said = DOCSTRING.match(text)
     assert said, f"{path}: expected a purpose, `May import: ....` and `Open first: ....`"
     may = () if said["may"].startswith("no ") else tuple(said["may"].replace("\n", " ").split(", "))
-    return Folder(path.parent.name, " ".join(said["purpose"].split()), may, tuple(said["first"].split(", ")))
+    purpose = " ".join(said["purpose"].split("\n\n")[0].split())  # how to add something may follow
+    return Folder(path.parent.name, purpose, may, tuple(said["first"].split(", ")))
 
 
 def module_of(path: Path) -> str:

@@ -15,13 +15,13 @@ NOWHERE_ELSE = {"numpy", "scipy"}  # at home everywhere
 # Folders or files where each library may be imported. A new home is a decision: say it here.
 HOMES = {
     "h5py": {"storage"},
-    "jinja2": {"report"},
+    "jinja2": {"report_page"},
     "joblib": {"parallel"},
-    "matplotlib": {"figures", "report"},
+    "matplotlib": {"figures", "report_page"},
     "numba": {"compilation"},
     "pandas": {
-        "calibration", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report", "results",
-        "screening", "twins", "workflow",
+        "calibration", "checks", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report_page",
+        "results", "screening", "twins", "workflow",
     },
     "pydantic": {"case"},
     "rich": {"cli"},

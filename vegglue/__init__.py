@@ -1,7 +1,55 @@
-"""vegglue: calibrate models of flow through plants, and learn which effect they miss."""
+"""vegglue: calibrate models of flow through plants, and learn which effect they miss.
+
+    case = vegglue.load_case("brook.yaml")
+    ensemble = vegglue.simulate(case)
+    posterior = vegglue.infer(case, ensemble)
+
+The verbs stand in `workflow`, one file each, and keep what they make in runs/<name>/, as the commands of the shell do.
+Nothing of them is imported before it is used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from vegglue import version
 
-__version__ = version.VERSION
+if TYPE_CHECKING:
+    from vegglue.case.config import load_case
+    from vegglue.errors import InputError, StorageError
+    from vegglue.workflow.check import check
+    from vegglue.workflow.compare import compare
+    from vegglue.workflow.diagnose import diagnose
+    from vegglue.workflow.extend import extend, extend_stepwise
+    from vegglue.workflow.import_folder import import_folder
+    from vegglue.workflow.infer import infer
+    from vegglue.workflow.next_measurement import next_measurement
+    from vegglue.workflow.report import report
+    from vegglue.workflow.run import run
+    from vegglue.workflow.simulate import simulate
+    from vegglue.workflow.twin import make_twin, reveal
 
-__all__ = ["__version__"]
+__all__ = [
+    "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "extend", "extend_stepwise",
+    "import_folder", "infer", "load_case", "make_twin", "next_measurement", "report", "reveal", "run", "simulate",
+]  # fmt: skip
+
+__version__ = version.VERSION
+# Where a name stands, if it is not in the file of its own name in `workflow`.
+_ELSEWHERE = {
+    "InputError": "errors",
+    "StorageError": "errors",
+    "load_case": "case.config",
+    "extend_stepwise": "workflow.extend",
+    "make_twin": "workflow.twin",
+    "reveal": "workflow.twin",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'vegglue' has no attribute {name!r}")
+    return getattr(import_module(f"vegglue.{_ELSEWHERE.get(name, f'workflow.{name}')}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

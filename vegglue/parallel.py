@@ -87,9 +87,11 @@ def _shared_out(work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: S
     return found
 
 
-def alone() -> None:
+@contextmanager
+def one_thread() -> Iterator[None]:
     """One thread for linear algebra in this process: its matrices are small, and the cores have tasks of their own."""
-    threadpool_limits(1)
+    with threadpool_limits(1):
+        yield
 
 
 def _pool(jobs: int, order: str) -> Parallel:
@@ -97,7 +99,7 @@ def _pool(jobs: int, order: str) -> Parallel:
 
 
 def _alone(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
-    with threadpool_limits(1):  # one task a core: threads of linear algebra would only get in each other's way
+    with one_thread():  # one task a core: threads of linear algebra would only get in each other's way
         return work(*task)
 
 

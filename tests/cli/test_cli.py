@@ -14,7 +14,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.cli.main import app
 from vegglue.solver.batch import NEIGHBOURHOOD
-from vegglue.storage.hdf5 import read_ensemble, read_posterior, stored_hash
+from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash
 
 pytestmark = pytest.mark.slow  # whole runs through the shell
 MEMBERS = 128

@@ -14,11 +14,12 @@ import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of
-from vegglue.twins.twin import TwinBase, VisibilityError, measured, true_place, twin_base
+from vegglue.twins.hidden_effect import TwinBase, VisibilityError
+from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -39,7 +40,7 @@ def grounds(model: Model) -> list[TwinBase]:
 
 def diagnosed(ground: TwinBase, station: pd.DataFrame, number: int) -> Diagnosis:
     """From the true parameters, as after an `infer`, but for set 0, where the search begins with the priors."""
-    return diagnose(replace(ground.model, station=station), known=None if number == 0 else ground.here.z)
+    return diagnose_model(replace(ground.model, station=station), known=None if number == 0 else ground.here.z)
 
 
 def drawn_sets(grounds: list[TwinBase], snr: float, seed: int) -> Iterator[tuple[str, Diagnosis]]:
@@ -50,7 +51,7 @@ def drawn_sets(grounds: list[TwinBase], snr: float, seed: int) -> Iterator[tuple
     for name in np.random.default_rng(seed).permutation(names):
         ground = grounds[number % 2]
         try:
-            station, _ = measured(ground, (str(name),), snr, "white", number)
+            station, _ = measured_twin(ground, (str(name),), snr, "white", number)
         except VisibilityError:
             continue
         yield str(name), diagnosed(ground, station, number)
@@ -62,7 +63,7 @@ def test_false_alarms_are_rare(grounds: list[TwinBase], noise: str) -> None:
     """Of 8 at most 2: at 5 % that fails once in 170 times, at 38 % (correlation ignored) twice in three."""
     alarms = 0
     for seed in range(8):
-        station, _ = measured(grounds[seed % 2], (), 0.0, noise, seed)
+        station, _ = measured_twin(grounds[seed % 2], (), 0.0, noise, seed)
         found = diagnosed(grounds[seed % 2], station, seed)
         alarms += bool(found.steps) or found.verdict.kind == "none-of-these"
     assert alarms <= 2
@@ -83,6 +84,6 @@ def test_what_hides_is_listed(grounds: list[TwinBase]) -> None:
 
 
 def test_what_is_in_no_list_is_not_given_a_name(grounds: list[TwinBase]) -> None:
-    station, _ = measured(grounds[0], ("unlisted:pier",), 15.0, "white", 3)
+    station, _ = measured_twin(grounds[0], ("unlisted:pier",), 15.0, "white", 3)
     found = diagnosed(grounds[0], station, 3)
     assert found.verdict.kind in ("none-of-these", "cannot-tell"), found.verdict.sentence

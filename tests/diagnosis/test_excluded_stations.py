@@ -18,8 +18,10 @@ from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.hdf5 import write_diagnosis
-from vegglue.workflow import loop, run_folder
+from vegglue.storage.result_files import write_diagnosis
+from vegglue.workflow import run_folder
+from vegglue.workflow.compare import left_out
+from vegglue.workflow.extend import write_child
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
@@ -68,8 +70,8 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
 ) -> None:
     case = load_case(CONFIG)
     added = [(candidate_named(case, model.station, "discharge_error[high]"), {})]
-    child, runs = loop.write_child(case, tmp_path / "child.yaml", added), tmp_path / "runs"
-    monkeypatch.setattr("vegglue.workflow.loop.baseline", quickly)
+    child, runs = write_child(case, tmp_path / "child.yaml", added), tmp_path / "runs"
+    monkeypatch.setattr("vegglue.workflow.run_folder.baseline", quickly)
     stations = int(model.station["used"].sum())
     for flagged, said in (((), 0), ((3, 20), 2)):
         found = flagging(model, *flagged)
@@ -88,4 +90,4 @@ def test_a_diagnosis_of_another_state_of_the_case_leaves_nothing_out(model: Mode
     (tmp_path / case.name).mkdir()
     found = flagging(model, 3)
     write_diagnosis(tmp_path / case.name / "diagnosis.h5", found, "", "e" * 64)
-    assert loop.left_out([case], tmp_path).empty
+    assert left_out([case], tmp_path).empty

@@ -15,11 +15,11 @@ import pytest
 from reach import COARSE, begin, said_to, vegglue, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.ensemble.simulate import chunk_size, simulate
+from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.errors import StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 # So many that a run is still on its way when it is stopped, on a busy machine too: some second.
 CHUNKS = 16
@@ -153,7 +153,7 @@ def simulated(folder: Path) -> None:
     """A finished ensemble of sixteen members."""
     config = write_reach(folder, *SIXTEEN)
     case = load_case(config)
-    simulate(case, read_observations(case), folder / ENSEMBLE, 1, lambda progress: None)
+    solve_ensemble(case, read_observations(case), folder / ENSEMBLE, 1, lambda progress: None)
 
 
 @pytest.fixture
@@ -239,12 +239,12 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("vegglue.storage.hdf5.os.fsync", lambda handle: fill_up(handle) if chunks else None)
+        patch.setattr("vegglue.storage.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
         with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* run the same command again"):
-            simulate(case, observations, path, 1, chunks.append)
+            solve_ensemble(case, observations, path, 1, chunks.append)
     assert [progress.solved for progress in chunks] == [0, CHUNK]
     again = []
-    simulate(case, observations, path, 1, again.append)
+    solve_ensemble(case, observations, path, 1, again.append)
     assert (again[0].resumed, again[-1].solved) == (CHUNK, CHUNKS * CHUNK)
     assert (read_ensemble(path).status == 0).all()
 

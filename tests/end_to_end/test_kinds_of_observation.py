@@ -13,28 +13,28 @@ from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
+from vegglue.checks.case_check import check_case
 from vegglue.diagnosis.comparison import held_out_rmse, rung
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
 from vegglue.engine.model import model_of
-from vegglue.ensemble.simulate import simulate, solve_flow
+from vegglue.ensemble.solve_ensemble import solve_ensemble, solve_flow
 from vegglue.figures.channel import save_channel_figure
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
-from vegglue.report.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report.page import write_report
+from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report_page.page import write_report
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.screening.candidates import candidates_of, cause_of
 from vegglue.site.gridded_site import build_site
-from vegglue.storage.hdf5 import read_ensemble, read_posterior, write_posterior
+from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
 from vegglue.twins.twin_files import write_twin
-from vegglue.workflow.check import check_case
 
 TRUTH = {"n_b": 0.05, "q": 2.13, "phi": 8.0}
 # A discharge that only those know who measured it.
@@ -99,9 +99,9 @@ class Line:
 def whole_line(folder: Path, names: tuple[str, ...]) -> Line:
     case = measured_case(folder, names)
     observations = read_observations(case)
-    simulate(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
+    solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
     ensemble = read_ensemble(folder / "ensemble.h5")
-    found = diagnose(model_of(case, observations))
+    found = diagnose_model(model_of(case, observations))
     return Line(folder, case, observations, ensemble, refine(ensemble, case, observations), found)
 
 

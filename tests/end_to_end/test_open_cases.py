@@ -13,8 +13,8 @@ from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.workflow.loop import Grown, diagnosed, grow
-from vegglue.workflow.run_folder import folder_of
+from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 
 CASES = Path(__file__).parents[3] / "shared" / "cases"
 EDDIES = {"viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures", "edge_mixing"}
@@ -33,11 +33,11 @@ def imported(name: str, folder: Path) -> Case:
 
 
 def looked_into(case: Case, folder: Path) -> Diagnosis:
-    return diagnosed(case, folder_of(folder / "runs", case), -1, print)
+    return diagnose(case, runs=folder / "runs", say=print)
 
 
-def extended(case: Case, folder: Path) -> Grown:
-    return grow(case, folder / "runs", -1, print)
+def extended(case: Case, folder: Path) -> StepwiseExtension:
+    return extend_stepwise(case, runs=folder / "runs", say=print)
 
 
 def test_where_nothing_is_hidden_nothing_is_found(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_what_is_hidden_is_found_and_added(name: str, hidden: str, true: float, 
     assert len(found.set) == 1 or set(found.set) <= EDDIES, found.verdict.sentence
     low, high = found.suspect(hidden).amplitude.interval95
     assert low <= true <= high
-    before, after = extended(case, tmp_path).rungs
+    before, after = extended(case, tmp_path).comparison.rungs
     assert after.validation < min(before.validation, WANTED)
 
 

@@ -10,7 +10,7 @@ import pytest
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.schema import Case
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model, Point, flow_at_centres, force_response, linearise, predict, responses
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
@@ -130,7 +130,7 @@ def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     assert truth is not None
     errors = 0.002 * np.random.default_rng(1).standard_normal(truth.prediction.size)
     measured = models[0].station.assign(value=truth.prediction + errors, standard_error=0.002)
-    exact, marched = (diagnose(replace(model, station=measured)) for model in models)
+    exact, marched = (diagnose_model(replace(model, station=measured)) for model in models)
     assert exact.set
     assert (marched.verdict, marched.set) == (exact.verdict, exact.set)
     assert marched.chi2 == pytest.approx(exact.chi2, rel=0.01)

@@ -14,7 +14,8 @@ from stored import HASH, MEMBERS, X, Y
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
-from vegglue.ensemble.simulate import simulate, solve_chunk, solve_flow
+from vegglue.checks.case_check import check_case
+from vegglue.ensemble.solve_ensemble import solve_chunk, solve_ensemble, solve_flow
 from vegglue.errors import InputError
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
 from vegglue.flow.sensor import read_sensors
@@ -25,8 +26,7 @@ from vegglue.site.grid import Grid, build_grid
 from vegglue.site.gridded_site import build_site
 from vegglue.solver import batch
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import read_ensemble, read_fields
-from vegglue.workflow.check import check_case
+from vegglue.storage.result_files import read_ensemble, read_fields
 
 SMALL = ("members: 1024, seed: 7", "members: 16, seed: 7, fields: {x: [8, 20]}")
 Finished = tuple[Case, Ensemble, Fields]
@@ -66,7 +66,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     """Sixteen members of the reach of the README with fields from its first section to its last."""
     folder = tmp_path_factory.mktemp("fields")
     case = load_case(write_reach(folder, COARSE, SMALL))
-    simulate(case, read_observations(case), folder / "ensemble.h5", 1, lambda progress: None)
+    solve_ensemble(case, read_observations(case), folder / "ensemble.h5", 1, lambda progress: None)
     wanted = simulation_hash(case)
     return case, read_ensemble(folder / "ensemble.h5", wanted), read_fields(folder / "fields.h5", wanted)
 
@@ -138,7 +138,7 @@ def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.M
         solved = solve(*arguments)
         return replace(solved, status=np.where(np.arange(len(solved.status)) == 1, FAILED, solved.status))
 
-    monkeypatch.setattr("vegglue.ensemble.simulate.solve_members", fail_second)
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.solve_members", fail_second)
     rows = solve_chunk(case, build_site(case), read_observations(case), np.full((3, 2), 0.4))
     assert [bool(np.isfinite(fields).any()) for fields in rows["fields"]] == [True, False, True]
 

@@ -22,8 +22,8 @@ from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
-from vegglue.report.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
+from vegglue.report_page.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report_page.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
 from vegglue.site.polygons import corners_of
 

@@ -35,7 +35,7 @@ from vegglue.figures.typography import (
     unit_math,
 )
 from vegglue.flow.sensor import FlowFields
-from vegglue.report.pictures import LONGEST_LABEL
+from vegglue.report_page.pictures import LONGEST_LABEL
 
 Y = np.array([3.0, 1.0, 2.0])  # not in order, as a table need not be
 BANDS = Bands(

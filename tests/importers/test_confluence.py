@@ -7,7 +7,7 @@ import pytest
 
 from vegglue.case.config import load_case
 from vegglue.cli.loop_commands import import_command
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.importers.confluence import case_from_confluence, discharge, flat_bed, holds_confluence
@@ -142,7 +142,7 @@ def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) 
     left = {}
     for bed in ("confluence", "confluence-flat"):
         model = model_in(load_case(target.with_stem(bed)))
-        found = diagnose(model)
+        found = diagnose_model(model)
         predictions, verdict = found.predictions, found.verdict
         velocity = (predictions.station["kind"] == "velocity").to_numpy()
         error = predictions.station["value"].to_numpy(float) - predictions.first

@@ -16,7 +16,7 @@ from vegglue.errors import InputError
 from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations
-from vegglue.report.posterior_words import describe
+from vegglue.report_page.posterior_words import describe
 from vegglue.resistance.plant_laws import baptist_chezy
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import LEVELS, Posterior

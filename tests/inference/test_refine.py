@@ -18,19 +18,19 @@ from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Point, linearise, predict
 from vegglue.engine.model import model_of
-from vegglue.ensemble.simulate import simulate
+from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.inference.homogeneity import alike, only, told_by_data, transfer
 from vegglue.inference.map_and_errors import distinct, groundwork, starting_places, unexplained_residual
 from vegglue.inference.refine import log_posterior, refinable, refine
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
-from vegglue.report.homogeneity_words import homogeneity_in_words
-from vegglue.report.posterior_words import describe
+from vegglue.report_page.homogeneity_words import homogeneity_in_words
+from vegglue.report_page.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior, Transfer
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import read_ensemble, read_posterior, write_posterior
+from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
 
 KNOWN = ("simulate: {members: 1024, seed: 7}", "simulate: {members: 64, seed: 7}\ninfer: {sigma: known}")
 ERRORS = ("velocities.csv, experiment: June}", "velocities.csv, experiment: June, standard_error: 0.01}")
@@ -39,7 +39,7 @@ ERRORS = ("velocities.csv, experiment: June}", "velocities.csv, experiment: June
 def made(folder: Path, *changes: tuple[str, str]) -> tuple[Case, Observations, Ensemble]:
     case = load_case(write_reach(folder, *changes))
     observations = read_observations(case)
-    simulate(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
+    solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
     return case, observations, read_ensemble(folder / "ensemble.h5")
 
 

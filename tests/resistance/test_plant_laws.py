@@ -9,13 +9,13 @@ from channels import make_problem, planted, sloping, solved
 
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Stand
+from vegglue.checks.trial_channel import CHANNEL
 from vegglue.flow.closures import drag
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import VegetatedCells
 from vegglue.flow.problem_setup import build_problem
 from vegglue.resistance.plant_laws import PLANT_LAWS
 from vegglue.site.gridded_site import build_site
-from vegglue.workflow.trial_channel import CHANNEL
 
 G, KARMAN, BARE = 9.81, 0.41, 60.0
 

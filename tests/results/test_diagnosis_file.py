@@ -12,7 +12,7 @@ from diagnoses import NO_LOCATION, NOTHING, a_diagnosis
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
-from vegglue.storage.hdf5 import diagnosis_that_fits, read_diagnosis, write_diagnosis
+from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, write_diagnosis
 
 HASH = "d" * 64
 ATTRIBUTES = {

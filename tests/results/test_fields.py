@@ -27,7 +27,8 @@ from stored import (
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.fields import FieldWindow, fields_group
-from vegglue.storage.hdf5 import ensemble_writer, read_fields
+from vegglue.storage.result_files import read_fields
+from vegglue.storage.resume import ensemble_writer
 
 HEADER = a_header(window=WINDOW)
 

@@ -25,7 +25,7 @@ from vegglue.results.posterior import (
     WeightStatistics,
 )
 from vegglue.results.refinement import Refinement
-from vegglue.storage.hdf5 import read_posterior, stored_hash, write_posterior
+from vegglue.storage.result_files import read_posterior, stored_hash, write_posterior
 
 
 def a_posterior(canopy: bool) -> Posterior:

@@ -11,7 +11,7 @@ from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model
 from vegglue.engine.model import coarser, model_of
-from vegglue.ensemble.simulate import simulate
+from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.flow.problem_setup import build_problem
 from vegglue.measurements.observations import read_observations
@@ -90,7 +90,7 @@ def test_a_boundary_without_a_cell_is_refused_before_anything_is_solved(
     with pytest.raises(InputError, match=sentence):
         build_problem(case, site, "one", {"n_b": np.array([0.03])})
     with pytest.raises(InputError, match=sentence):
-        simulate(case, read_observations(case), tmp_path / "ensemble.h5", 1, lambda progress: None)
+        solve_ensemble(case, read_observations(case), tmp_path / "ensemble.h5", 1, lambda progress: None)
     assert not (tmp_path / "ensemble.h5").exists()
 
 

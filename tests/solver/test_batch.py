@@ -13,7 +13,7 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import parameters_at, unit_points
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
-from vegglue.ensemble.simulate import LARGEST_CHUNK, begin_and_chunks, simulate, solve_chunk
+from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, begin_and_chunks, solve_chunk, solve_ensemble
 from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
@@ -22,7 +22,7 @@ from vegglue.solver.batch import NEIGHBOURHOOD, blend, solve_members
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.parameter_metric import axes, leaves
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 CHUNK = LARGEST_CHUNK
 # The outlet level becomes a parameter; far below the bed, no steady state is found.
@@ -94,8 +94,8 @@ def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: p
         handed.extend(places[chunks[index]] for index in todo)
         return iter(())
 
-    monkeypatch.setattr("vegglue.ensemble.simulate._solve_all", record)
-    simulate(case, observations, tmp_path / "ensemble.h5", jobs, lambda progress: None)
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble._solve_all", record)
+    solve_ensemble(case, observations, tmp_path / "ensemble.h5", jobs, lambda progress: None)
     places = places_of(case, 5 * CHUNK)
     expected = [places[leaf] for leaf in begin_and_chunks(case, site, places)[1]]
     assert len(handed) == 5
@@ -153,7 +153,7 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     case, _, observations = reach_at(tmp_path, *OUTLET, shallower, ("members: 1024", "members: 8"))
     path = tmp_path / "ensemble.h5"
     heard = []
-    simulate(case, observations, path, 1, heard.append)
+    solve_ensemble(case, observations, path, 1, heard.append)
     ensemble = read_ensemble(path)
     failed = ensemble.status == FAILED
     assert 0 < failed.sum() < 8

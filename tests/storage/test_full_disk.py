@@ -11,7 +11,8 @@ import pytest
 from stored import HASH, a_header, append, no_space, write_chunks
 
 from vegglue.errors import StorageError
-from vegglue.storage.hdf5 import ensemble_writer, read_ensemble
+from vegglue.storage.result_files import read_ensemble
+from vegglue.storage.resume import ensemble_writer
 
 
 def test_full_disk_while_appending_keeps_what_was_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,7 +20,7 @@ def test_full_disk_while_appending_keeps_what_was_written(tmp_path: Path, monkey
     with ensemble_writer(path, a_header()) as writer:
         append(writer, 0)
         with monkeypatch.context() as patch:
-            patch.setattr("vegglue.storage.hdf5.os.fsync", no_space)
+            patch.setattr("vegglue.storage.resume.os.fsync", no_space)
             with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* make room"):
                 append(writer, 1)
     with ensemble_writer(path, a_header()) as writer:

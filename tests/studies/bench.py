@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import parameters_at, unit_points
 from vegglue.case.prior import sample_prior
-from vegglue.ensemble.simulate import begin_and_chunks, begin_at, simulate, solve_chunk
+from vegglue.ensemble.solve_ensemble import begin_and_chunks, begin_at, solve_chunk, solve_ensemble
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import crop
@@ -27,7 +27,7 @@ from vegglue.solver.parameter_metric import leaves, parameter_metric
 from vegglue.solver.reference_member import settled
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
 from vegglue.solver.wet_band import rows_inside
-from vegglue.storage.hdf5 import read_ensemble
+from vegglue.storage.result_files import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {
@@ -145,7 +145,7 @@ def whole(case) -> None:  # type: ignore[no-untyped-def]
     """All members of an ensemble, over all cores, into a file."""
     with tempfile.TemporaryDirectory() as folder:
         path, began = Path(folder) / "ensemble.h5", time.perf_counter()
-        simulate(case, read_observations(case), path, -1, lambda _: None)
+        solve_ensemble(case, read_observations(case), path, -1, lambda _: None)
         seconds, found = time.perf_counter() - began, read_ensemble(path)
     nx, ny = build_site(case).bed.shape
     print(

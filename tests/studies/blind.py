@@ -29,7 +29,7 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.comparison import improvement, rung
-from vegglue.diagnosis.diagnose import diagnose
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding
 from vegglue.diagnosis.next_measurement import SEPARATES, worth_of_measurements
 from vegglue.engine.interface import Model, linearise
@@ -37,18 +37,11 @@ from vegglue.errors import InputError
 from vegglue.parallel import as_finished
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of, with_effect
+from vegglue.twins.hidden_effect import TwinBase, VisibilityError, candidate_of, case_hiding
 from vegglue.twins.reveal import marks
-from vegglue.twins.twin import (
-    Answer,
-    TwinBase,
-    VisibilityError,
-    candidate_of,
-    case_hiding,
-    measured,
-    true_place,
-    twin_base,
-)
-from vegglue.workflow.loop import rivals_of
+from vegglue.twins.sealed_answer import Answer
+from vegglue.twins.twin import measured_twin, true_place, twin_base
+from vegglue.workflow.next_measurement import rivals_of
 from vegglue.workflow.run_folder import model_in
 
 ROOT = Path(__file__).parents[2]
@@ -135,11 +128,11 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     record: dict[str, Any] = {"key": trial.key, **asdict(trial)}
     began = time.process_time()
     try:
-        station, answer = measured(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
+        station, answer = measured_twin(ground, trial.hide, trial.signal, NOISE.get(trial.group, "white"), seed)
     except InputError as error:
         return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)
-    found = diagnose(model, ground.here.z)
+    found = diagnose_model(model, ground.here.z)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
     if found.steps and trial.number % LOOKED_INTO == 0:
         record |= held_out(model, found)
@@ -223,7 +216,7 @@ def measured_again(
     values += error * np.random.default_rng((seed, 3)).standard_normal(len(more))
     station = pd.concat([model.station, more.assign(value=values, standard_error=error, used=True)], ignore_index=True)
     case = model.case.model_copy(update={"experiments": experiments})
-    again = diagnose(replace(model, case=case, station=station), base.fitted.point.z)
+    again = diagnose_model(replace(model, case=case, station=station), base.fitted.point.z)
     return {
         "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
         "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict.kind, "set": again.set,

@@ -10,7 +10,8 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import baseline
 from vegglue.screening import score_test
 from vegglue.screening.residual_screening import Screening, screen
-from vegglue.twins.twin import LARGEST_SIZE, TwinBase, measured
+from vegglue.twins.hidden_effect import LARGEST_SIZE, TwinBase
+from vegglue.twins.twin import measured_twin
 
 # Data sets for each effect and ground, and groups that a set holds at most to count as small.
 DRAWS, SMALL = 40, 3
@@ -18,7 +19,7 @@ DRAWS, SMALL = 40, 3
 
 def silent(ground: TwinBase) -> Screening:
     """A screening where nothing is hidden: for its fingerprints, and the errors they are seen against."""
-    station, _ = measured(ground, (), 0.0, "white", 1)
+    station, _ = measured_twin(ground, (), 0.0, "white", 1)
     return screen(baseline(replace(ground.model, station=station), ground.here.z))
 
 

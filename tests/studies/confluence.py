@@ -21,8 +21,9 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.spatial_scan import SPOT_RADIUS
 from vegglue.site.channel_geometry import half_width
 from vegglue.site.gridded_site import build_site
-from vegglue.workflow.loop import calibrated, child_path, diagnosed, grow, write_child
-from vegglue.workflow.run_folder import validation_of
+from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.extend import child_path, extend_stepwise, write_child
+from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "confluence.md"
@@ -54,7 +55,7 @@ def by_section(model: Model, prediction: np.ndarray) -> dict[str, float]:
 
 
 def row_of(title: str, case: Case, runs: Path) -> Row:
-    base = calibrated(case, folder_of(case, runs), excluded_by())
+    base = calibrated(case, folder_of(runs, case), excluded_by())
     unseen = validation_of(case)
     assert unseen is not None
     there = linearise(unseen, base.fitted.point.z)
@@ -67,12 +68,6 @@ def row_of(title: str, case: Case, runs: Path) -> Row:
         {"levels": seen.rmse["level"], "chi2": seen.chi2, "stations": seen.stations, "left out": held_out_rmse(found)},
         found.values,
     )
-
-
-def folder_of(case: Case, runs: Path) -> Path:
-    folder = runs / case.name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def with_object(case: Case, found: Diagnosis) -> Case:
@@ -91,9 +86,9 @@ def climb(path: Path, title: str, runs: Path, jobs: int, objects: int = 1) -> tu
     in its turn; and what each diagnosis said.
     """
     case = load_case(path)
-    found = diagnosed(case, folder_of(case, runs), jobs, print)
-    grown = grow(case, runs, jobs, print)
-    cases, titles = [load_case(one) for one in grown.paths], [title]
+    found = diagnose(case, runs=runs, jobs=jobs, say=print)
+    grown = extend_stepwise(case, runs=runs, jobs=jobs, say=print)
+    cases, titles = list(grown.cases), [title]
     for step in found.steps[: len(cases) - 1]:
         titles.append(f"{titles[-1]}, {step.accepted}")
     rows = [row_of(name, one, runs) for name, one in zip(titles, cases, strict=True)]

@@ -18,9 +18,11 @@ from vegglue.errors import InputError
 from vegglue.results.diagnosis import DragLocation, Step
 from vegglue.screening.candidates import with_effect
 from vegglue.screening.score_test import project
-from vegglue.storage.hdf5 import write_diagnosis
-from vegglue.twins.reveal import in_words, marks
-from vegglue.twins.twin import Answer, Hidden, TwinBase, errors_named, measured, opened, sealed, true_place, twin_base
+from vegglue.storage.result_files import write_diagnosis
+from vegglue.twins.hidden_effect import TwinBase
+from vegglue.twins.reveal import guess_in_words, marks
+from vegglue.twins.sealed_answer import Answer, Hidden, opened_answer, sealed_answer
+from vegglue.twins.twin import errors_named, measured_twin, true_place, twin_base
 from vegglue.twins.twin_files import config_in, write_twin
 from vegglue.workflow.run_folder import model_in
 
@@ -64,7 +66,7 @@ def test_errors_are_as_stated(ground: TwinBase, noise: str, correlation: float, 
     """Over 60 seeds: 4,860 velocities and their neighbours along a section."""
     errors = []
     for seed in range(60):
-        station, answer = measured(ground, ["nothing"], 6.0, noise, seed)
+        station, answer = measured_twin(ground, ["nothing"], 6.0, noise, seed)
         assert answer.hidden == ()
         errors.append((station["value"] - ground.there.prediction) / station["standard_error"])
     velocity = (station["kind"] == "velocity").to_numpy()
@@ -76,7 +78,7 @@ def test_errors_are_as_stated(ground: TwinBase, noise: str, correlation: float, 
 @pytest.mark.parametrize("name", ["discharge_error[high]", "viscosity", "station_shift[B]", "smagorinsky"])
 @pytest.mark.parametrize("snr", [3.0, 6.0])
 def test_an_effect_is_as_visible_as_asked(ground: TwinBase, name: str, snr: float) -> None:
-    _, answer = measured(ground, [name], snr, "white", 4)
+    _, answer = measured_twin(ground, [name], snr, "white", 4)
     (hidden,) = answer.hidden
     assert hidden.name == name
     assert hidden.signal == pytest.approx(snr, rel=0.1)
@@ -84,7 +86,7 @@ def test_an_effect_is_as_visible_as_asked(ground: TwinBase, name: str, snr: floa
 
 def test_a_linear_effect_has_the_size_of_its_fingerprint(ground: TwinBase) -> None:
     """a = snr / |S_perp|, S from the exact tangent instead of the two flows that `twin` compares."""
-    _, answer = measured(ground, ["discharge_error[mid]"], 3.0, "white", 4)
+    _, answer = measured_twin(ground, ["discharge_error[mid]"], 3.0, "white", 4)
     candidate = candidate_named(ground.model.case, ground.model.station, "discharge_error[mid]")
     case = with_effect(ground.model.case, candidate, {})
     trace = responses(ground.model, ground.here, [Cause(case, candidate.parameter, candidate.effect.amplitude)])
@@ -95,7 +97,7 @@ def test_a_linear_effect_has_the_size_of_its_fingerprint(ground: TwinBase) -> No
 
 
 def test_a_size_that_is_given_is_kept(ground: TwinBase) -> None:
-    station, answer = measured(ground, ["gauge_datum=0.5", "bad_probe=-8"], 6.0, "white", 4)
+    station, answer = measured_twin(ground, ["gauge_datum=0.5", "bad_probe=-8"], 6.0, "white", 4)
     level = (station["kind"] == "level").to_numpy()
     above = (station["value"] - ground.there.prediction).to_numpy()
     assert above[level] == pytest.approx(0.5, abs=0.015)
@@ -106,16 +108,16 @@ def test_a_size_that_is_given_is_kept(ground: TwinBase) -> None:
 
 @pytest.mark.slow
 def test_the_seed_decides_everything(ground: TwinBase) -> None:
-    first, again = (measured(ground, ["?"], 6.0, "white", 5) for _ in range(2))
+    first, again = (measured_twin(ground, ["?"], 6.0, "white", 5) for _ in range(2))
     assert first[0]["value"].tolist() == again[0]["value"].tolist()
     assert first[1] == again[1]
-    assert len({measured(ground, ["?"], 6.0, "white", seed)[1].hidden[0].name for seed in range(4)}) > 1
+    assert len({measured_twin(ground, ["?"], 6.0, "white", seed)[1].hidden[0].name for seed in range(4)}) > 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pier", "jet", "sink", "fallen_tree", "scour_hole"])
 def test_what_is_in_no_list_can_be_hidden(ground: TwinBase, name: str) -> None:
-    _, answer = measured(ground, [f"unlisted:{name}"], 6.0, "white", 2)
+    _, answer = measured_twin(ground, [f"unlisted:{name}"], 6.0, "white", 2)
     (hidden,) = answer.hidden
     assert not hidden.listed
     assert hidden.signal == pytest.approx(6.0, rel=0.1)
@@ -128,7 +130,7 @@ def test_what_is_in_no_list_can_be_hidden(ground: TwinBase, name: str) -> None:
 )
 def test_what_cannot_be_hidden_is_said(ground: TwinBase, wanted: str, named: str) -> None:
     with pytest.raises(InputError, match=named):
-        measured(ground, [wanted], 6.0, "white", 1)
+        measured_twin(ground, [wanted], 6.0, "white", 1)
 
 
 def an_answer(*hidden: Hidden) -> Answer:
@@ -138,14 +140,14 @@ def an_answer(*hidden: Hidden) -> Answer:
 def test_a_seal_hides_and_opens(tmp_path: Path) -> None:
     answer = an_answer(Hidden("streamlining", -0.4, {"reference_speed": 0.3}, 5.9))
     path = tmp_path / "answer.sealed"
-    path.write_text(sealed(answer), encoding="utf-8")
-    assert opened(path) == answer
+    path.write_text(sealed_answer(answer), encoding="utf-8")
+    assert opened_answer(path) == answer
     assert "stream" not in path.read_text(encoding="utf-8")
-    path.write_text(sealed(answer)[:-20], encoding="utf-8")
+    path.write_text(sealed_answer(answer)[:-20], encoding="utf-8")
     with pytest.raises(InputError, match="seal is broken"):
-        opened(path)
+        opened_answer(path)
     with pytest.raises(InputError, match="cannot be read"):
-        opened(tmp_path / "none")
+        opened_answer(tmp_path / "none")
 
 
 def test_marks_of_every_kind() -> None:
@@ -171,24 +173,24 @@ def test_marks_of_every_kind() -> None:
 
 def test_what_reveal_says() -> None:
     effect = Hidden("eddies", 0.3, {}, 6.0)
-    said = "\n".join(in_words(an_answer(effect), a_diagnosis()))
+    said = "\n".join(guess_in_words(an_answer(effect), a_diagnosis()))
     assert "n_b = 0.03" in said
     assert "correlated by 0.5" in said
     assert "the interval holds the true size" in said
-    assert "Nothing was hidden" in "\n".join(in_words(an_answer(), None))
+    assert "Nothing was hidden" in "\n".join(guess_in_words(an_answer(), None))
     silent = a_diagnosis(verdict={"kind": "nothing-missing"}, suspects=(a_suspect("wind"),), steps=())
-    assert "right" in in_words(an_answer(), silent)[-1]
-    assert "missed" in in_words(an_answer(effect), silent)[-1]
+    assert "right" in guess_in_words(an_answer(), silent)[-1]
+    assert "missed" in guess_in_words(an_answer(effect), silent)[-1]
     wide = Hidden("mixing[D3]", 0.3, {"width": 0.6}, 6.0)
-    assert "found with width = 0.1 instead of 0.6, on which sizes" in in_words(an_answer(wide), a_diagnosis())[-1]
+    assert "found with width = 0.1 instead of 0.6, on which sizes" in guess_in_words(an_answer(wide), a_diagnosis())[-1]
     alike = Hidden("mixing[D3]", 0.3, {"width": 0.101}, 6.0)
-    assert in_words(an_answer(alike), a_diagnosis())[-1].endswith("the true size.")
+    assert guess_in_words(an_answer(alike), a_diagnosis())[-1].endswith("the true size.")
 
 
 def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:
     """Its config runs as it is, and its measurements are the ones made, to the last digit written."""
-    station, answer = measured(ground, ["viscosity"], 6.0, "white", 1)
-    target = write_twin(ground.model.case, tmp_path / "Riddle 1", station, sealed(answer))
+    station, answer = measured_twin(ground, ["viscosity"], 6.0, "white", 1)
+    target = write_twin(ground.model.case, tmp_path / "Riddle 1", station, sealed_answer(answer))
     assert config_in(tmp_path / "Riddle 1") == target
     assert all(observation.synthetic for observation in load_case(target).observations)
     target.with_name("riddle-1+viscosity.yaml").touch()

@@ -9,6 +9,7 @@ from channels import GRAVITY, centres, discharge, family, make_problem, river, s
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from vegglue.checks.trial_channel import mirrored
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment, take
@@ -19,7 +20,6 @@ from vegglue.solver.batch import solve_members
 from vegglue.solver.chord import chord
 from vegglue.solver.jacobian import factors, jacobian
 from vegglue.solver.march import march, settle
-from vegglue.workflow.trial_channel import mirrored
 
 CHANCE = np.random.default_rng(3)
 

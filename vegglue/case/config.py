@@ -20,11 +20,12 @@ PATHS = ("file", "raster", "points", "effect_file")
 DECLARING = ("law", "distribution")
 
 
-def load_case(path: Path, trust: bool = False) -> Case:
+def load_case(path: Path | str, trust: bool = False) -> Case:
     """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do.
 
     trust: whether a Python file that the case names may be run.
     """
+    path = Path(path)
     layers = _layers(path, ())
     tree: Tree = {}
     for _, layer in reversed(layers):

@@ -11,12 +11,11 @@ from vegglue.case.messages import nearest
 from vegglue.case.schema import Case
 from vegglue.cli.options import Json, Runs, console
 from vegglue.effects.definition import Effect
-from vegglue.effects.library import effects_of, library
+from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.report.diagnosis_pictures import save_fingerprint_figure
-from vegglue.report.effect_page import by_stage, effect_json, page, work_in_case
-from vegglue.workflow.effect_contract import breaches
-from vegglue.workflow.loop import trace_of
+from vegglue.report_page.effect_page import by_stage, effect_json, page, work_in_case
+from vegglue.workflow.check import check_effects
+from vegglue.workflow.diagnose import draw_fingerprint_of
 
 
 def effects_command(
@@ -39,8 +38,8 @@ def effects_command(
         _list(tuple(known.values()), as_object)
     elif name in known:
         _show(known[name], case, as_object)
-        if case is not None and not as_object:
-            _draw(known[name], case, runs)
+        if case is not None and case.observations and not as_object:
+            console.print(f"Fingerprint drawn in {draw_fingerprint_of(case, known[name], runs=runs)}")
     else:
         raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
 
@@ -64,24 +63,8 @@ def _show(effect: Effect, case: Case | None, as_object: bool) -> None:
         console.print(line)
 
 
-def _draw(effect: Effect, case: Case, runs: Path) -> None:
-    """The effect's trace at the stations of the calibrated case, before calibration takes its part."""
-    if not case.observations:
-        return
-    path = runs / case.name / f"fingerprint_{effect.name}.png"
-    trace, station = trace_of(case, runs / case.name, effect)
-    amplitude = effect.amplitude
-    unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
-    save_fingerprint_figure(trace, station, unit, path)
-    console.print(f"Fingerprint drawn in {path}")
-
-
 def _check(file: Path, as_object: bool, trust: bool) -> None:
-    if not trust:
-        raise InputError(f"{file}: runs as code when it is checked: read it, and add --trust if you trust it.")
-    if not file.is_file():
-        raise InputError(f"{file}: expected an existing Python file of effects; correct the path.")
-    found = {effect.name: breaches(effect, file.resolve()) for effect in effects_of(file.resolve())}
+    found = check_effects(file, trust=trust)
     if as_object:
         print(json.dumps(found, ensure_ascii=False))
     else:

@@ -1,20 +1,14 @@
 """The shell of twins: make data with a hidden effect, and open the seal."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vegglue.case.config import load_case
-from vegglue.case.resolved_config import case_hash
+from vegglue.case.config import load_case, shown_path
 from vegglue.cli.options import Runs, console
-from vegglue.errors import InputError
-from vegglue.storage.hdf5 import diagnosis_that_fits
-from vegglue.twins.reveal import in_words
-from vegglue.twins.twin import measured, opened, sealed, true_place, twin_base
-from vegglue.twins.twin_files import SEAL, config_in, write_twin
-from vegglue.workflow.run_folder import model_in
+from vegglue.measurements.observations import read_observations
+from vegglue.workflow.twin import make_twin, reveal
 
 
 def twin_command(
@@ -29,13 +23,10 @@ def twin_command(
     seed: Annotated[int, typer.Option(min=0, help="Decides parameters, errors and what `?` is.")] = 1,
 ) -> None:
     """Make measurements with a hidden effect, to play blind against `diagnose`; the answer is sealed."""
-    case = load_case(config)
-    model = model_in(case)
-    if not case.parameters:
-        raise InputError(f"{config}: `parameters` expected a prior or more, got none; add one.")
-    station, answer = measured(twin_base(model, true_place(len(model.names), seed)), hide or ["?"], snr, noise, seed)
-    target = write_twin(case, to, station, sealed(answer))
-    console.print(f"{target}: {int(station['used'].sum())} measurements. Next: vegglue diagnose {target}, then")
+    case = make_twin(load_case(config), to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed)
+    target = shown_path(case.source)
+    measurements = int(read_observations(case).table["used"].sum())
+    console.print(f"{target}: {measurements} measurements. Next: vegglue diagnose {target}, then")
     console.print(f"vegglue reveal {to}")
 
 
@@ -44,13 +35,5 @@ def reveal_command(
     runs: Runs = Path("runs"),
 ) -> None:
     """Open the seal of a twin, and say how well its diagnosis guessed."""
-    answer = opened(folder / SEAL)
-    case = load_case(config_in(folder))
-    diagnosis = diagnosis_that_fits(runs / case.name / "diagnosis.h5", case_hash(case))
-    for line in in_words(answer, diagnosis):
+    for line in reveal(folder, runs=runs):
         console.print(f"- {line}")
-    if diagnosis is None:
-        console.print(f"No diagnosis of it in {runs / case.name}: `vegglue diagnose {config_in(folder)}` makes one.")
-
-
-TWIN_COMMANDS: tuple[tuple[str, Callable[..., None]], ...] = (("twin", twin_command), ("reveal", reveal_command))

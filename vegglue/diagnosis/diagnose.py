@@ -26,7 +26,7 @@ from vegglue.screening.residual_screening import screen
 MOST_EFFECTS = 3
 
 
-def diagnose(model: Model, known: Array | None = None, say: Say = lambda text: None) -> Diagnosis:
+def diagnose_model(model: Model, known: Array | None = None, say: Say = lambda text: None) -> Diagnosis:
     """Find out what a calibrated model lacks. known (p,): a good place of the prior, if there is one.
 
     Errors: InputError when the model finds no flow, or a station has no standard error.

@@ -1,5 +1,5 @@
 """All members of a case solved over the cores.
 
 May import: case, site, measurements, flow, solver, results, storage.
-Open first: simulate.py.
+Open first: solve_ensemble.py.
 """

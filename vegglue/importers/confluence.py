@@ -15,6 +15,16 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name, write_text
+from vegglue.importers.config_parts import (
+    FIRST_LOOK,
+    MANNING_BED,
+    bed_prior,
+    even,
+    loguniform_prior,
+    normal_prior,
+    observed,
+    validated,
+)
 from vegglue.measurements.csv_table import read_table
 
 EXPERIMENT = "measured"
@@ -60,7 +70,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
         "title": "Open-channel confluence, measured by others",
         "grid": grid,
         "bed": [{"points": f"{into.name}/bed.csv"}],
-        "friction": {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"},
+        "friction": {"classes": {"bed": MANNING_BED}, "default": "bed"},
         "inflows": {
             "upstream": {"side": "west", "spread": "conveyance"},
             "side": {"side": "south", "range": [0.0, CONFLUENCE_WIDTH], "spread": "uniform", "angle": angle},
@@ -70,13 +80,10 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
         "experiments": {EXPERIMENT: _setting()},
         "parameters": _priors(vertical[np.isin(vertical[:, 0], sections[::2])], blocks, width),
         "observations": [_observation("velocity", into, "velocities"), _observation("level", into, "levels")],
-        "validation": {
-            "experiments": {EXPERIMENT: _setting()}, "observations": [_observation("velocity", into, "held_out")],
-        },
+        **validated({EXPERIMENT: _setting()}, [_observation("velocity", into, "held_out")]),
         "numerics": {"film_depth": 0.002},
-        "simulate": {"members": 256, "seed": 1},
-        "infer": {"sigma": "known"},
-    }  # fmt: skip
+        **FIRST_LOOK,
+    }
 
 
 def flat_bed(folder: Path, parent: Path) -> Tree:
@@ -114,24 +121,17 @@ def _priors(vertical: Array, blocks: Array, width: float) -> Tree:
     side = max(float(below.mean()) - before, 0.02 * before)
     level = float(blocks[blocks[:, 0] > blocks[:, 0].max() - 0.5 * width, 2].mean())
     return {
-        "discharge": _normal(before, UPSTREAM * before, "m3/s", "Q", "discharge from upstream"),
-        "side_discharge": _normal(side, SIDE * side, "m3/s", "Q_s", "discharge from the side, which is not stated")
-        | {"low": _rounded(0.02 * side), "high": _rounded(3.0 * side)},
-        "outlet_level": _normal(level, OUTLET, "m", "z_out", "water level at the outlet"),
-        "n_b": {
-            "distribution": "loguniform", "low": 0.005, "high": 0.05, "unit": "s m^(-1/3)", "symbol": "n_b",
-            "meaning": "Manning coefficient of the bed",
-        },
-        "eddy_viscosity": {
-            "distribution": "loguniform", "low": 3e-5, "high": 1e-2, "unit": "m2/s", "symbol": "ν",
-            "meaning": "eddy viscosity",
-        },
+        "discharge": normal_prior(
+            _rounded(before), _rounded(UPSTREAM * before), "m3/s", "Q", "discharge from upstream"
+        ),
+        "side_discharge": normal_prior(
+            _rounded(side), _rounded(SIDE * side), "m3/s", "Q_s", "discharge from the side, which is not stated",
+            low=_rounded(0.02 * side), high=_rounded(3.0 * side),
+        ),
+        "outlet_level": normal_prior(_rounded(level), OUTLET, "m", "z_out", "water level at the outlet"),
+        "n_b": bed_prior(0.005, 0.05),
+        "eddy_viscosity": loguniform_prior(3e-5, 1e-2, "m2/s", "ν", "eddy viscosity"),
     }  # fmt: skip
-
-
-def _normal(mean: float, sd: float, unit: str, symbol: str, meaning: str) -> Tree:
-    numbers = {"mean": _rounded(mean), "sd": _rounded(sd)}
-    return {"distribution": "normal", **numbers, "unit": unit, "symbol": symbol, "meaning": meaning}
 
 
 def _angle(path: Path) -> float:
@@ -155,7 +155,7 @@ def _grid(bed: Array, vertical: Array, width: float) -> Tree:
     coarse = 4.0 * CELL
     low = max(np.floor((vertical[:, 0].min() - 0.5 * width) / coarse), np.ceil(bed[:, 0].min() / coarse - 1e-9))
     high = min(np.ceil(vertical[:, 0].max() / coarse) + 1, np.floor(bed[:, 0].max() / coarse + 1e-9))
-    rows = 2 * round(width / CELL / 2)
+    rows = even(width / CELL)
     return {
         "x": [round(float(low) * coarse, 6), round(float(high) * coarse, 6)],
         "y": [0.0, width],
@@ -199,7 +199,7 @@ def _setting() -> Tree:
 
 
 def _observation(kind: str, into: Path, name: str) -> Tree:
-    return {"kind": kind, "file": f"{into.name}/{name}.csv", "experiment": EXPERIMENT}
+    return observed(kind, f"{into.name}/{name}.csv", EXPERIMENT)
 
 
 def _columns(path: Path, *names: str) -> Array:

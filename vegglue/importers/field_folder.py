@@ -15,6 +15,16 @@ from typing import Any
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError
+from vegglue.importers.config_parts import (
+    FIRST_LOOK,
+    MANNING_BED,
+    bed_prior,
+    even,
+    loguniform_prior,
+    normal_prior,
+    observed,
+    validated,
+)
 from vegglue.measurements.kinds import KINDS
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
@@ -40,7 +50,7 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         "grid": _grid(channel, experiments),
         "bed": [{"trapezoid": _trapezoid(channel)}],
         "friction": {
-            "classes": {"bed": {"law": "manning", "n": "n_b"}, "bank": {"law": "keulegan", "k_s": "k_s"}},
+            "classes": {"bed": MANNING_BED, "bank": {"law": "keulegan", "k_s": "k_s"}},
             "default": "bed",
             "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
         },
@@ -50,14 +60,11 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         "experiments": {name: _experiment(given) for name, given in experiments.items()},
         "parameters": dict(PARAMETERS),
         "observations": _observations(folder, target),
-        "simulate": {"members": 256, "seed": 1},
-        "infer": {"sigma": "known"},
+        **FIRST_LOOK,
     }
     if site.get("holdout") and (folder / "holdout.csv").is_file():
-        tree["validation"] = {
-            "experiments": {name: _experiment(given) for name, given in site["holdout"].items()},
-            "observations": [{"kind": "velocity", "file": _named(folder / "holdout.csv", target)}],
-        }
+        held_out = {name: _experiment(given) for name, given in site["holdout"].items()}
+        tree |= validated(held_out, [observed("velocity", _named(folder / "holdout.csv", target))])
     if patches:
         tree["plants"] = _plants(patches)
         guess = float(site.get("canopy_height_guess_m", 0.8))
@@ -66,27 +73,17 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
 
 
 PARAMETERS: Tree = {
-    "n_b": {
-        "distribution": "loguniform", "low": 0.01, "high": 0.2, "unit": "s m^(-1/3)", "symbol": "n_b",
-        "meaning": "Manning coefficient of the bed",
-    },
-    "k_s": {
-        "distribution": "loguniform", "low": 0.01, "high": 5.0, "unit": "m", "symbol": "k_s",
-        "meaning": "Nikuradse roughness height of the banks",
-    },
-}  # fmt: skip
-PHI: Tree = {
-    "distribution": "loguniform", "low": 0.02, "high": 100.0, "unit": "-", "symbol": "φ",
-    "meaning": "drag of the densest patches",
-}  # fmt: skip
+    "n_b": bed_prior(0.01, 0.2),
+    "k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks"),
+}
+PHI = loguniform_prior(0.02, 100.0, "-", "φ", "drag of the densest patches")
 
 
 def _canopy(guess: float) -> Tree:
-    return {
-        "distribution": "normal", "mean": guess, "sd": round(BY_EYE * guess, 4), "low": round(0.4 * guess, 4),
-        "high": round(1.8 * guess, 4), "unit": "m", "symbol": "h_d",
-        "meaning": "height of the canopy, estimated by eye",
-    }  # fmt: skip
+    return normal_prior(
+        guess, round(BY_EYE * guess, 4), "m", "h_d", "height of the canopy, estimated by eye",
+        low=round(0.4 * guess, 4), high=round(1.8 * guess, 4),
+    )  # fmt: skip
 
 
 def _read_site(path: Path) -> Tree:
@@ -133,7 +130,7 @@ def _grid(channel: Mapping[str, Any], experiments: Mapping[str, Any]) -> Tree:
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
     beside = math.ceil(depth / float(channel["bank_slope_v_per_h"]) / dy / 2) * 2
-    columns = round(length / (dy * LENGTHENED) / 2) * 2
+    columns = even(length / (dy * LENGTHENED))
     half = round(0.5 * width + beside * dy, 6)
     return {"x": [0.0, length], "y": [-half, half], "cell": [length / columns, dy]}
 
@@ -162,7 +159,7 @@ def _observations(folder: Path, target: Path) -> list[Tree]:
     found = []
     for kind in KINDS.values():
         if (folder / kind.file).is_file():
-            found.append({"kind": kind.name, "file": _named(folder / kind.file, target)})
+            found.append(observed(kind.name, _named(folder / kind.file, target)))
     if not found:
         files = ", ".join(kind.file for kind in KINDS.values())
         raise InputError(f"{_shown(folder)}: expected one of {files}, got none; put what was measured there.")

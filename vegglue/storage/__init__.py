@@ -1,5 +1,5 @@
 """Results on disk: HDF5 files, one run at a time, and how a killed run resumes.
 
 May import: results.
-Open first: hdf5.py, resume.py.
+Open first: result_files.py, resume.py.
 """

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.twins.twin import BAD_PROBE, Answer, Hidden
+from vegglue.twins.sealed_answer import BAD_PROBE, Answer, Hidden
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Mark:
 
 
 def marks(answer: Answer, diagnosis: Diagnosis) -> list[Mark]:
+    """One for each thing that is hidden."""
     return [_mark(hidden, diagnosis) for hidden in answer.hidden]
 
 
@@ -60,7 +61,7 @@ def groups_of(diagnosis: Diagnosis) -> list[int]:
     return [len(step.groups) for step in diagnosis.steps]
 
 
-def in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
+def guess_in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
     """The truth, and what the diagnosis made of it, one line each."""
     errors = "errors as stated" if answer.scale == 1.0 else f"errors {answer.scale:g} times those stated"
     if answer.correlation:

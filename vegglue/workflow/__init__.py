@@ -1,6 +1,6 @@
-"""The steps on files: check, the loop from misfit to a child config, and what every effect must keep.
+"""The verbs of `import vegglue`, one file each: from a case to its results, kept in the folder of the run.
 
-May import: resistance, effects, case, site, measurements, flow, solver, engine, results, calibration, screening,
-storage, diagnosis, report.
-Open first: loop.py, check.py.
+May import: effects, case, site, measurements, importers, engine, results, calibration, screening, storage, ensemble,
+inference, diagnosis, figures, twins, report_page, checks.
+Open first: run.py, run_folder.py.
 """

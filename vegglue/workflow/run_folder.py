@@ -1,32 +1,47 @@
-"""The folder of a run: the calibrated place that one command leaves for the next."""
+"""The folder of a run, runs/<name>/: what one step keeps there for the next, first of all where a model fits best.
+
+ensemble.h5, fields.h5, posterior.h5, diagnosis.h5 and best.json carry the hash of the case; what does not fit is not
+used.
+"""
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import z_at
+from vegglue.calibration.baseline import Baseline, baseline, for_prediction
+from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
+from vegglue.diagnosis.excluded_stations import excluding
 from vegglue.engine.interface import Model
 from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
-from vegglue.storage.hdf5 import read_posterior, stored_hash
+from vegglue.storage.result_files import read_posterior, stored_hash
 
 MAKE_ROOM = "make room and run it again"
 
 
-def folder_of(runs: Path, case: Case) -> Path:
+def folder_of(runs: Path | str, case: Case) -> Path:
     """Where the results of a case lie; made if need be."""
-    folder = runs / case.name
+    folder = Path(runs) / case.name
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
+def of_size(case: Case, members: int | None) -> Case:
+    """The case with another number of members, or as it is."""
+    if members is None:
+        return case
+    return case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
+
+
 def model_in(case: Case) -> Model:
+    """The case as a model of its own measurements, which are read from their files."""
     return model_of(case, read_observations(case))
 
 
@@ -60,3 +75,14 @@ def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None
     """Keep the best place for the next command. Errors: StorageError."""
     text = json.dumps({"config_hash": case_hash(case), "theta": {name: float(theta[name]) for name in case.parameters}})
     write_text(folder / "best.json", text, MAKE_ROOM)
+
+
+def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
+    """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
+    base = for_prediction(baseline(excluding(model_in(case), aside), known_place(case, folder)))
+    remember_place(case, folder, _theta(base))
+    return base
+
+
+def _theta(base: Baseline) -> dict[str, float]:
+    return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.checks.trial_channel import PAIRS, Trial, answer, at_rest, dry, mirrored, moving_water, sizes, trial
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
@@ -18,7 +19,6 @@ from vegglue.flow.closures import closed
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import Problem, crop, take
 from vegglue.solver.newton import newton
-from vegglue.workflow.trial_channel import PAIRS, Trial, answer, at_rest, dry, mirrored, moving_water, sizes, trial
 
 
 def breaches(effect: Effect, own: Path | None = None) -> list[str]:

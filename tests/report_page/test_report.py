@@ -19,11 +19,11 @@ from vegglue.flow.sensor import FlowFields
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
-from vegglue.report.findings import findings
-from vegglue.report.key_numbers import key_numbers, verdict_of
-from vegglue.report.page import write_report
-from vegglue.report.run import Run, is_synthetic, zones
-from vegglue.report.tables import parameter_rows
+from vegglue.report_page.findings import findings
+from vegglue.report_page.key_numbers import key_numbers, verdict_of
+from vegglue.report_page.page import write_report
+from vegglue.report_page.run import Run, is_synthetic, zones
+from vegglue.report_page.tables import parameter_rows
 from vegglue.results.ensemble import Ensemble
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING

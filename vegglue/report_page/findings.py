@@ -12,8 +12,8 @@ from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
-from vegglue.report.homogeneity_words import homogeneity_in_words, rejected
-from vegglue.report.key_numbers import (
+from vegglue.report_page.homogeneity_words import homogeneity_in_words, rejected
+from vegglue.report_page.key_numbers import (
     as_power,
     estimate,
     largest_mass_error,
@@ -24,8 +24,8 @@ from vegglue.report.key_numbers import (
     unexplained_error,
     with_unit,
 )
-from vegglue.report.posterior_words import UNBELIEVED, drawn_in_words, tied, unseen_in_words
-from vegglue.report.run import Run, patches_drawn
+from vegglue.report_page.posterior_words import UNBELIEVED, drawn_in_words, tied, unseen_in_words
+from vegglue.report_page.run import Run, patches_drawn
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON

@@ -20,12 +20,12 @@ from vegglue.figures.posterior import (
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, percent, plus_minus, short
 from vegglue.inference.weighted_statistics import weighted_quantile
-from vegglue.report.findings import MASS_LIMIT
-from vegglue.report.flow_pictures import plans
-from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, plant_parameter, symbol
-from vegglue.report.measured_pictures import discharges, residuals, sections, verticals
-from vegglue.report.posterior_words import how_known
-from vegglue.report.run import Run, picture
+from vegglue.report_page.findings import MASS_LIMIT
+from vegglue.report_page.flow_pictures import plans
+from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, plant_parameter, symbol
+from vegglue.report_page.measured_pictures import discharges, residuals, sections, verticals
+from vegglue.report_page.posterior_words import how_known
+from vegglue.report_page.run import Run, picture
 
 MOST_PAIRS = 6  # of parameters drawn together
 LONGEST_LABEL = 24  # letters beside a mark, with which the axes of a marginal keep nine tenths of their width

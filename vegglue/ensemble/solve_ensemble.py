@@ -7,7 +7,7 @@ results are too.
 import hashlib
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.parallel import as_finished
-from vegglue.progress import Progress
+from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ensemble import Header
 from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
 from vegglue.site.gridded_site import Site, build_site
@@ -33,7 +33,7 @@ from vegglue.solver.batch import NEIGHBOURHOOD, solve_members
 from vegglue.solver.parameter_metric import leaves, parameter_metric
 from vegglue.solver.reference_member import SolvedMember, known_middle
 from vegglue.solver.status import FAILED
-from vegglue.storage.hdf5 import ensemble_writer
+from vegglue.storage.resume import ensemble_writer
 from vegglue.version import VERSION
 
 # Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.
@@ -44,7 +44,7 @@ Rows = dict[str, np.ndarray]
 Begin = dict[str, SolvedMember | None]
 
 
-def simulate(case: Case, observations: Observations, path: Path, jobs: int, report: Callable[[Progress], None]) -> None:
+def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch = silent) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
     Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
@@ -64,12 +64,12 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed = resumed, 0
-        report(Progress(solved, len(places), failed, resumed))
+        watch(Progress(case.name, solved, len(places), failed, resumed))
         for index, rows in _solve_all(case, site, observations, places, chunks, todo, begin, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + int((rows["status"] == FAILED).sum())
-            report(Progress(solved, len(places), failed, resumed))
+            watch(Progress(case.name, solved, len(places), failed, resumed))
 
 
 def chunk_size(members: int) -> int:

@@ -11,7 +11,7 @@ from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
-from vegglue.report.run import Run, picture, planted
+from vegglue.report_page.run import Run, picture, planted
 from vegglue.site.polygons import corners_of
 
 REACH_MARGIN = 8.0  # m, shown beyond the outermost patch and station

@@ -1,4 +1,4 @@
-"""Ensembles on disk: a run that stops goes on where it was, and what does not fit is told; readable by xarray."""
+"""A run that stops or is killed goes on where it was, and nothing of another run is mixed in."""
 
 import signal
 import time
@@ -8,12 +8,10 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 from stored import (
     ALL,
     CHUNKS,
-    HASH,
     MEMBERS,
     WINDOW,
     a_header,
@@ -25,9 +23,10 @@ from stored import (
     write_chunks,
 )
 
-from vegglue.errors import InputError, StorageError
-from vegglue.results.ensemble import ROWS, Header
-from vegglue.storage.hdf5 import ensemble_writer, read_ensemble, stored_hash
+from vegglue.errors import InputError
+from vegglue.results.ensemble import Header
+from vegglue.storage.result_files import read_ensemble
+from vegglue.storage.resume import ensemble_writer
 
 
 @pytest.fixture
@@ -37,20 +36,6 @@ def path(tmp_path: Path) -> Path:
 
 def part(path: Path) -> Path:
     return path.with_name("ensemble.h5.part")
-
-
-def test_ensemble_comes_back_as_it_went(path: Path) -> None:
-    header = a_header()
-    write_chunks(path, ALL, header)
-    assert_whole(path, header)
-    ensemble = read_ensemble(path, HASH)
-    assert list(ensemble.parameters) == ["z_last", "a_first"]  # the order of the config
-    assert all(np.array_equal(ensemble.parameters[name], header.parameters[name]) for name in header.parameters)
-    pd.testing.assert_frame_equal(ensemble.station, header.station, check_dtype=False)
-    assert ensemble.station["used"].dtype == bool
-    assert (ensemble.experiments, ensemble.sections) == (header.experiments, header.sections)
-    assert (ensemble.config, ensemble.seed, ensemble.version) == ("name: d0\n", 5, "0.1.0")
-    assert stored_hash(path) == HASH
 
 
 def test_unfinished_run_is_resumed(path: Path) -> None:
@@ -82,7 +67,7 @@ APPEND_FOREVER = """
     from pathlib import Path
     sys.path.insert(0, {tests!r})
     from stored import WINDOW, a_header, append
-    from vegglue.storage.hdf5 import ensemble_writer
+    from vegglue.storage.resume import ensemble_writer
     with ensemble_writer(Path({path!r}), a_header(window={window})) as writer:
         append(writer, 1)
         print("appended", flush=True)
@@ -139,24 +124,6 @@ def test_broken_part_file_is_set_aside(path: Path) -> None:
         assert writer.set_aside == path.with_name("ensemble.h5.part.old")
 
 
-def test_missing_other_and_broken_ensembles_are_told(path: Path) -> None:
-    with pytest.raises(InputError, match=r"ensemble\.h5: .*found no file; run `vegglue simulate CONFIG`"):
-        read_ensemble(path)
-    write_chunks(path, ALL, a_header())
-    with pytest.raises(InputError, match=r"expected config hash eeeeeeeeeeee, found ffffffffffff: .* again"):
-        read_ensemble(path, "e" * 64)
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    with pytest.raises(StorageError, match="cannot be opened"):
-        read_ensemble(path)
-    assert stored_hash(path) is None
-    path.write_bytes(content)
-    with h5py.File(path, "r+") as file:
-        del file["members/seconds"]
-    with pytest.raises(StorageError, match="is broken or of another version"):
-        read_ensemble(path)
-
-
 def test_rows_that_do_not_match_the_file_are_refused(path: Path) -> None:
     rows = rows_of(0)
     del rows["seconds"]
@@ -170,25 +137,3 @@ def test_long_reasons_are_cut_between_characters(path: Path) -> None:
             reasons = np.array(["x" + "ü" * 300] * len(members_of(chunk)), object)
             writer.append(chunk, members_of(chunk), rows_of(chunk) | {"reason": reasons})
     assert set(read_ensemble(path).reason) == {"x" + "ü" * 119}
-
-
-def test_parameter_named_like_a_dimension_is_refused(path: Path) -> None:
-    named = {"member": np.ones(MEMBERS)}
-    with pytest.raises(InputError, match=r"\['member'\] are names of dimensions .* rename"):
-        write_chunks(path, set(), a_header(parameters=named, units={"member": "-"}))
-    assert [file.name for file in path.parent.iterdir()] == [".lock"]
-
-
-@pytest.mark.parametrize("group", ["members", "parameters", "stations", "progress"])
-def test_xarray_opens_every_group_of_an_ensemble(path: Path, group: str) -> None:
-    xarray = pytest.importorskip("xarray")
-    write_chunks(path, ALL, a_header())
-    with xarray.open_dataset(path, group=group, engine="h5netcdf") as data:
-        data.load()
-    if group == "members":
-        assert set(data.data_vars) == {*ROWS, "section_x"}
-        assert data["section_flow"].dims == ("member", "experiment", "section")
-        assert data["section"].values.tolist() == ["D0", "D3"]
-        assert data["seconds"].attrs["units"] == "s"
-    if group == "stations":
-        assert data["used"].values.tolist() == [True, False]

@@ -8,7 +8,7 @@ import numpy as np
 
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
-from vegglue.report.homogeneity_words import homogeneity_in_words
+from vegglue.report_page.homogeneity_words import homogeneity_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Marginals, Posterior
 from vegglue.results.refinement import ErrorModel, GroupsLeftOut, LeaveOneOut, MisfitTest, PosteriorModes, Refinement
 

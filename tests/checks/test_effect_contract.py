@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from vegglue.case.schema import Case
+from vegglue.checks.effect_contract import breaches
+from vegglue.checks.trial_channel import AMPLITUDE, CHANNEL, sizes
 from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
 from vegglue.effects.library import SHIPPED, library
 from vegglue.flow.backwater import backwater
@@ -15,8 +17,6 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.site.gridded_site import build_site
 from vegglue.solver.march import march
 from vegglue.solver.newton import newton
-from vegglue.workflow.effect_contract import breaches
-from vegglue.workflow.trial_channel import AMPLITUDE, CHANNEL, sizes
 
 
 @pytest.mark.parametrize("effect", SHIPPED, ids=lambda effect: effect.name)

@@ -9,7 +9,7 @@ from vegglue.arrays import Array
 from vegglue.figures.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of
-from vegglue.report.key_numbers import KeyNumber
+from vegglue.report_page.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
 # Effects in the table that is open; the others stand below it, folded.

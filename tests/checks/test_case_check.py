@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from vegglue.case.config import load_case
+from vegglue.checks.case_check import check_case
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
 from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.gridded_site import build_site
 from vegglue.site.polygons import distance_to_outline
-from vegglue.workflow.check import check_case
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SOUND = """

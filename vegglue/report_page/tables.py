@@ -13,9 +13,9 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
-from vegglue.report.key_numbers import as_power, estimate, largest_mass_error, symbol
-from vegglue.report.posterior_words import how_known
-from vegglue.report.run import Run, zones
+from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
+from vegglue.report_page.posterior_words import how_known
+from vegglue.report_page.run import Run, zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CorrectedCanopy
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON

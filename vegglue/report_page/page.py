@@ -12,13 +12,13 @@ from vegglue.figures.style import palette_css
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
-from vegglue.report.diagnosis_pictures import diagnosis_pictures
-from vegglue.report.diagnosis_words import diagnosis_in_words
-from vegglue.report.findings import findings
-from vegglue.report.key_numbers import key_numbers, verdict_of
-from vegglue.report.pictures import pictures
-from vegglue.report.run import Run, is_synthetic
-from vegglue.report.tables import facts, failures, health, members, other_rows, parameter_rows, station_rows
+from vegglue.report_page.diagnosis_pictures import diagnosis_pictures
+from vegglue.report_page.diagnosis_words import diagnosis_in_words
+from vegglue.report_page.findings import findings
+from vegglue.report_page.key_numbers import key_numbers, verdict_of
+from vegglue.report_page.pictures import pictures
+from vegglue.report_page.run import Run, is_synthetic
+from vegglue.report_page.tables import facts, failures, health, members, other_rows, parameter_rows, station_rows
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

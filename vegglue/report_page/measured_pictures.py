@@ -25,8 +25,8 @@ from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.observations import fitted_curve
-from vegglue.report.key_numbers import measurement_error
-from vegglue.report.run import Run, patches_drawn, picture, zones
+from vegglue.report_page.key_numbers import measurement_error
+from vegglue.report_page.run import Run, patches_drawn, picture, zones
 from vegglue.results.posterior import Posterior
 
 

@@ -17,8 +17,8 @@ from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
-from vegglue.report.diagnosis_words import added, error_of, first_score, last_score, ranked, standing_of
-from vegglue.report.run import Run, picture
+from vegglue.report_page.diagnosis_words import added, error_of, first_score, last_score, ranked, standing_of
+from vegglue.report_page.run import Run, picture
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.score_test import alike_groups
 from vegglue.site.polygons import corners_of

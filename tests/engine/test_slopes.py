@@ -1,0 +1,60 @@
+"""Slopes of predictions are those of solved members, lead to other grids, and a fit on them finds the truth."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.calibration.fit import fit
+from vegglue.calibration.noise import noise_of
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import theta_at
+from vegglue.engine.interface import linearise
+from vegglue.engine.model import coarser, model_of
+from vegglue.engine.newton import predict_near
+from vegglue.measurements.observations import read_observations
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_slopes_are_those_of_solved_members() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    z = np.array([0.3, -0.2, 0.5, 0.1])
+    point = linearise(model, z)
+    assert point is not None
+    steps = 0.01 * np.eye(4)
+    measured = (predict_near(model, point, z + steps) - predict_near(model, point, z - steps)) / 0.02
+    assert point.slope == pytest.approx(measured.T, abs=2e-4)
+
+
+def test_a_point_leads_to_one_on_narrower_cells() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    coarse = coarser(model)
+    assert coarse is not None
+    assert coarse.site.bed.shape == (model.site.bed.shape[0], model.site.bed.shape[1] // 2), "long cells become wider"
+    z = np.array([0.3, -0.2, 0.5, 0.1])
+    cold, near = linearise(model, z), linearise(coarse, z)
+    assert cold is not None
+    assert near is not None
+    warm = linearise(model, z, near)
+    assert warm is not None
+    assert warm.prediction == pytest.approx(cold.prediction, abs=1e-6)
+
+
+def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    truth = linearise(model, np.array([0.4, -0.3, 0.2, -0.5]))
+    assert truth is not None
+    exact = model.station.assign(value=truth.prediction)
+    made = replace(model, station=exact)
+    start = linearise(made, np.zeros(4))
+    assert start is not None
+    fitted = fit(made, noise_of(exact), start)
+    # The prior pulls towards zero, by less than its share of what is known.
+    assert np.abs(fitted.point.z - truth.z).max() < 3.0 * np.sqrt(np.diag(fitted.covariance)).max()
+    assert fitted.chi2 < 1.0
+    assert theta_at(case, fitted.point.z)["n_b"] == pytest.approx(theta_at(case, truth.z)["n_b"], rel=0.02)

@@ -1,0 +1,75 @@
+"""A folder of a field team becomes a case, or is refused in a sentence."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from reach import said_to, vegglue
+
+from vegglue.case.config import load_case
+from vegglue.engine.interface import linearise
+from vegglue.engine.model import model_of
+from vegglue.measurements.observations import read_observations
+
+SITE: dict[str, Any] = {
+    "channel": {"length_m": 40.0, "bottom_width_m": 3.0, "bank_slope_v_per_h": 0.6667, "bed_slope": 0.001},
+    "patches": [{"x": [16, 20], "y": [0, 1.5], "stems_per_m2": 20}, {"x": [26, 30], "y": [-1.5, 0]}],
+    "canopy_height_guess_m": 0.6,
+    "experiments": {"low": {"discharge_m3_s": 1.2, "downstream_level_m": 0.7}},
+    "holdout": {"high": {"discharge_m3_s": 2.0, "downstream_level_m": 0.9}},
+}
+
+
+def field_folder(folder: Path, **changes: Any) -> Path:
+    """What a field team would hand over."""
+    folder.mkdir()
+    (folder / "site.json").write_text(json.dumps(SITE | changes), encoding="utf-8")
+    (folder / "velocities.csv").write_text("experiment,section,x,y,u,u_se\nlow,A,12,0.5,0.45,0.01\n", encoding="utf-8")
+    (folder / "levels.csv").write_text("experiment,x,y,level,level_se\nlow,10,0,0.74,0.002\n", encoding="utf-8")
+    (folder / "holdout.csv").write_text("experiment,section,x,y,u\nhigh,A,12,0.5,0.6\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.slow
+def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
+    said = vegglue(tmp_path, "import", field_folder(tmp_path / "Mill Brook"), "--to", "mill.yaml").stdout
+    case = load_case(tmp_path / "mill.yaml")
+    assert "vegglue run mill.yaml" in said
+    assert case.name == "mill-brook"
+    assert set(case.parameters) == {"n_b", "k_s", "phi", "canopy_height"}
+    assert [patch.stems for patch in case.plants.patches] == [20.0, 1.0]
+    assert case.plants.stands["plants"].stems == 20.0
+    assert case.grid.cell[1] == pytest.approx(3.0 / 16)
+    assert case.grid.y[1] > 1.5 + 0.75 / 0.6667, "the banks reach above the water"
+    assert case.validation is not None
+    assert list(case.validation.experiments) == ["high"]
+    table = read_observations(case).table
+    assert table["kind"].tolist() == ["velocity", "level"]
+    assert linearise(model_of(case, read_observations(case)), np.zeros(4)) is not None, "water flows in it"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"channel": {"length_m": 40.0}}, "`channel.bottom_width_m` is missing"),
+        ({"experiments": {}}, "`experiments` expected one or more"),
+        (
+            {"experiments": {"low": {"discharge_m3_s": "much", "downstream_level_m": 1}}},
+            "expected a number, got 'much'",
+        ),
+    ],
+)
+def test_a_folder_that_says_too_little_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    changes: dict[str, Any],
+    said: str,
+) -> None:
+    folder = field_folder(tmp_path / "site", **changes)
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "site.yaml")
+    assert code == 2
+    assert said in error
+    assert len(error.strip().splitlines()) == 1

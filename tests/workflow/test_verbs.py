@@ -1,0 +1,111 @@
+"""`import vegglue`: the verbs on the nouns from Python, on the example of the README; fast to import."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reach import COARSE, README, ROOT, write_reach
+
+import vegglue
+from vegglue.case.resolved_config import case_hash, simulation_hash
+from vegglue.progress import Progress
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.storage.result_files import read_ensemble, stored_hash
+
+MEMBERS = 16
+HEAVY = ("numpy", "numba", "pandas", "scipy", "h5py", "matplotlib", "pydantic", "yaml", "typer", "joblib")
+SMALL = ("members: 1024", f"members: {MEMBERS}")
+WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
+FROM_PYTHON = "## From Python"
+
+
+def test_nothing_heavy_is_imported_before_a_verb_is_used() -> None:
+    program = f"import sys, vegglue; print(*(name for name in {HEAVY} if name in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_every_name_is_there_and_the_same_for_editors() -> None:
+    """What type checkers and editors see is what is got."""
+    tree = ast.parse((ROOT / "vegglue" / "__init__.py").read_text(encoding="utf-8"))
+    branch = next(node for node in tree.body if isinstance(node, ast.If))
+    said = {
+        alias.name: node.module for node in ast.walk(branch) if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
+    assert set(said) == set(vegglue.__all__) - {"__version__"}
+    for name, module in said.items():
+        found = getattr(vegglue, name)
+        assert found is getattr(sys.modules[str(module)], name)
+        assert found.__doc__
+    assert dir(vegglue) == vegglue.__all__
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        vegglue.simulat  # noqa: B018
+
+
+def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
+    runs, heard, said = tmp_path / "runs", list[Progress](), list[str]()
+    case = vegglue.load_case(str(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)))
+    assert vegglue.check(case, runs=runs).used_stations == 15
+
+    ensemble = vegglue.simulate(case, runs=runs, jobs=1, watch=heard.append)
+    assert (heard[-1].name, heard[-1].solved) == ("brook", MEMBERS)
+    assert ensemble.config_hash == simulation_hash(case)
+    heard.clear()
+    again = vegglue.simulate(case, runs=str(runs), jobs=1, watch=heard.append)
+    assert heard == [], "what is there is not solved again"
+    np.testing.assert_array_equal(again.prediction, ensemble.prediction)
+
+    posterior = vegglue.infer(case, ensemble, runs=runs, jobs=1, method="glue")
+    assert set(posterior.marginals.median) == {"n_b", "phi"}
+    assert stored_hash(runs / "brook" / "posterior.h5") == case_hash(case)
+
+    diagnosis = vegglue.diagnose(case, runs=runs, jobs=1, say=said.append)
+    assert isinstance(diagnosis, Diagnosis)
+    assert said
+    child = vegglue.extend(case, ["streamlining"])
+    assert child.source == tmp_path / "brook+streamlining.yaml"
+    comparison = vegglue.compare([case, child], runs=runs)
+    assert [rung.name for rung in comparison.rungs] == ["brook", "brook-streamlining"]
+    assert (runs / "brook-streamlining" / "ladder.png").exists()
+    for question in vegglue.next_measurement(case, runs=runs, jobs=1):
+        assert question.tells_apart
+        assert question.measurements[0].per_hour >= question.measurements[-1].per_hour
+
+    page = vegglue.report(case, runs=runs)
+    assert diagnosis.verdict.sentence.split(" (")[0] in page.read_text(encoding="utf-8"), "the page tells the diagnosis"
+
+
+def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
+    case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL))
+    runs = tmp_path / "runs"
+    ensemble = vegglue.simulate(case, runs=runs, members=8, jobs=1)
+    assert len(ensemble.status) == 8
+    vegglue.infer(case, ensemble, runs=runs, method="glue")
+    with pytest.raises(vegglue.InputError, match="run `vegglue simulate CONFIG`"):
+        vegglue.report(case, runs=runs)
+    assert vegglue.report(case, runs=runs, members=8).exists()
+
+
+def test_an_ensemble_of_another_case_is_refused(tmp_path: Path) -> None:
+    case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL))
+    ensemble = vegglue.simulate(case, runs=tmp_path / "runs", jobs=1)
+    other = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, ("level: 0.95", "level: 0.96")))
+    with pytest.raises(vegglue.InputError, match="brook: expected its own ensemble"):
+        vegglue.infer(other, ensemble, runs=tmp_path / "runs")
+
+
+@pytest.mark.slow  # refines to the end, on all cores
+def test_the_readme_is_right_about_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = re.search(rf"^{FROM_PYTHON}$.*?^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert found
+    write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(found[1], "README.md", "exec"), names)
+    assert isinstance(names["page"], Path)
+    assert names["page"].exists()
+    assert len(read_ensemble(tmp_path / "runs" / "brook" / "ensemble.h5").status) == MEMBERS

@@ -1,0 +1,60 @@
+"""Can water enter and leave, does it stay off the edges, and is the discharge the measured one?"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.parameter_space import middle_value
+from vegglue.case.schema import Case, Experiment
+from vegglue.checks.ensemble_and_priors import prior_range, shown_bounds
+from vegglue.measurements.observations import Observations
+from vegglue.resistance.physical_constants import GRAVITY
+from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.gridded_site import Site
+from vegglue.site.zones import centres_within, inflow_cells
+
+
+def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
+    """Inflows and outlets without cells or without water, and water on edges that act as walls."""
+    for name, experiment in case.experiments.items():
+        depth = expected_depth(case, site, experiment)
+        open_ = centres_within(case.outlet.range, site.grid.y)
+        level = middle_value(case, experiment.level)
+        wet = np.maximum(depth[-1, open_], 0.0)
+        if not open_.any():
+            yield "The outlet holds no cell centre: no water can leave."
+        elif not (wet > 0).any():
+            lowest = site.bed[-1, open_].min()
+            yield f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {lowest:.3g} m."
+        elif (froude := _froude(case, experiment, wet, site.grid.dy)) > 0.7:
+            yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."
+        if (depth[:, [0, -1]] > 0).any():
+            yield f"Experiment {name} puts water on the side edges of the grid, which act as walls: widen the grid."
+        for inflow, side in case.inflows.items():
+            edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
+            cells = inflow_cells(side, site.grid)
+            if not cells.size:
+                yield f"Inflow {inflow} holds no cell centre: no water can enter."
+            elif side.side == "west" and not (edge[cells] > 0).any():
+                yield f"Inflow {inflow} lies above the water of experiment {name}."
+
+
+def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> float:
+    """Fr = Q / (A sqrt(g A / B)) of the outlet [-]."""
+    area, top = float(depth.sum()) * width, float((depth > 0).sum()) * width
+    discharge = sum(middle_value(case, value) for value in experiment.discharge.values())
+    return discharge / (area * float(np.sqrt(GRAVITY * area / top)))
+
+
+def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[str]:
+    """Discharges [m3/s] that differ from those of the ADV sections by more than their errors."""
+    for (name, section), by_rule in observations.discharge.items():
+        parts = [prior_range(case, value) for value in case.experiments[name].discharge.values()]
+        total = (sum(low for low, _ in parts), sum(high for _, high in parts))
+        for rule, measured in by_rule.items():
+            off = max(total[0] - measured.value, measured.value - total[1])
+            if off > max(2.0 * measured.standard_error, 0.03 * measured.value):
+                found = f"{measured.value:.3g} ± {measured.standard_error:.2g} m3/s by the rule `{rule}`"
+                said = f"the case says {shown_bounds(total)} m3/s"
+                yield f"The ADV of {section} in experiment {name} gives {found}, {said}."

@@ -1,0 +1,35 @@
+"""What is odd about a case, in plain sentences, before hours are spent on it; errors are refused earlier.
+
+Each remark comes from one function of the file of its subject; a new one is added to the list below.
+"""
+
+from vegglue.case.schema import Case
+from vegglue.checks.boundaries import remarks_on_boundaries, remarks_on_discharges
+from vegglue.checks.channel_and_plants import (
+    remarks_on_bank_law,
+    remarks_on_canopies,
+    remarks_on_friction_classes,
+    remarks_on_patches,
+)
+from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
+from vegglue.checks.stations import remarks_on_patch_edges, remarks_on_stations
+from vegglue.measurements.observations import Observations
+from vegglue.site.gridded_site import Site
+
+
+def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
+    """What a user should look at, one sentence each, none when nothing is odd."""
+    remarks = (
+        remarks_on_ensemble(case, observations),
+        remarks_on_kept_fields(case, site),
+        remarks_on_patches(case, site),
+        remarks_on_friction_classes(case, site),
+        remarks_on_idle_parameters(case, site),
+        remarks_on_boundaries(case, site),
+        remarks_on_canopies(case, site, observations),
+        remarks_on_bank_law(case, site),
+        remarks_on_stations(case, site, observations),
+        remarks_on_patch_edges(case, observations),
+        remarks_on_discharges(case, observations),
+    )
+    return [sentence for about in remarks for sentence in about]

@@ -1,0 +1,101 @@
+"""Do patches, stands and friction classes hold cells, does the water cover the plants, and does the bank law hold?"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vegglue.case.parts import Value
+from vegglue.case.prior import quantile
+from vegglue.case.schema import Case, Experiment
+from vegglue.checks.ensemble_and_priors import Bounds, prior_range, shown_bounds
+from vegglue.measurements.observations import Observations
+from vegglue.site.channel_geometry import expected_depth, patches_present
+from vegglue.site.gridded_site import Site
+from vegglue.site.polygons import area_of, corners_of
+from vegglue.site.zones import cells_of_patch
+
+
+def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
+    """Patches that the grid holds poorly: area of their cells against their own [m2], overlaps, unused stands."""
+    cell = site.grid.dx * site.grid.dy
+    for index, patch in enumerate(case.plants.patches):
+        meant = area_of(corners_of(patch))
+        alone = cells_of_patch(patch, site.grid)
+        covered, hidden = alone.sum() * cell, int((alone & (site.patch != index)).sum())
+        if not alone.any():
+            yield f"Patch {patch.name} covers no cell centre: it is outside the grid, or smaller than a cell."
+        elif abs(covered - meant) > 0.1 * meant:
+            yield f"Patch {patch.name} of {meant:.3g} m2 becomes {covered:.3g} m2 of cells: take finer cells."
+        if hidden:
+            yield f"Patch {patch.name} loses {hidden} cells to patches listed after it, which win where they overlap."
+    unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}
+    for stand in sorted(unused):
+        yield f"Stand {stand} grows in no patch."
+
+
+def remarks_on_friction_classes(case: Case, site: Site) -> Iterator[str]:
+    """Friction classes that hold in no cell."""
+    for index, name in enumerate(site.class_names):
+        if not (site.friction_class == index).any():
+            yield f"Friction class {name} holds in no cell."
+
+
+def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[str]:
+    """Canopies above the water, dry stands, and heights [m] that differ from those measured."""
+    for name, experiment in case.experiments.items():
+        depth = expected_depth(case, site, experiment)
+        for stand in sorted({case.plants.patches[index].stand for index in patches_present(case, name)}):
+            cells = np.isin(site.patch, [i for i, patch in enumerate(case.plants.patches) if patch.stand == stand])
+            if not cells.any():
+                continue
+            height = prior_range(case, _canopy_height(case, experiment, stand))
+            canopy, deepest = f"The canopy of {stand}, {shown_bounds(height)} m,", float(depth[cells].max())
+            if deepest <= 0:
+                yield f"Stand {stand} stands dry in experiment {name}."
+            elif height[1] > deepest:
+                reaches = "reaches" if height[0] >= deepest else "may reach"
+                yield (
+                    f"{canopy} {reaches} above the water of experiment {name}, about {deepest:.2g} m deep: "
+                    f"`numerics.emergent` ({case.numerics.emergent}) then decides its drag."
+                )
+            yield from _measured_canopy(observations, name, stand, height)
+
+
+def _canopy_height(case: Case, experiment: Experiment, stand: str) -> Value:
+    override = experiment.stands.get(stand)
+    own = case.plants.stands[stand].canopy_height
+    return own if override is None or override.canopy_height is None else override.canopy_height
+
+
+def _measured_canopy(observations: Observations, name: str, stand: str, height: Bounds) -> Iterator[str]:
+    for (experiment, section), canopy in observations.canopy_height.items():
+        margin = 2.0 * canopy.standard_error + 0.05
+        # Nothing compares with NaN, so a canopy that does not show raises no question.
+        if experiment == name and max(height[0] - canopy.value, canopy.value - height[1]) > margin:
+            yield (
+                f"The verticals of {section} in experiment {name} put the canopy at {canopy.value:.2f} m, "
+                f"the case puts {stand} at {shown_bounds(height)} m."
+            )
+
+
+def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
+    """Where 12 h / k_s of the law of the banks falls below its floor [-] and is held there."""
+    floor = case.numerics.bank_argument_minimum
+    for index, (name, friction_class) in enumerate(case.friction.classes.items()):
+        if friction_class.k_s is None:
+            continue
+        roughest = _largest(case, friction_class.k_s)
+        for experiment_name, experiment in case.experiments.items():
+            depth = expected_depth(case, site, experiment)
+            wet = depth[(site.friction_class == index) & (site.patch < 0) & (depth > 0)]
+            share = float(np.mean(12.0 * wet / roughest < floor)) if wet.size else 0.0
+            if share > 0:
+                yield (
+                    f"At k_s = {roughest:.3g} m, 12 h/k_s falls below {floor:g} and is held there where h < "
+                    f"{floor * roughest / 12:.2g} m: in {100 * share:.0f} % of the wet cells of class {name} "
+                    f"in experiment {experiment_name}."
+                )
+
+
+def _largest(case: Case, value: Value) -> float:
+    return float(quantile(case.parameters[value], 0.999999)) if isinstance(value, str) else value

@@ -1,0 +1,90 @@
+"""Is the ensemble large enough, does it fit its budget, and does every parameter act on something?"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vegglue.case.consistency import values
+from vegglue.case.messages import KeyPath
+from vegglue.case.parts import Value
+from vegglue.case.prior import quantile
+from vegglue.case.schema import Case
+from vegglue.checks.stations import station_in_words
+from vegglue.measurements.observations import Observations
+from vegglue.results.fields import excess
+from vegglue.site.channel_geometry import patches_present
+from vegglue.site.gridded_site import Site
+
+Bounds = tuple[float, float]
+# Fewer members leave two or three in each tail of 2.5 %.
+FEW_MEMBERS = 100
+
+
+def prior_range(case: Case, value: Value) -> Bounds:
+    """What a value may be: 95 % of its prior, or itself twice."""
+    if isinstance(value, str):
+        low, high = quantile(case.parameters[value], [0.025, 0.975])
+        return float(low), float(high)
+    return value, value
+
+
+def shown_bounds(bounds: Bounds) -> str:
+    """`low to high`, or one number where both are the same."""
+    low, high = bounds
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+
+
+def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]:
+    """Its size against what quantiles and Sobol' points need, and what the observations can settle."""
+    members, table = case.simulate.members, observations.table
+    if members < FEW_MEMBERS:
+        yield f"Only {members} members will be simulated: quantiles need some hundreds."
+    if members & (members - 1):
+        power = 2 ** round(np.log2(members))
+        yield f"Note: {members} members is no power of two; Sobol' points fill the priors more evenly with {power}."
+    if not len(table):
+        yield "There are no observations: an ensemble can be simulated, but nothing inferred from it."
+        return
+    used = table[table["used"].astype(bool)]
+    if len(used) < len(case.parameters):
+        yield f"{len(used)} used observations cannot settle {len(case.parameters)} parameters."
+    if case.infer.sigma == "known" and used["standard_error"].isna().any():
+        count = int(used["standard_error"].isna().sum())
+        yield f"`infer.sigma` is known, but {count} of {len(used)} used observations have no standard error."
+    for name in case.experiments:
+        if not (used["experiment"] == name).any():
+            yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."
+    for row in table[~table["used"].astype(bool)].to_dict("records"):
+        yield f"The {station_in_words(row)} is not used: {row['reason']}."
+
+
+def remarks_on_kept_fields(case: Case, site: Site) -> Iterator[str]:
+    """Fields that would exceed their budget [MB]."""
+    if sentence := excess(case, site.grid):
+        yield f"It will not be simulated as it is: {sentence}"
+
+
+def remarks_on_idle_parameters(case: Case, site: Site) -> Iterator[str]:
+    """Parameters whose value changes nothing in any experiment."""
+    classes = {name for index, name in enumerate(site.class_names) if (site.friction_class == index).any()}
+    growing = _growing(case, site)
+    acting = {value for place, value, _ in values(case) if _acts(place, classes, growing)}
+    for name in case.parameters:
+        if name not in acting:
+            yield f"Parameter {name} acts in no cell of any experiment: its posterior will be its prior."
+
+
+def _acts(place: KeyPath, classes: set[str], growing: set[str]) -> bool:
+    if place[0] == "friction":
+        return place[2] in classes
+    return place[-2] in growing if "stands" in place[:-2] else True
+
+
+def _growing(case: Case, site: Site) -> set[str]:
+    """Stands that have cells in at least one experiment."""
+    found = set()
+    for experiment in case.experiments:
+        for index in patches_present(case, experiment):
+            if (site.patch == index).any():
+                found.add(case.plants.patches[index].stand)
+    return found

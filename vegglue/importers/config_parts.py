@@ -1,0 +1,44 @@
+"""What configs made of folders have in common: priors, tables of measurements, and the settings of a first look."""
+
+from typing import Any
+
+from vegglue.case.resolved_config import Tree
+
+# One bed of Manning's law, whose coefficient is the parameter n_b.
+MANNING_BED = {"law": "manning", "n": "n_b"}
+# 256 members show within a minute or two what a case is like; all errors are those stated with the data.
+FIRST_LOOK: Tree = {"simulate": {"members": 256, "seed": 1}, "infer": {"sigma": "known"}}
+
+
+def normal_prior(mean: float, sd: float, unit: str, symbol: str, meaning: str, **cut: float) -> Tree:
+    """N(mean, sd^2), cut at `low` and `high` if they are given; all in the unit."""
+    return {"distribution": "normal", "mean": mean, "sd": sd, **cut, **_words(unit, symbol, meaning)}
+
+
+def loguniform_prior(low: float, high: float, unit: str, symbol: str, meaning: str) -> Tree:
+    """ln uniform between ln low and ln high; both in the unit."""
+    return {"distribution": "loguniform", "low": low, "high": high, **_words(unit, symbol, meaning)}
+
+
+def bed_prior(low: float, high: float) -> Tree:
+    """The prior of n_b of MANNING_BED [s m^(-1/3)]."""
+    return loguniform_prior(low, high, "s m^(-1/3)", "n_b", "Manning coefficient of the bed")
+
+
+def observed(kind: str, file: str, experiment: str | None = None) -> Tree:
+    """A table of measurements of one kind; of one experiment, or of those that it names itself."""
+    return {"kind": kind, "file": file} | ({} if experiment is None else {"experiment": experiment})
+
+
+def validated(experiments: dict[str, Tree], observations: list[Tree]) -> Tree:
+    """Measurements that no calibration sees, and the experiments they were made in."""
+    return {"validation": {"experiments": experiments, "observations": observations}}
+
+
+def even(cells: float) -> int:
+    """The nearest even number of cells, so that a grid can be halved."""
+    return 2 * round(cells / 2)
+
+
+def _words(unit: str, symbol: str, meaning: str) -> dict[str, Any]:
+    return {"unit": unit, "symbol": symbol, "meaning": meaning}

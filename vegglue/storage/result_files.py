@@ -1,0 +1,94 @@
+"""Results as files: ensemble.h5, fields.h5, posterior.h5 and diagnosis.h5, each with the config it was made from.
+
+A file whose config hash is not the wanted one is refused with the command that makes it again. Ensembles are written by
+`resume`, member by member.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from vegglue.errors import InputError, StorageError
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from, diagnosis_groups
+from vegglue.results.ensemble import Ensemble, ensemble_from
+from vegglue.results.fields import Fields, fields_from
+from vegglue.results.posterior import Posterior
+from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
+from vegglue.storage.hdf5 import open_hdf5, read_groups, stored_attribute, write_whole
+from vegglue.storage.resume import part_file
+
+POSTERIOR_FORMAT, DIAGNOSIS_FORMAT = "vegglue posterior 1", "vegglue diagnosis 2"
+Result = TypeVar("Result")
+
+
+def read_ensemble(path: Path, expected_hash: str | None = None) -> Ensemble:
+    """Read a finished ensemble.
+
+    Errors: InputError when there is none, or it was made from another config than the one with `expected_hash`;
+    StorageError when the file is broken.
+    """
+    if not path.exists() and part_file(path).exists():
+        raise InputError(f"{path}: found only a part of the members; run `vegglue simulate CONFIG` to solve the rest.")
+    return _read(path, expected_hash, "simulate", ensemble_from)
+
+
+def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
+    """Read the fields of a finished ensemble, whole; errors as those of read_ensemble."""
+    if not path.exists():
+        remedy = "say in `simulate.fields` where they are to be kept and run `vegglue simulate CONFIG`"
+        raise InputError(f"{path}: expected fields of the members, found no file; {remedy}.")
+    return _read(path, expected_hash, "simulate", fields_from)
+
+
+def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: str) -> None:
+    """Write a posterior with the resolved config it was inferred under, replacing an older file only when it is whole.
+
+    Errors: StorageError when it cannot be written.
+    """
+    own = {"config": config, "config_hash": config_hash, "format": POSTERIOR_FORMAT}
+    write_whole(path, posterior_groups(posterior), posterior_attributes(posterior) | own)
+
+
+def read_posterior(path: Path, expected_hash: str | None = None) -> Posterior:
+    """Read a posterior; errors as those of read_ensemble, for `vegglue infer CONFIG`."""
+    return _read(path, expected_hash, "infer", posterior_from)
+
+
+def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: str) -> None:
+    """Write a diagnosis with the resolved config it was made under; errors as those of write_posterior."""
+    own = {"config": config, "config_hash": config_hash, "format": DIAGNOSIS_FORMAT}
+    write_whole(path, diagnosis_groups(diagnosis), diagnosis_attributes(diagnosis) | own)
+
+
+def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
+    """Read a diagnosis; errors as those of read_ensemble, for `vegglue diagnose CONFIG`."""
+    return _read(path, expected_hash, "diagnose", diagnosis_from)
+
+
+def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
+    """The diagnosis of exactly this config, None when there is none or only one of another state or another format."""
+    fits = stored_hash(path) == config_hash and stored_attribute(path, "format") == DIAGNOSIS_FORMAT
+    return read_diagnosis(path) if fits else None
+
+
+def stored_hash(path: Path) -> str | None:
+    """Config hash a result file was made from, or None when there is no readable file."""
+    return stored_attribute(path, "config_hash")
+
+
+def _read(path: Path, expected_hash: str | None, step: str, understand: Callable[..., Result]) -> Result:
+    remedy = f"run `vegglue {step} CONFIG`"
+    if not path.exists():
+        raise InputError(f"{path}: expected the result of an earlier step, found no file; {remedy}.")
+    with open_hdf5(path, "r") as file:
+        found = str(file.attrs.get("config_hash", "none"))
+        if expected_hash is not None and found != expected_hash:
+            raise InputError(
+                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config, a data file "
+                f"or vegglue changed since this was made; {remedy} again."
+            )
+        try:
+            return understand(read_groups(file), dict(file.attrs))
+        except (KeyError, OSError, TypeError, ValueError) as error:
+            raise StorageError(f"{path}: is broken or of another version ({error}); remove it and {remedy}.") from error

@@ -1,0 +1,62 @@
+"""cases -> error ladder: how well each predicts what it was fitted to, what was held out, and what no fit has seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.diagnosis.comparison import Rung, rung
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.figures.error_ladder import save_ladder_figure
+from vegglue.parallel import one_thread
+from vegglue.progress import Say, silent
+from vegglue.storage.result_files import diagnosis_that_fits
+from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One rung for each model, in the order they were given, and the measurements that none of them uses, since a
+    diagnosis has set them aside.
+    """
+
+    rungs: tuple[Rung, ...]
+    left_out: pd.DataFrame
+
+
+@one_thread()
+def compare(cases: Sequence[Case], *, runs: Path | str = "runs", say: Say = silent) -> Comparison:
+    """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one.
+
+    Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when a model finds
+    no flow, or a station has no standard error.
+    """
+    aside = left_out(cases, runs)
+    rungs = []
+    for case in cases:
+        say(f"calibrating {case.name}")
+        rungs.append(rung_of(case, runs, aside))
+    found = Comparison(tuple(rungs), aside)
+    draw_ladder_of(found, cases[-1], runs)
+    return found
+
+
+def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame) -> Rung:
+    """The case where it predicts best, without the measurements set aside."""
+    return rung(calibrated(case, folder_of(runs, case), aside), validation_of(case))
+
+
+def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
+    """The measurements that the diagnosis of any of the cases has set aside, where it fits the case."""
+    found = (diagnosis_that_fits(Path(runs) / case.name / "diagnosis.h5", case_hash(case)) for case in cases)
+    return excluded_by(*(one for one in found if one is not None))
+
+
+def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
+    """Draw the ladder in the folder of its last case; returns the picture."""
+    picture = folder_of(runs, last) / "ladder.png"
+    save_ladder_figure(found.rungs, picture)
+    return picture

@@ -1,0 +1,65 @@
+"""case -> diagnosis: where the model misses and which effect is missing; and what one effect would change."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.case.resolved_config import case_hash, resolved_yaml
+from vegglue.case.schema import Case
+from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.effects.definition import Effect
+from vegglue.engine.interface import responses
+from vegglue.parallel import at_most, one_thread
+from vegglue.progress import Say, silent
+from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.screening.candidates import Candidate, cause_of
+from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
+from vegglue.workflow.run_folder import calibrated, folder_of, known_place, model_in, remember_place
+
+
+@one_thread()
+def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> Diagnosis:
+    """Say where the model fails, which effect is missing, and how sure that is; kept in runs/<name>/diagnosis.h5 and
+    drawn in diagnosis.png.
+
+    A diagnosis of exactly this case is read instead. Errors: InputError when the model finds no flow, or a station has
+    no standard error.
+    """
+    folder, wanted = folder_of(runs, case), case_hash(case)
+    path = folder / "diagnosis.h5"
+    kept = diagnosis_that_fits(path, wanted)
+    if kept is not None:
+        return kept
+    with at_most(jobs):
+        found = diagnose_model(model_in(case), known_place(case, folder), say)
+    write_diagnosis(path, found, resolved_yaml(case), wanted)
+    save_diagnosis_figure(found, case, folder / "diagnosis.png")
+    remember_place(case, folder, found.parameters.first)
+    return found
+
+
+@one_thread()
+def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs") -> Path:
+    """Draw what an effect would change at the stations of the calibrated case, before calibration takes its part; in
+    runs/<name>/fingerprint_<effect>.png, which is returned.
+    """
+    folder = folder_of(runs, case)
+    path = folder / f"fingerprint_{effect.name}.png"
+    trace, station = fingerprint_of(case, folder, effect)
+    amplitude = effect.amplitude
+    unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
+    save_fingerprint_figure(trace, station, unit, path)
+    return path
+
+
+def fingerprint_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFrame]:
+    """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
+    unit of (amplitude - off)^power: (station,) and the stations.
+    """
+    base, one = calibrated(case, folder, excluded_by()), Candidate(effect)
+    shapes = {shape.name: shape.default for shape in effect.shapes}
+    changed = cause_of(base.model.case, one, shapes)
+    return responses(base.model, base.fitted.point, [changed])[:, 0], base.model.station

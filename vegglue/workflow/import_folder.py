@@ -1,0 +1,40 @@
+"""folder of measurements -> case: a config with wide priors that runs without an edit by hand.
+
+A further layout of folders is a file in `importers/` that makes the keys and values of a config, and a line here.
+"""
+
+from pathlib import Path
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import Tree, as_yaml
+from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
+from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
+from vegglue.importers.field_folder import case_from_folder
+
+
+def import_folder(folder: Path | str, to: Path | str | None = None) -> Case:
+    """Make a case of a folder of measurements: site.json, velocities.csv and levels.csv, or a published set.
+
+    to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
+    makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. Errors: InputError for what is
+    missing or cannot be read.
+    """
+    folder = Path(folder)
+    target = _default_target(folder) if to is None else Path(to)
+    if holds_confluence(folder):
+        _write_config(target, folder, case_from_confluence(folder, target))
+        _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target))
+    else:
+        _write_config(target, folder, case_from_folder(folder, target))
+    return load_case(target)
+
+
+def _write_config(path: Path, folder: Path, tree: Tree) -> None:
+    text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
+    write_text(path, text, "give another file by --to")
+
+
+def _default_target(folder: Path) -> Path:
+    name = f"{folder.resolve().name}.yaml"
+    return Path("configs") / name if Path("configs").is_dir() else Path(name)

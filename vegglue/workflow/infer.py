@@ -1,0 +1,66 @@
+"""case, ensemble -> posterior: by draws around the best members, or by the members weighed as they are (GLUE)."""
+
+from pathlib import Path
+from typing import Literal
+
+from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.inference.glue import glue
+from vegglue.inference.refine import refinable, refine
+from vegglue.measurements.observations import read_observations
+from vegglue.parallel import at_most, one_thread
+from vegglue.progress import Say, silent
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+from vegglue.storage.result_files import read_ensemble, write_posterior
+from vegglue.workflow.run_folder import folder_of, of_size
+
+Method = Literal["refine", "glue"]
+
+
+@one_thread()
+def infer(
+    case: Case,
+    ensemble: Ensemble | None = None,
+    *,
+    runs: Path | str = "runs",
+    method: Method | None = None,
+    members: int | None = None,
+    jobs: int = -1,
+    say: Say = silent,
+) -> Posterior:
+    """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
+    runs/<name>/posterior.h5.
+
+    ensemble: the one of this case, whose size counts then; read from the folder if not given. method: `refine` or
+    `glue` instead of the case's. members: size of the ensemble instead of the case's.
+
+    Errors: InputError when there is no ensemble of this case, or its likelihood cannot be refined.
+    """
+    case = of_size(case, members if ensemble is None else len(ensemble.status))
+    observations = read_observations(case)
+    folder = folder_of(runs, case)
+    if ensemble is None:
+        ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
+    elif ensemble.config_hash != simulation_hash(case):
+        raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
+    if chosen_method(case, method) == "glue":
+        posterior = glue(ensemble, case, observations)
+    else:
+        with at_most(jobs):
+            posterior = refine(ensemble, case, observations, say)
+    write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
+    return posterior
+
+
+def chosen_method(case: Case, asked: Method | None) -> Method:
+    """What is asked for, else what the case says; an informal likelihood is always weighed. Errors: InputError."""
+    if refinable(case):
+        return asked or case.infer.method
+    if asked == "refine":
+        raise InputError(
+            "--method refine: expected `infer.likelihood: gaussian` without `behavioural`, got an informal likelihood; "
+            "change the config or use --method glue."
+        )
+    return "glue"

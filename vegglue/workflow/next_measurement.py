@@ -1,0 +1,85 @@
+"""case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vegglue.case.schema import Case
+from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
+from vegglue.diagnosis.suspects import POWER_QUANTILE
+from vegglue.errors import InputError
+from vegglue.parallel import one_thread
+from vegglue.progress import Say, silent
+from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.run_folder import calibrated, folder_of
+
+# Effects hidden behind calibration that measurements are proposed for.
+HIDDEN = 4
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is to be told apart, in words, and the measurements that could, the best first."""
+
+    tells_apart: str
+    measurements: tuple[MeasurementWorth, ...]
+
+
+@one_thread()
+def next_measurement(
+    case: Case, *, between: Sequence[str] = (), runs: Path | str = "runs", jobs: int = -1, say: Say = silent
+) -> list[Question]:
+    """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
+
+    between: names of effects, else those that the diagnosis could not tell apart, else the strongest of those it could
+    not test, each by itself at a plausible size. Errors: InputError for a name that is not in the diagnosis.
+    """
+    found = diagnose(case, runs=runs, jobs=jobs, say=say)
+    by_name = {one.name: one for one in found.suspects}
+    unknown = [name for name in between if name not in by_name]
+    if unknown:
+        raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
+    asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
+    if not asked:
+        return []
+    base = calibrated(case, folder_of(runs, case), excluded_by(found))
+    worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals for _, rivals in asked])
+    return [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
+
+
+def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
+    """In words, and the rivals of each."""
+    if len(names) > 1:
+        return [(" from ".join(names), rivals_of(case, found, names))]
+    hidden = [one for one in found.suspects if not one.detectability.testable and not found.steps]
+    # What calibration hides best, of all that would leave a trace without it.
+    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
+    single = [one for one in found.suspects if list(names) == [one.name]] or strongest
+    return [(_what_hides(one), rivals_of(case, found, [one.name], plausible=True)) for one in single]
+
+
+def _what_hides(suspect: Suspect) -> str:
+    return f"{suspect.name} from a change of {suspect.detectability.confounder}"
+
+
+def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
+    """Length of the trace of a plausible amplitude before projection, in standard errors."""
+    amplitude = candidate_named(case, found.predictions.station, suspect.name).effect.amplitude
+    detectability = suspect.detectability
+    gain = amplitude.gain(amplitude.off + detectability.smallest)
+    length = found.first_screening.threshold + POWER_QUANTILE
+    return length * amplitude.plausible / gain / max(detectability.visibility, 1e-6)
+
+
+def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
+    """Effects of a diagnosis by name, at the size it found or a plausible one."""
+    rivals: list[Rival] = []
+    for suspect in (one for one in found.suspects if one.name in names):
+        candidate = candidate_named(case, found.predictions.station, suspect.name)
+        amplitude = candidate.effect.amplitude
+        gain = amplitude.plausible if plausible else amplitude.gain(suspect.amplitude.value)
+        rivals.append((candidate, suspect.shapes, gain))
+    return rivals

@@ -1,0 +1,68 @@
+"""case -> everything: the loop from misfit to missing effect, then posterior and report before and after."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.progress import Say, Watch, silent
+from vegglue.storage.result_files import stored_hash
+from vegglue.workflow.compare import draw_ladder_of
+from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
+from vegglue.workflow.infer import infer
+from vegglue.workflow.next_measurement import next_measurement
+from vegglue.workflow.report import report
+from vegglue.workflow.run_folder import folder_of
+from vegglue.workflow.simulate import is_simulated, simulate
+
+Show = Callable[[Case, Any], None]
+
+
+def _unseen(case: Case, result: Any) -> None:
+    """Shows nothing."""
+
+
+def run(
+    case: Case,
+    *,
+    runs: Path | str = "runs",
+    jobs: int = -1,
+    say: Say = silent,
+    watch: Watch = silent,
+    show: Show = _unseen,
+) -> StepwiseExtension:
+    """Diagnose, add what is missing, watch the error fall, say what to measure next; then ensemble, posterior and
+    report of the case and of its last child. What is up to date is not made again.
+
+    show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
+    Posterior, the Path of a page, or a sentence.
+    """
+    show(case, diagnose(case, runs=runs, jobs=jobs, say=say))
+    extension = extend_stepwise(case, runs=runs, jobs=jobs, say=say)
+    show(case, extension)
+    show(case, next_measurement(case, runs=runs, jobs=jobs, say=say))
+    last = extension.cases[-1]
+    picture = draw_ladder_of(extension.comparison, last, runs)
+    show(last, f"Ladder drawn in {picture}; last config: {last.source}")
+    for each in {one.source: one for one in (case, last)}.values():
+        _ensemble_to_report(each, runs, jobs, say, watch, show)
+    return extension
+
+
+def _ensemble_to_report(case: Case, runs: Path | str, jobs: int, say: Say, watch: Watch, show: Show) -> None:
+    folder = folder_of(runs, case)
+    current = is_simulated(case, runs)
+    ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch)
+    show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
+    if stored_hash(folder / "posterior.h5") == case_hash(case):
+        show(case, f"{folder / 'posterior.h5'} is up to date.")
+    else:
+        try:
+            show(case, infer(case, ensemble, runs=runs, jobs=jobs, say=say))
+        except InputError as error:
+            show(case, f"{error} There is no report of {case.name} without a posterior.")
+            return
+    show(case, report(case, runs=runs))

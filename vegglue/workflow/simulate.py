@@ -1,0 +1,44 @@
+"""case -> ensemble: every member solved and kept; what an earlier run has solved is not solved again."""
+
+from pathlib import Path
+
+from vegglue.case.resolved_config import simulation_hash
+from vegglue.case.schema import Case
+from vegglue.ensemble.solve_ensemble import solve_ensemble
+from vegglue.errors import InputError, StorageError
+from vegglue.measurements.observations import read_observations
+from vegglue.parallel import one_thread
+from vegglue.progress import Watch, silent
+from vegglue.results.ensemble import Ensemble
+from vegglue.storage.result_files import read_ensemble, stored_hash
+from vegglue.workflow.run_folder import folder_of, of_size
+
+
+@one_thread()
+def simulate(
+    case: Case, *, runs: Path | str = "runs", members: int | None = None, jobs: int = -1, watch: Watch = silent
+) -> Ensemble:
+    """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields).
+
+    An ensemble of exactly this case is read instead; one that was stopped goes on where it was. members: size of the
+    ensemble instead of the case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is
+    told how far it is. Predictions are (member, station), in m/s for velocities and m for levels.
+
+    Errors: InputError for a case without parameters, or fields beyond their budget; StorageError when another run holds
+    the folder or the disk is full.
+    """
+    case = of_size(case, members)
+    path = folder_of(runs, case) / "ensemble.h5"
+    if not is_simulated(case, runs):
+        solve_ensemble(case, read_observations(case), path, jobs, watch)
+    return read_ensemble(path)
+
+
+def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
+    """Whether a readable ensemble of exactly this case is there, with its fields if the case keeps any."""
+    path, wanted = Path(runs) / case.name / "ensemble.h5", simulation_hash(case)
+    try:
+        read_ensemble(path, wanted)
+    except (InputError, StorageError):
+        return False
+    return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted

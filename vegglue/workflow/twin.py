@@ -1,0 +1,54 @@
+"""case -> twin: measurements with a hidden effect and a sealed answer; and how well its diagnosis guessed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.parallel import one_thread
+from vegglue.storage.result_files import diagnosis_that_fits
+from vegglue.twins.reveal import guess_in_words
+from vegglue.twins.sealed_answer import opened_answer, sealed_answer
+from vegglue.twins.twin import measured_twin, true_place, twin_base
+from vegglue.twins.twin_files import SEAL, config_in, write_twin
+from vegglue.workflow.run_folder import model_in
+
+
+@one_thread()
+def make_twin(
+    case: Case,
+    to: Path | str,
+    *,
+    hide: Sequence[str] = ("?",),
+    snr: float = 6.0,
+    noise: str = "white",
+    seed: int = 1,
+) -> Case:
+    """Make measurements at the stations of a case from a truth that hides something; config, tables and the sealed
+    answer are written into a folder.
+
+    hide: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any; snr: how visible an effect
+    without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`. Errors: InputError.
+    """
+    model = model_in(case)
+    if not case.parameters:
+        raise InputError(f"{case.source}: `parameters` expected a prior or more, got none; add one.")
+    station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
+    return load_case(write_twin(case, Path(to), station, sealed_answer(answer)))
+
+
+def reveal(folder: Path | str, *, runs: Path | str = "runs") -> list[str]:
+    """Open the seal of a twin: what is true and, where there is a diagnosis of it, how well that guessed; one sentence
+    each. Errors: InputError when there is no seal, or it is broken.
+    """
+    folder = Path(folder)
+    answer = opened_answer(folder / SEAL)
+    case = load_case(config_in(folder))
+    there = Path(runs) / case.name
+    diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
+    lines = guess_in_words(answer, diagnosis)
+    if diagnosis is None:
+        lines.append(f"No diagnosis of it in {there}: `vegglue diagnose {config_in(folder)}` makes one.")
+    return lines
