@@ -71,7 +71,7 @@ def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple
     return bed, np.repeat((np.abs(y) > 1.5).astype(np.int64)[None], cells[0], axis=0)
 
 
-def even_ground(bed: Array, banks: Array, cell: tuple[float, float]) -> ChannelGeometry:
+def even_geometry(bed: Array, banks: Array, cell: tuple[float, float]) -> ChannelGeometry:
     """What effects are told of the paper's section, y = 0 on its axis; nothing of plants."""
     nx, ny = bed.shape
     nothing = np.zeros((nx, ny, 1))
@@ -88,7 +88,7 @@ def mixed(problem: Problem, length: float, tolerance: float) -> tuple[Problem, A
     state = solved(problem, tolerance)
     for share in (0.4, 0.7, 1.0) if length else ():
         mixing = ActiveEffect(library()["mixing_length"], {"length": np.array([share * length])})
-        problem = replace(problem, acting=(mixing,))
+        problem = replace(problem, effects=(mixing,))
         solution = newton(problem, state, tolerance)
         assert solution.converged[0]
         state = solution.state

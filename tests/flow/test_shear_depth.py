@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from channels import even_ground, make_problem, mixed, river, trapezoid
+from channels import even_geometry, make_problem, mixed, river, trapezoid
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import simulation_hash
@@ -51,7 +51,7 @@ def channel(smallest: bool, length: float) -> Problem:
     cell = (problem.dx, problem.dy)
     _, banks = trapezoid(30.0, 4.5, problem.shape)
     mixing = ActiveEffect(library()["mixing_length"], {"length": np.array([length])})
-    return replace(problem, acting=(mixing,), ground=even_ground(problem.bed, banks, cell))
+    return replace(problem, effects=(mixing,), geometry=even_geometry(problem.bed, banks, cell))
 
 
 def test_land_raises_no_viscosity() -> None:
@@ -79,7 +79,7 @@ def test_tangent_equals_difference_of_solved_states() -> None:
         return replace(problem, inflows=inflows)
 
     step = 1e-4
-    bare = replace(channel(True, 0.3), acting=())
+    bare = replace(channel(True, 0.3), effects=())
     problem, state = mixed(bare, 0.3, 1e-10)
     assert np.abs(state - mixed(replace(bare, smallest_shear_depth=False), 0.3, 1e-10)[1]).max() > 1e-3
     more, less = with_discharge(1.0 + step), with_discharge(1.0 - step)

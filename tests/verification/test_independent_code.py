@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, even_ground, make_problem, mixed, solved, trapezoid
+from channels import centres, even_geometry, make_problem, mixed, solved, trapezoid
 
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import LEVEL, VegetatedCells
@@ -56,7 +56,7 @@ def with_the_truth(folder, finer, smallest):
         "viscosity": np.array([truth["nu"]]),
         "film": 0.002,
         "smallest_shear_depth": smallest,
-        "ground": even_ground(bed, banks, size),
+        "geometry": even_geometry(bed, banks, size),
     }
     problem = make_problem(bed, size, run["discharge_m3_s"], run["downstream_level_m"], **changes)
     return grid, *mixed(problem, answer["settings"].get("mixk", 0.0), 1e-8)

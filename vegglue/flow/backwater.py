@@ -45,7 +45,7 @@ def _column(problem: Problem, i: int) -> Problem:
         friction_class=problem.friction_class[i : i + 1],
         plants=plants,
         lift=problem.lift[i : i + 1],
-        acting=(),
+        effects=(),
     )
 
 

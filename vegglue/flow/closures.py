@@ -43,13 +43,13 @@ class BareClosures:
     smallest_shear_depth: bool
 
 
-def stages_of(acting: tuple[ActiveEffect, ...]) -> set[str]:
-    return {one.effect.stage for one in acting}
+def stages_of(effects: tuple[ActiveEffect, ...]) -> set[str]:
+    return {active.effect.stage for active in effects}
 
 
-def stand_values(
-    acting: tuple[ActiveEffect, ...],
-    ground: ChannelGeometry,
+def plant_values(
+    effects: tuple[ActiveEffect, ...],
+    geometry: ChannelGeometry,
     column: NDArray[np.int64],
     row: NDArray[np.int64],
     plants: tuple[Array, Array],
@@ -63,21 +63,23 @@ def stand_values(
     north = np.minimum(row + 1, state.shape[2] - 1)
     beyond = np.where((row + 1 < state.shape[2])[:, None], state[column, ACROSS, north], 0.0)
     v = 0.5 * (state[column, ACROSS, row] + beyond)
-    stand = PlantCells(
+    seen = PlantCells(
         phi=phi,
         canopy_height=canopy_height,
         depth=depth[column, row],
         speed=np.sqrt(u**2 + v**2 + 1e-6),
-        front=ground.front[column, row],
-        edge=ground.edge[column, row],
-        x=ground.x[column, 0],
-        y=ground.y[0, row],
+        front=geometry.front[column, row],
+        edge=geometry.edge[column, row],
+        x=geometry.x[column, 0],
+        y=geometry.y[0, row],
     )
-    now = applied(acting, "plants", stand, {"phi": phi, "canopy_height": canopy_height})
+    now = applied(effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
     return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])
 
 
-def closures(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry, state: Array, bare: BareClosures) -> Closures:
+def closures(
+    effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, state: Array, bare: BareClosures
+) -> Closures:
     """All that the stages resistance, exchange and force hand on."""
     nx = state.shape[0]
     found: dict[str, Array] = {"rate": np.empty_like(bare.rate), "viscosity": np.empty_like(bare.rate)}
@@ -85,11 +87,11 @@ def closures(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry, state: A
         stop = min(first + CLOSURE_STRIP, nx)
         wide = slice(max(first - 1, 0), min(stop + 1, nx))
         inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(part_of(ground, wide, slice(None)), state, bare, wide)
-        values = applied(acting, "resistance", cells, {"rate": cells.rate})
+        cells = _cells(part_of(geometry, wide, slice(None)), state, bare, wide)
+        values = applied(effects, "resistance", cells, {"rate": cells.rate})
         cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
-        values |= applied(acting, "exchange", cells, {"viscosity": bare.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
-        values |= applied(acting, "force", cells, {"x": ZERO, "y": ZERO})
+        values |= applied(effects, "exchange", cells, {"viscosity": bare.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
+        values |= applied(effects, "force", cells, {"x": ZERO, "y": ZERO})
         for name, value in values.items():
             if value is ZERO:
                 continue
@@ -103,13 +105,13 @@ def closures(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry, state: A
 ZERO, EMPTY = np.zeros(1), np.zeros((0, 0, 0))
 
 
-def _cells(ground: ChannelGeometry, state: Array, bare: BareClosures, columns: slice) -> Cells:
+def _cells(geometry: ChannelGeometry, state: Array, bare: BareClosures, columns: slice) -> Cells:
     here, depth = state[columns], bare.depth[columns]
     before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
     v = 0.5 * here[:, ACROSS]
     v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
     return Cells(
-        ground=ground,
+        geometry=geometry,
         depth=depth,
         level=here[:, LEVEL],
         u=0.5 * (here[:, ALONG] + before),
@@ -153,17 +155,17 @@ def add_plant_drag(problem: Problem, rate: Array, depth: Array, plants: tuple[Ar
 
 def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, dict[str, Array]]:
     """Friction rate [1/m] and viscosity [m2/s] (nx, ny, m), momentum fluxes and forces by name, effects included."""
-    stages = stages_of(problem.acting)
+    stages = stages_of(problem.effects)
     plants = (problem.plants.phi, problem.plants.canopy_height)
-    if "plants" in stages and problem.ground is not None:
+    if "plants" in stages and problem.geometry is not None:
         column, row = problem.plants.column, problem.plants.row
-        plants = stand_values(problem.acting, problem.ground, column, row, plants, state, depth)
+        plants = plant_values(problem.effects, problem.geometry, column, row, plants, state, depth)
     rate = bed_drag(problem, depth)
-    if problem.ground is None or not stages & {"resistance", "exchange", "force"}:
+    if problem.geometry is None or not stages & {"resistance", "exchange", "force"}:
         add_plant_drag(problem, rate, depth, plants)
         return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
     of_bed = rate.copy()
     add_plant_drag(problem, rate, depth, plants)
     bare = BareClosures(depth, rate, of_bed, problem.viscosity, problem.smallest_shear_depth)
-    found = closures(problem.acting, problem.ground, state, bare)
+    found = closures(problem.effects, problem.geometry, state, bare)
     return found.rate, found.viscosity, found.momentum

@@ -60,7 +60,7 @@ class Problem:
     [m2/s].
 
     lift (nx, ny, m) or empty: by how much members' beds lie higher [m]; source (nx, ny, m) or empty: water that enters
-    from above or below, without momentum [m/s]; acting: effects at work in the flow and its readings.
+    from above or below, without momentum [m/s]; effects: effects at work in the flow and its readings.
     """
 
     dx: float
@@ -80,8 +80,8 @@ class Problem:
     smallest_shear_depth: bool = False
     lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     source: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    acting: tuple[ActiveEffect, ...] = ()
-    ground: ChannelGeometry | None = None
+    effects: tuple[ActiveEffect, ...] = ()
+    geometry: ChannelGeometry | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -123,8 +123,9 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
         outlet_level=pick(problem.outlet_level),
         lift=pick(problem.lift) if problem.lift.size else problem.lift,
         source=pick(problem.source) if problem.source.size else problem.source,
-        acting=tuple(
-            replace(one, values={name: pick(value) for name, value in one.values.items()}) for one in problem.acting
+        effects=tuple(
+            replace(active, values={name: pick(value) for name, value in active.values.items()})
+            for active in problem.effects
         ),
     )
 
@@ -151,7 +152,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         outlet=problem.outlet[south:north],
         lift=np.ascontiguousarray(problem.lift[:, south:north]),
         source=np.ascontiguousarray(problem.source[:, south:north]),
-        ground=None if problem.ground is None else rows_of(problem.ground, south, north),
+        geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
     )
 
 

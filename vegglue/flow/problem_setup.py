@@ -28,9 +28,9 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     members = len(next(iter(theta.values()))) if theta else 1
     setting = case.experiments[experiment]
     classes = [case.friction.classes[name] for name in site.class_names]
-    acting = active_effects(case, experiment, theta, members)
-    ground = channel_geometry(case, site, experiment) if acting else None
-    boundary = bounded(acting, _boundary(case, site, setting, theta, members))
+    effects = active_effects(case, experiment, theta, members)
+    geometry = channel_geometry(case, site, experiment) if effects else None
+    boundary = bounded(effects, _boundary(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
@@ -52,34 +52,34 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         log_argument_minimum=case.numerics.bank_argument_minimum,
         phi_proportional=case.numerics.emergent == "proportional",
         smallest_shear_depth=case.numerics.shear_depth == "smallest",
-        lift=lifted(acting, ground) if ground else np.zeros((0, 0, 0)),
-        source=_source(boundary.lateral, ground) if ground else np.zeros((0, 0, 0)),
-        acting=acting,
-        ground=ground,
+        lift=lifted(effects, geometry) if geometry else np.zeros((0, 0, 0)),
+        source=_source(boundary.lateral, geometry) if geometry else np.zeros((0, 0, 0)),
+        effects=effects,
+        geometry=geometry,
     )
 
 
 def _boundary(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> BoundaryValues:
-    """What the case says of inflows and outlet; spread and place have as many cells as the longest side."""
+    """What the case says of inflows and outlet; spread and position have as many cells as the longest side."""
     cells = [inflow_cells(inflow, site.grid).size for inflow in case.inflows.values()]
-    place = np.zeros((len(cells), max(cells), 1))
+    position = np.zeros((len(cells), max(cells), 1))
     for inflow, size in enumerate(cells):
-        place[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+        position[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     return BoundaryValues(
         discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
         level=value_of(setting.level, theta, members),
         spread=np.ones((len(cells), max(cells), 1)),
         lateral=np.zeros(members),
-        place=place,
+        position=position,
     )
 
 
-def _source(lateral: Array, ground: ChannelGeometry) -> Array:
+def _source(lateral: Array, geometry: ChannelGeometry) -> Array:
     """Lateral inflow spread over the floor, (nx, ny, m) [m/s]; empty without one."""
     if not lateral.any():
         return np.zeros((0, 0, 0))
-    floor = 1.0 - ground.bank
-    return np.ascontiguousarray(floor * lateral / (floor.sum() * ground.dx * ground.dy))
+    floor = 1.0 - geometry.bank
+    return np.ascontiguousarray(floor * lateral / (floor.sum() * geometry.dx * geometry.dy))
 
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
@@ -115,17 +115,19 @@ def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> Infl
     )
 
 
-def lifted(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry) -> Array:
+def lifted(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> Array:
     """By how much members' beds lie higher, (nx, ny, m) [m]; empty when no effect says so."""
     nothing = np.zeros((0, 0, 0))
-    if not any(one.effect.stage == "site" and one.on.any() for one in acting):
+    if not any(active.effect.stage == "site" and active.on.any() for active in effects):
         return nothing
-    members = len(next(iter(acting[0].values.values())))
-    change = applied(acting, "site", ground, {"bed": np.zeros((*ground.bed.shape[:2], members))})
+    members = len(next(iter(effects[0].values.values())))
+    change = applied(effects, "site", geometry, {"bed": np.zeros((*geometry.bed.shape[:2], members))})
     return np.ascontiguousarray(change["bed"])
 
 
-def bounded(acting: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
+def bounded(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
     """What enters and leaves after the effects of the stage boundary."""
-    neutral = {item.name: getattr(boundary, item.name) for item in dataclasses.fields(boundary) if item.name != "place"}
-    return BoundaryValues(**applied(acting, "boundary", boundary, neutral), place=boundary.place)
+    neutral = {
+        item.name: getattr(boundary, item.name) for item in dataclasses.fields(boundary) if item.name != "position"
+    }
+    return BoundaryValues(**applied(effects, "boundary", boundary, neutral), position=boundary.position)

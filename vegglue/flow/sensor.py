@@ -61,7 +61,7 @@ def read_sensors(
     prediction = np.empty((len(station), problem.members))
     for kind, rows, x, y in _by_kind(station):
         prediction[rows] = READERS[kind.name].read(flow, x, y)
-    if any(one.effect.stage == "sensor" for one in problem.acting):
+    if any(active.effect.stage == "sensor" for active in problem.effects):
         prediction = _shown(flow, prediction, station)
     through = flow.discharge
     error = np.abs(through / _entered(problem) - 1.0).max(axis=0)
@@ -89,14 +89,14 @@ def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
     there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
     there |= _measured_by_probes(flow, value, station) | {"x": x[:, None], "y": y[:, None]}
-    for one in problem.acting:
+    for active in problem.effects:
         rows = np.ones(len(station), dtype=bool)
-        if one.sections:
-            rows &= station["section"].isin(one.sections).to_numpy()
-        if one.devices:
-            rows &= station["device"].isin(one.devices).to_numpy()
+        if active.sections:
+            rows &= station["section"].isin(active.sections).to_numpy()
+        if active.devices:
+            rows &= station["device"].isin(active.devices).to_numpy()
         reading = Reading(value=value, **there)
-        value = np.where(rows[:, None], applied((one,), "sensor", reading, {"value": value})["value"], value)
+        value = np.where(rows[:, None], applied((active,), "sensor", reading, {"value": value})["value"], value)
     return value
 
 

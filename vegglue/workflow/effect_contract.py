@@ -107,10 +107,10 @@ def _standing(problem: Problem) -> dict[str, Array]:
     """phi and canopy height of plants in 0.3 m of water from slow to fast."""
     speed = np.geomspace(0.001, 3.0, 40)[:, None] * np.ones(problem.members)
     one = np.ones_like(speed)
-    stand = PlantCells(
+    plants = PlantCells(
         2.0 * one, 0.5 * one, 0.3 * one, speed, one[:, :1], -0.1 * one[:, :1], one[:, :1], 0.0 * one[:, :1]
     )
-    return applied(problem.acting, "plants", stand, {"phi": stand.phi, "canopy_height": stand.canopy_height})
+    return applied(problem.effects, "plants", plants, {"phi": plants.phi, "canopy_height": plants.canopy_height})
 
 
 def _mirrors(tried: Trial) -> Iterator[str]:
