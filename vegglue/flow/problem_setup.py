@@ -1,7 +1,5 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
-import dataclasses
-
 import numpy as np
 
 from vegglue.arrays import Array
@@ -9,6 +7,7 @@ from vegglue.case.case_effects import Theta, active_effects, value_of
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.site_schema import Inflow, Stand, StandOverride
 from vegglue.effects.active_effect import ActiveEffect, applied
+from vegglue.effects.definition import REPLACED
 from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
 from vegglue.flow.problem import InflowSegment, Problem, VegetatedCells
 from vegglue.resistance import bed_laws, plant_laws
@@ -127,7 +126,5 @@ def lifted(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> Arra
 
 def bounded(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
     """What enters and leaves after the effects of the stage boundary."""
-    neutral = {
-        item.name: getattr(boundary, item.name) for item in dataclasses.fields(boundary) if item.name != "position"
-    }
+    neutral = {name: getattr(boundary, name) for name in REPLACED["boundary"]}
     return BoundaryValues(**applied(effects, "boundary", boundary, neutral), position=boundary.position)
