@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from channels import even_geometry, make_problem, mixed, river, trapezoid
+from channels import changed, even_geometry, make_problem, mixed, river, trapezoid
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.effects.surroundings import weighted_across
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
@@ -65,7 +65,7 @@ def test_land_raises_no_viscosity() -> None:
         state[:, ALONG, :, 0] = wet
         depth = faces(problem, state).cell
         edge = wet & ~np.roll(wet, 1, axis=1)
-        found[smallest] = float(closed(problem, state, depth)[1][..., 0][edge].mean())
+        found[smallest] = float(closures(problem, state, depth).viscosity[..., 0][edge].mean())
     assert found[False] > 0.1
     assert found[True] < 0.02
 
@@ -75,8 +75,8 @@ def test_tangent_equals_difference_of_solved_states() -> None:
 
     def with_discharge(factor: float) -> Problem:
         problem = channel(True, 0.3)
-        inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.inflows)
-        return replace(problem, inflows=inflows)
+        inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.boundaries.inflows)
+        return changed(problem, inflows=inflows)
 
     step = 1e-4
     bare = replace(channel(True, 0.3), effects=())

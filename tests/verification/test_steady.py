@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import GRAVITY, centres, discharge, family, make_problem, river, sloping, solved
+from channels import GRAVITY, centres, changed, discharge, family, make_problem, planted, river, sloping, solved
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -34,10 +34,10 @@ def disturbed(state, size):
 def flipped(problem):
     """The problem seen in a mirror along its axis."""
     rows = problem.shape[1]
-    return replace(
+    return changed(
         problem,
         bed=np.ascontiguousarray(problem.bed[:, ::-1]),
-        friction_class=np.ascontiguousarray(problem.friction_class[:, ::-1]),
+        friction_class=np.ascontiguousarray(problem.friction.friction_class[:, ::-1]),
         plants=replace(problem.plants, row=rows - 1 - problem.plants.row),
     )
 
@@ -64,8 +64,7 @@ def test_mirrored_channel_has_the_mirrored_flow():
 
 
 def test_a_symmetric_channel_has_a_symmetric_flow():
-    none = replace(river().plants, column=np.zeros(0, np.int64), row=np.zeros(0, np.int64))
-    problem = river(plants=replace(none, **{name: np.zeros((0, 1)) for name in ("phi", "canopy_height", "bare_chezy")}))
+    problem = river(plants=planted((0, 0), 0.0, 0.0, 0.0))
     state = solved(problem)
     assert np.abs(state - mirrored(state)).max() < 1e-10
 
@@ -204,7 +203,7 @@ def test_jacobian_is_the_derivative_of_the_residual():
     """In deep water with currents both ways across: every row."""
     bed = 0.05 * np.sin(np.arange(20))[:, None] * np.cos(np.arange(8))[None]
     problem = make_problem(bed, (0.5, 0.4), 2.0, 1.0, (bed_laws.MANNING, 0.05), viscosity=np.array([0.02]))
-    problem = replace(problem, inflows=(replace(problem.inflows[0], by_conveyance=False),))
+    problem = changed(problem, inflows=(replace(problem.boundaries.inflows[0], by_conveyance=False),))
     worst = compare_jacobian(problem, disturbed(solved(problem), 0.01))
     print(f"J against differences, deep water: {worst.max():.1e} of the row's size")
     assert worst.max() < 5e-5

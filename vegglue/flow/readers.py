@@ -186,10 +186,10 @@ def _wet_share(flow: GriddedFlow, face: int) -> Array:
     """dh/da of a face between two columns (ny,) [-], a the mean of level minus bed: that of `wet_depth`, exactly."""
     problem, sides = flow.problem, [face - 1, face]
     above = flow.level[sides, :, 0] - problem.bed[sides]
-    if problem.lift.size:
-        above = above - problem.lift[sides, :, 0]
-    reach = problem.reach[sides].mean(axis=0)
-    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / reach + 0.5, 0.0, 1.0)
+    if problem.bed_rise.size:
+        above = above - problem.bed_rise[sides, :, 0]
+    half_range = problem.bed_half_range[sides].mean(axis=0)
+    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / half_range + 0.5, 0.0, 1.0)
 
 
 def _no_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import closures
 from vegglue.flow.equations import Faces, faces
 from vegglue.flow.problem import Problem
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
@@ -84,7 +84,7 @@ def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     problem, now = flow.problem, flow.at_faces
     canopy = np.zeros_like(now.cell)
     canopy[problem.plants.column, problem.plants.row] = problem.plants.canopy_height
-    fields = {"depth": now.cell, "u": flow.u, "rate": closed(problem, flow.state, now.cell)[0]}
+    fields = {"depth": now.cell, "u": flow.u, "rate": closures(problem, flow.state, now.cell).rate}
     fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
     there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
@@ -144,9 +144,9 @@ def _entered(problem: Problem) -> Array:
     """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s]."""
     nx = problem.shape[0]
     entered = np.zeros((nx + 1, problem.members))
-    if problem.source.size:
-        entered[1:] += problem.source.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
-    for inflow in problem.inflows:
+    if problem.boundaries.lateral_inflow.size:
+        entered[1:] += problem.boundaries.lateral_inflow.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
+    for inflow in problem.boundaries.inflows:
         if inflow.side == "west":
             entered += inflow.discharge
     return entered + _from_sides(problem, nx)
@@ -155,7 +155,7 @@ def _entered(problem: Problem) -> Array:
 def _from_sides(problem: Problem, nx: int) -> Array:
     """The part that enters through the sides, counted by its even share; exact beyond the segment."""
     entered = np.zeros((nx + 1, problem.members))
-    for inflow in problem.inflows:
+    for inflow in problem.boundaries.inflows:
         if inflow.side != "west":
             share = np.clip((np.arange(nx + 1) - inflow.start) / (inflow.stop - inflow.start), 0.0, 1.0)
             entered += share[:, None] * inflow.discharge

@@ -1,7 +1,7 @@
 """Chord steps x <- x - M^-1 R(x) of many members with the factors M of one, accelerated by Anderson's mixing.
 
 Members pass through a few lanes that are computed side by side; as soon as some are done, others enter their lanes.
-Thin water is eased, see `easing`. A member is there when its correction, in m and m/s, is below the tolerance.
+Thin water is eased, see `thin_water`. A member is there when its correction, in m and m/s, is below the tolerance.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.flow.equations import carry_thin, eased, largest_correction, where_thin
+from vegglue.flow.chord_equations import carry_thin, eased, largest_correction, where_thin
 from vegglue.flow.problem import Problem, take
 from vegglue.solver.anderson import Memory, kept
 from vegglue.solver.jacobian import Factors

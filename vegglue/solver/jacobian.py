@@ -6,7 +6,8 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.flow import thin_water
-from vegglue.flow.equations import residual, slope_of_friction, thickness
+from vegglue.flow.chord_equations import slope_of_friction, thickness
+from vegglue.flow.equations import residual
 from vegglue.flow.problem import Problem, take
 from vegglue.solver import block_elimination
 
@@ -19,8 +20,8 @@ COLOUR_LANES = 16
 class Factors:
     """The eliminated Jacobian of one member: J^-1 costs three products a column.
 
-    Beside it what chord steps need of the state it was made at, see `easing`: slopes of friction [1/s], depths of faces
-    [m] and how velocities answer to levels there [1/s].
+    Beside it what chord steps need of the state it was made at, see `thin_water`: slopes of friction [1/s], depths of
+    faces [m] and how velocities answer to levels there [1/s].
     """
 
     columns: Single

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import Closures, closures
 from vegglue.flow.equations import Faces, faces, residual, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.problem import LEVEL, Problem
@@ -33,12 +33,11 @@ def march(problem: Problem, state: Array, time_step: float, steps: int, theta: f
 def advance(problem: Problem, state: Array, time_step: float, theta: float) -> Array:
     """The change of a state over one step."""
     now = faces(problem, state)
-    rough, viscosity, _ = closed(problem, state, now.cell)
     # Never below a thousandth, so that dry land keeps a water table.
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
-    along, across = _damping(problem, now, rough, viscosity)
-    change = -residual(problem, state)
-    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, problem.outlet, time_step, theta, problem.dx)
+    along, across = _damping(problem, now, closures(problem, state, now.cell))
+    change, outlet = -residual(problem, state), problem.boundaries.outlet
+    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, problem.dx)
     sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
 
@@ -69,13 +68,13 @@ def settle(problem: Problem, start: Array, tolerance: float) -> Marched:
     return Marched(state, False, FALL_BACK_TRIES * per_try, f"still changing by {rate:.1e} per second after {span:g} s")
 
 
-def _damping(problem: Problem, now: Faces, rough: Array, viscosity: Array) -> tuple[Array, Array]:
+def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Array]:
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    cell = 2.0 * rough * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
+    cell = 2.0 * closed.rate * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
     # Shear acts on a thin cell over the depth of its deeper corners.
     sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
-    cell += 4.0 * viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
+    cell += 4.0 * closed.viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
     across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])

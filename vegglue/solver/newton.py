@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.arrays import Array, Single
-from vegglue.flow.equations import eased, slope_of_friction, storage
+from vegglue.flow.chord_equations import eased, slope_of_friction
+from vegglue.flow.equations import storage
 from vegglue.flow.problem import LEVEL, Problem
 from vegglue.solver import block_elimination
 from vegglue.solver.chord import LONGEST_CORRECTION, ChordSolution, chord

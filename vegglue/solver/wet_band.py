@@ -19,7 +19,7 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
     wet = np.flatnonzero(above > -MARGIN)
     if not wet.size:
         return 0, problem.shape[1]
-    sides = {inflow.side for inflow in problem.inflows}
+    sides = {inflow.side for inflow in problem.boundaries.inflows}
     south = 0 if "south" in sides else max(int(wet[0]) - 1, 0)
     north = problem.shape[1] if "north" in sides else min(int(wet[-1]) + 2, problem.shape[1])
     return south, north
