@@ -5,9 +5,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
-from vegglue.resistance.physical_constants import GRAVITY
-
-AIR_OVER_WATER = 1.2e-3
+from vegglue.resistance.physical_constants import AIR_OVER_WATER, GRAVITY
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:

@@ -5,8 +5,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import PlantCells
-
-WATER_VISCOSITY = 1e-6
+from vegglue.resistance.physical_constants import WATER_VISCOSITY
 
 
 def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
