@@ -14,8 +14,8 @@ from vegglue.compilation import compiled_exactly
 # unknowns this far apart may be disturbed together.
 ALONG_PERIOD, ROWS_REACH = 4, 2
 ACROSS_PERIOD = 2 * ROWS_REACH + 1
-# Of so many columns [-] one tells Anderson's mixing how steps change. With one of four it takes 1 to 4 % more steps than
-# with all, each of which reads a third less memory (DECISIONS).
+# Of so many columns [-] one tells Anderson's mixing how steps change. With one of four it takes 1 to 4 % more steps
+# than with all, each of which reads a third less memory (DECISIONS).
 SPARSE = 4
 
 
