@@ -1,6 +1,6 @@
 """The commands of the shell.
 
-May import: effects, case, site, measurements, results, storage, ensemble, inference, diagnosis, figures, report,
-importers, twins, workflow.
+May import: effects, case, site, measurements, solver, results, storage, ensemble, inference, diagnosis, figures,
+report, importers, twins, workflow.
 Open first: main.py, options.py.
 """

@@ -31,6 +31,7 @@ from vegglue.report.posterior_words import describe
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.site.gridded_site import build_site
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.storage.hdf5 import diagnosis_that_fits, read_ensemble, read_posterior, stored_hash, write_posterior
 from vegglue.version import VERSION
 from vegglue.workflow.check import check_case
@@ -90,10 +91,10 @@ def simulate_command(
     with _progress(case.name) as report:
         simulate(case, observations, path, jobs, report)
     ensemble = read_ensemble(path)
-    status = ensemble.status
+    marched, failed = (members_with(ensemble.status, number) for number in (SOLVED_BY_MARCHING, FAILED))
     console.print(
-        f"{path}: {len(status):,} members, {int((status == 1).sum())} by marching, {int((status == 2).sum())} failed, "
-        f"largest mass error {ensemble.mass_error[status != 2].max(initial=0.0):.1e}"
+        f"{path}: {len(ensemble.status):,} members, {marched} by marching, {failed} failed, "
+        f"largest mass error {ensemble.mass_error[ensemble.status != FAILED].max(initial=0.0):.1e}"
     )
 
 
