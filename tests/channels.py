@@ -166,10 +166,10 @@ def filled(problem: Problem, level: float) -> Array:
     return state
 
 
-def family(places: Array) -> Problem:
-    """The reach for members at places (m, 2) of a unit square: roughness of the floor, density of the plants."""
-    places = np.atleast_2d(places)
-    many = take(river(), np.zeros(len(places), dtype=np.int64))
-    coefficient = np.stack([0.03 + 0.06 * places[:, 0], np.full(len(places), 1.0)])
-    phi = many.plants.phi * 10.0 ** (places[:, 1] - 0.5)
+def family(points: Array) -> Problem:
+    """The reach for members at points (m, 2) of a unit square: roughness of the floor, density of the plants."""
+    points = np.atleast_2d(points)
+    many = take(river(), np.zeros(len(points), dtype=np.int64))
+    coefficient = np.stack([0.03 + 0.06 * points[:, 0], np.full(len(points), 1.0)])
+    phi = many.plants.phi * 10.0 ** (points[:, 1] - 0.5)
     return changed(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))

@@ -14,6 +14,7 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import read_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.batch import solve_members
+from vegglue.solver.march import fall_back
 from vegglue.solver.status import FAILED
 
 # Points solved together: as many as fit the lanes of chord steps from one point.
@@ -62,7 +63,9 @@ def _alone(model: Model, z: Array) -> Array:
 
 def _read_alone(model: Model, experiment: str, points: Array) -> Array:
     build = partial(_problem, model, experiment)
-    solved = solve_members(build, points, model.case.numerics.tolerance)
+    numerics = model.case.numerics
+    how = fall_back(numerics.march_step, numerics.march_span)
+    solved = solve_members(build, points, numerics.tolerance, how=how)
     state = np.ascontiguousarray(solved.state)
     prediction = read_sensors(build(points), state, model.site.grid, model.station_of(experiment), ()).prediction
     prediction[solved.status == FAILED] = np.nan

@@ -57,7 +57,7 @@ def class_drag(depth, half_range, friction_class, law, coefficient, log_argument
     depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; half_range: half the range of the bed across the
     flow in a cell, w [m]. The slope of the surface drives either part, as in the subgrid friction of Volp et al. 2013,
     doi:10.1002/wrcr.20324; but the wet part is asked once, at its mean depth, and not each depth as if the water beside
-    it did not matter (`test_verification_banks`).
+    it did not matter (`verification/test_banks`).
     """
     (nx, ny, m), dry = depth.shape, FILM_ON_LAND * film
     drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))

@@ -11,8 +11,10 @@ from vegglue.flow.equations import residual
 from vegglue.flow.problem import Problem, take
 from vegglue.solver import block_elimination
 
+# Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
+# ones digits of the residual. Factors only lead to the root, so that no result hangs on it.
 COLOUR_STEP = 1e-6
-# Disturbed together: 15, as many as there are colours in a quarter, take a quarter longer than 16.
+# Colours disturbed together [-]: 15, as many as there are colours in a quarter, take a quarter longer than 16.
 COLOUR_LANES = 16
 
 
