@@ -31,12 +31,12 @@ from vegglue.storage.hdf5 import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {
-    "flow.eased": "residual of chord steps",
+    "chord_equations.eased": "residual of chord steps",
     "jacobian.jacobian": "Jacobian, its residuals included",
-    "blocks.factor": "factorisation",
-    "blocks.solve": "back-substitution",
+    "block_elimination.factor": "factorisation",
+    "block_elimination.solve": "back-substitution",
     "anderson.next_state": "Anderson mixing",
-    "neighbourhood._starts": "starts from solved neighbours",
+    "batch._starts": "starts from solved neighbours",
 }
 PAPER_STEPS = 6000
 SAMPLE = 128
