@@ -8,7 +8,7 @@ from vegglue.flow.problem import ALONG, LEVEL, Problem
 from vegglue.resistance import physical_constants
 
 # Largest slope of the energy line [-]: above it the estimate in one dimension would run away from the bed. Chosen, not
-# measured, twenty times the slope of the paper's bed; it decides where Newton starts, not where it ends.
+# measured, twenty times that of a bed of 1 in 1,000; it decides where Newton starts, not where it ends.
 STEEPEST = 0.02
 
 

@@ -20,7 +20,7 @@ from vegglue.solver.jacobian import Factors
 # lanes for each member, more leave lanes idle.
 ENTER = 2
 # A step this long [m, m/s] leaves the range where the linearisation means anything: chosen, not measured, about a
-# fourth of the depth and of the speed in the paper's channel.
+# fourth of the depth and of the speed of the channels in `configs`.
 LONGEST_CORRECTION = 0.25
 
 

@@ -46,8 +46,8 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
 class FallBack:
     """How members are marched where Newton fails: steps [s], and the flow time [s] after which one has failed.
 
-    Chosen, not measured: a wave runs through 171 m of the paper's channel within a minute, so that 40 minutes let it
-    come and go many times; a step of 0.5 s takes about as long as the water needs through a cell. Longer channels may
+    Chosen, not measured: a wave runs through 171 m of water 1 m deep within a minute, so that 40 minutes let it come
+    and go many times; a step of 0.5 s takes about as long as the water needs through a cell. Longer channels may
     need more time (`numerics.march_span`), a march that runs away shorter steps (`numerics.march_step`).
     """
 
