@@ -12,8 +12,8 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
-from vegglue.case.parameter_space import parameters_at, unit_points
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import parameters_at, sobol_sample
+from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.ensemble.simulate import linearised_medians, simulate, solve_chunk, starts_and_chunks
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
@@ -73,23 +73,22 @@ def marching(case) -> float:  # type: ignore[no-untyped-def]
 
 
 def ensemble(case):  # type: ignore[no-untyped-def]
-    """Site, measurements and the points of all members."""
-    points = unit_points(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    return build_site(case), read_observations(case), points
+    """Site, measurements and all members."""
+    return build_site(case), read_observations(case), sobol_sample(case)
 
 
 def steady(case) -> float:  # type: ignore[no-untyped-def]
     """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
-    site, observations, points = ensemble(case)
-    start_from, chunks = starts_and_chunks(case, site, points)
-    chunk = points[chunks[7]]
-    solve_chunk(case, site, observations, chunk[:2], start_from)
+    site, observations, sample = ensemble(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    chunk = sample.take(chunks[7])
+    solve_chunk(case, site, observations, chunk.take(np.arange(2)), start_from)
     profile = cProfile.Profile()
     began = time.perf_counter()
     rows = profile.runcall(solve_chunk, case, site, observations, chunk, start_from)
     seconds = time.perf_counter() - began
     print(
-        f"steady, 1142 x 40 cells: {len(chunk) / seconds:.1f} members/s on one core, "
+        f"steady, 1142 x 40 cells: {len(chunk.points) / seconds:.1f} members/s on one core, "
         f"{np.median(rows['iterations']):.0f} iterations a member, mass error {np.nanmax(rows['mass_error']):.0e}, "
         f"{members_with(rows['status'], SOLVED_BY_MARCHING)} marched, {members_with(rows['status'], FAILED)} failed"
     )
@@ -98,7 +97,7 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
     for name, words in PHASES.items():
         count, spent = calls[name]
         print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
-    return seconds / len(chunk)
+    return seconds / len(chunk.points)
 
 
 def sizes(case) -> None:  # type: ignore[no-untyped-def]
@@ -127,19 +126,19 @@ def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: i
 
 def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
     """Cells, and seconds a member on one core."""
-    site, observations, points = ensemble(case)
+    site, observations, sample = ensemble(case)
     start_from = linearised_medians(case, site)
     slopes = [one.slopes for one in start_from.values() if one is not None]
-    around = [points[cluster] for cluster in clusters(parameter_metric(points, slopes).coordinates, SAMPLE)]
-    chunk = min(around, key=lambda some: np.linalg.norm(some.mean(axis=0) - 0.5))
-    solve_chunk(case, site, observations, chunk[:2], start_from)
+    around = [sample.take(some) for some in clusters(parameter_metric(sample.points, slopes).coordinates, SAMPLE)]
+    chunk = min(around, key=lambda some: np.linalg.norm(some.points.mean(axis=0) - 0.5))
+    solve_chunk(case, site, observations, chunk.take(np.arange(2)), start_from)
     began = time.perf_counter()
     rows = solve_chunk(case, site, observations, chunk, start_from)
     seconds = time.perf_counter() - began
     if (rows["status"] != SOLVED_BY_NEWTON).any():
         marched, failed = (members_with(rows["status"], number) for number in (SOLVED_BY_MARCHING, FAILED))
         print(f"  {marched} marched, {failed} failed")
-    return site.bed.size, seconds / len(chunk)
+    return site.bed.size, seconds / len(chunk.points)
 
 
 def whole(case) -> None:  # type: ignore[no-untyped-def]
@@ -160,12 +159,12 @@ def same(case) -> None:  # type: ignore[no-untyped-def]
     """64 members spread over the priors: by chord steps in an ensemble, by Newton alone, and marched."""
     short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
     site = build_site(short)
-    points = unit_points(short, sample_prior(short.parameters, 64, 1))
+    points = sobol_points(len(short.parameters), 64, 1)
 
     def build(some):  # type: ignore[no-untyped-def]
         return build_problem(short, site, "D3a", parameters_at(short, some))
 
-    solved = solve_members(build, points, 1e-8)
+    solved = solve_members(build(points), points, build, 1e-8)
     tasks = [(build(point[None]), solved.state[..., i : i + 1]) for i, point in enumerate(points)]
     found = Parallel(n_jobs=-1)(delayed(three_ways)(*task) for task in tasks)
     apart, left, minutes = (np.array(each) for each in zip(*found, strict=True))
@@ -193,15 +192,15 @@ def three_ways(problem, start):  # type: ignore[no-untyped-def]
 
 def cores(case) -> None:  # type: ignore[no-untyped-def]
     """Speed-up from one to two processes over the same two chunks of the 5,000-member ensemble."""
-    site, observations, points = ensemble(case)
-    start_from, chunks = starts_and_chunks(case, site, points)
+    site, observations, sample = ensemble(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
     chunks = chunks[8:10]
     members, spent = sum(chunk.size for chunk in chunks), []
     for jobs in (1, 2):
         with Parallel(n_jobs=jobs) as pool:
-            pool(delayed(solve_chunk)(case, site, observations, points[chunk[:2]], start_from) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, sample.take(chunk[:2]), start_from) for chunk in chunks)
             began = time.perf_counter()
-            pool(delayed(solve_chunk)(case, site, observations, points[chunk], start_from) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, sample.take(chunk), start_from) for chunk in chunks)
             spent.append(time.perf_counter() - began)
     gain = spent[0] / spent[1]
     print(f"{members} members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two: {gain:.2f} times faster")

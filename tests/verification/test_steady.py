@@ -116,7 +116,7 @@ def test_members_do_not_depend_on_their_company():
     """
     points = np.random.default_rng(4).random((36, 2))
     chosen = np.array([1, 17, 35])
-    together, few = solve_members(family, points, 1e-7), solve_members(family, points[chosen], 1e-7)
+    together, few = (solve_members(family(some), some, family, 1e-7) for some in (points, points[chosen]))
     assert (together.status == SOLVED_BY_NEWTON).all()
     assert np.abs(discharge(family(points), together.state) / 2.0 - 1.0).max() < 1e-6
     company = np.abs(together.state[..., chosen] - few.state).max()

@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vegglue.case.parameter_space import parameters_at, unit_points
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import Problem, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
 from vegglue.measurements.kinds import velocity_rows
@@ -59,20 +58,19 @@ def simulate(case: Case, observations: Observations, path: Path, jobs: int, repo
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
-    theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
-    points = unit_points(case, theta)
-    start_from, chunks = starts_and_chunks(case, site, points)
-    header = make_header(case, observations, theta, chunks, window_of(case, site.grid))
+    sample = sobol_sample(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed = resumed, 0
-        report(Progress(solved, len(points), failed, resumed))
-        for index, rows in _solve_all(case, site, observations, points, chunks, todo, start_from, jobs):
+        report(Progress(solved, header.members, failed, resumed))
+        for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + members_with(rows["status"], FAILED)
-            report(Progress(solved, len(points), failed, resumed))
+            report(Progress(solved, header.members, failed, resumed))
 
 
 def chunk_size(members: int) -> int:
@@ -92,20 +90,20 @@ def _solve_all(
     case: Case,
     site: Site,
     observations: Observations,
-    points: np.ndarray,
+    sample: PriorSample,
     chunks: list[np.ndarray],
     todo: list[int],
     start_from: StartFrom,
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    tasks = ((index, case, site, observations, points[chunks[index]], start_from) for index in todo)
+    tasks = ((index, case, site, observations, sample.take(chunks[index]), start_from) for index in todo)
     yield from as_finished(_solve_numbered, tasks, jobs)
 
 
 def _solve_numbered(
-    index: int, case: Case, site: Site, observations: Observations, points: np.ndarray, start_from: StartFrom
+    index: int, case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom
 ) -> tuple[int, Rows]:
-    return index, solve_chunk(case, site, observations, points, start_from)
+    return index, solve_chunk(case, site, observations, sample, start_from)
 
 
 def linearised_medians(case: Case, site: Site) -> StartFrom:
@@ -120,13 +118,13 @@ def linearised_medians(case: Case, site: Site) -> StartFrom:
 
 
 def solve_chunk(
-    case: Case, site: Site, observations: Observations, points: np.ndarray, start_from: StartFrom | None = None
+    case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
 ) -> Rows:
-    """The rows of the ensemble file for members at `points` of the unit cube, every experiment of the case, and as
-    `fields` (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from.
+    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
+    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from.
     """
     station, sections = observations.table, section_positions(observations)
-    members, window, tolerance = len(points), window_of(case, site.grid), case.numerics.tolerance
+    members, window, tolerance = len(sample.points), window_of(case, site.grid), case.numerics.tolerance
     kept = window.columns if window else slice(0, 0)
     fields_shape = (members, len(case.experiments), len(QUANTITIES), kept.stop - kept.start, site.grid.y.size)
     rows: Rows = {
@@ -141,13 +139,15 @@ def solve_chunk(
     }
     for number, experiment in enumerate(case.experiments):
         began = time.perf_counter()
-        build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(build, points, tolerance, (start_from or {}).get(experiment), _fall_back(case))
+        problem = build_problem(case, site, experiment, sample.theta)
+        build, origin = partial(_problem_at, case, site, experiment), (start_from or {}).get(experiment)
+        solved = solve_members(problem, sample.points, build, tolerance, origin, _fall_back(case))
         here = (station["experiment"] == experiment).to_numpy()
         for first in range(0, members, READ_TOGETHER):
             few = slice(first, min(first + READ_TOGETHER, members))
             state = np.ascontiguousarray(solved.state[..., few])
-            readings = read_sensors(build(points[few]), state, site.grid, station[here], sections, kept)
+            part = take(problem, np.arange(members)[few])
+            readings = read_sensors(part, state, site.grid, station[here], sections, kept)
             rows["prediction"][few, here] = readings.prediction
             rows["section_flow"][few, number] = readings.section_flow
             rows["fields"][few, number] = readings.fields
@@ -166,13 +166,14 @@ def solve_chunk(
 def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
     """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
     site = build_site(case)
-    point = unit_points(case, {name: np.array([theta[name]]) for name in case.parameters})
+    sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
     fields = {}
     for experiment in case.experiments:
+        problem = build_problem(case, site, experiment, sample.theta)
         build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(build, point, case.numerics.tolerance, how=_fall_back(case))
+        solved = solve_members(problem, sample.points, build, case.numerics.tolerance, how=_fall_back(case))
         if solved.status[0] != FAILED:
-            fields[experiment] = flow_fields(build(point), solved.state, site.grid)
+            fields[experiment] = flow_fields(problem, solved.state, site.grid)
     return fields
 
 

@@ -11,7 +11,7 @@ from scipy.interpolate import RBFInterpolator
 
 from vegglue.arrays import Array
 from vegglue.compilation import compiled
-from vegglue.flow.problem import Problem, crop
+from vegglue.flow.problem import Problem, crop, take
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.march import USUAL_FALL_BACK, FallBack
 from vegglue.solver.parameter_metric import (
@@ -64,35 +64,36 @@ class SolvedMembers:
 
 @dataclass(frozen=True)
 class _Batch:
-    """What members are solved with: the problem of any points, that of all members, how near they are, the largest
+    """What members are solved with: their problem, that of members at any points, how near they are, the largest
     correction [m, m/s] a solved one may still ask for, and how they are marched where Newton fails.
     """
 
-    problem_of: ProblemOf
     problem: Problem
+    problem_of: ProblemOf
     metric: ParameterMetric
     tolerance: float
     fall_back: FallBack
 
 
 def solve_members(
-    problem_of: ProblemOf,
+    problem: Problem,
     points: Array,
+    problem_of: ProblemOf,
     tolerance: float,
     start_from: LinearisedMember | None = None,
     how: FallBack = USUAL_FALL_BACK,
 ) -> SolvedMembers:
-    """Steady states at all points; a member's does not depend on who else is asked for, beyond `tolerance`.
+    """Steady states of all members of a problem; one does not depend on who else is asked for, beyond `tolerance`.
 
-    start_from: a member to come from; from a rough estimate if not given; how: what to do where Newton fails.
+    points (m, d): where they are in the unit cube; problem_of: the problem of members at other points; start_from: a
+    member to come from, a rough estimate if not given; how: what to do where Newton fails.
     """
-    problem = problem_of(points)
     (nx, ny), m = problem.shape, len(points)
     state = np.moveaxis(np.empty((m, nx, 3, ny)), 0, -1)
     solved = SolvedMembers(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
     linearised = [] if start_from is None else [start_from]
     metric = parameter_metric(points, [one.slopes for one in linearised])
-    batch = _Batch(problem_of, problem, metric, tolerance, how)
+    batch = _Batch(problem, problem_of, metric, tolerance, how)
     found = clusters(metric.coordinates, CLUSTER_SIZE)
     central = [_central_member(metric.coordinates, cluster) for cluster in found]
     for cluster, first, following in zip(found, central, [*central[1:], None], strict=True):
@@ -143,13 +144,13 @@ def _reference_for(
     """A member as reference, kept in `solved`: its factors if the cluster before solved it, else reached from those
     linearised so far.
     """
-    point = batch.metric.points[member]
+    point, problem = batch.metric.points[member], take(batch.problem, np.array([member]))
     if solved.status[member] == SOLVED_BY_NEWTON:
-        return reference_at(batch.problem_of, point, solved.state[..., member : member + 1])
-    reference, spent = _reached_by_strides(batch, member, linearised)
+        return reference_at(batch.problem_of, problem, point, solved.state[..., member : member + 1])
+    reference, spent = _reached_by_strides(batch, problem, point, linearised)
     if reference is None:
         warm = _warm_start(batch.metric, member, solved, linearised)
-        reference = solve_reference(batch.problem_of, point, warm, batch.tolerance, batch.fall_back)
+        reference = solve_reference(batch.problem_of, problem, point, warm, batch.tolerance, batch.fall_back)
         spent += reference.iterations
     solved.iterations[member] += spent
     solved.status[member], solved.reason[member] = reference.status, reference.reason
@@ -205,22 +206,23 @@ def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedM
 
 
 def _reached_by_strides(
-    batch: _Batch, member: int, linearised: list[LinearisedMember]
+    batch: _Batch, problem: Problem, target: Array, linearised: list[LinearisedMember]
 ) -> tuple[ReferenceMember | None, int]:
-    """A reference far from all linearised so far, in strides that tangents reach, each with the factors of the last and
-    added to `linearised`, and iterations spent; none if it is near, or could not be reached.
+    """The reference at a point far from all linearised so far, in strides that tangents reach, each with the factors of
+    the last and added to `linearised`, and iterations spent; none if it is near, or could not be reached.
     """
-    metric, target, spent = batch.metric, batch.metric.points[member], 0
+    metric, spent = batch.metric, 0
     origin = _nearest_linearised(metric, target, linearised) if linearised else None
     if origin is None or _distance(metric, target, origin) <= STRIDE:
         return None, spent
-    reference = reference_at(batch.problem_of, origin.point, origin.state)
+    reference = reference_at(batch.problem_of, batch.problem_of(origin.point[None]), origin.point, origin.state)
     while reference.linearised is not None:
         here, distance = reference.linearised, _distance(metric, target, reference.linearised)
         last = distance <= STRIDE
         point = target if last else here.point + (target - here.point) * (STRIDE / distance)
         tolerance = batch.tolerance if last else max(batch.tolerance, STRIDE_TOLERANCE)
-        reference = reference_beside(batch.problem_of, point, reference, tolerance, batch.fall_back)
+        there = problem if last else batch.problem_of(point[None])
+        reference = reference_beside(batch.problem_of, there, point, reference, tolerance, batch.fall_back)
         spent += reference.iterations
         if reference.linearised is not None:
             if last:

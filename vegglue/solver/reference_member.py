@@ -63,42 +63,47 @@ def linearised_median(
     problem_of: ProblemOf, parameters: int, tolerance: float, how: FallBack
 ) -> LinearisedMember | None:
     """The member at the medians of all priors, for others to begin from; None if it has to be marched."""
-    return solve_reference(problem_of, np.full(parameters, 0.5), None, tolerance, how).linearised
+    point = np.full(parameters, 0.5)
+    return solve_reference(problem_of, problem_of(point[None]), point, None, tolerance, how).linearised
 
 
 def solve_reference(
-    problem_of: ProblemOf, point: Array, warm: Array | None, tolerance: float, how: FallBack
+    problem_of: ProblemOf, problem: Problem, point: Array, warm: Array | None, tolerance: float, how: FallBack
 ) -> ReferenceMember:
-    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
-    problem = problem_of(point[None])
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching.
+
+    problem: of the one member at the point.
+    """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
         solution, shared, band = settled(problem, start, tolerance)
         spent += int(solution.iterations[0])
         if shared is None:
             continue
-        return _reference(problem_of, point, problem, band, solution.state, shared, spent)
+        return _reference(problem_of, problem, point, band, solution.state, shared, spent)
     return _marched(problem, spent, tolerance, how)
 
 
-def reference_at(problem_of: ProblemOf, point: Array, state: Array) -> ReferenceMember:
+def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
     """A member already solved, its state (nx, 3, ny, 1), as a reference."""
-    return _reference_of(problem_of, point, problem_of(point[None]), state)
+    band = wet_band(problem, state)
+    near = rows_inside(state, band)
+    return _reference(problem_of, problem, point, band, near, factors(crop(problem, *band), near), 0)
 
 
 def reference_beside(
-    problem_of: ProblemOf, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
+    problem_of: ProblemOf, problem: Problem, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
 ) -> ReferenceMember:
     """A reference near another: with the factors of that one, if they reach, else on its own."""
     assert other.linearised is not None
     assert other.factors is not None
-    problem, start = problem_of(point[None]), other.linearised.predict(point[None])
+    start = other.linearised.predict(point[None])
     end = chord_in_band(problem, rows_inside(start, other.band), other.factors, other.band, tolerance)
     spent = int(end.iterations[0])
     if end.converged[0]:
         state = widen(end.state, problem.shape[1], other.band)
-        return replace(_reference_of(problem_of, point, problem, state), state=state, iterations=spent)
-    alone = solve_reference(problem_of, point, start, tolerance, how)
+        return replace(reference_at(problem_of, problem, point, state), state=state, iterations=spent)
+    alone = solve_reference(problem_of, problem, point, start, tolerance, how)
     return replace(alone, iterations=spent + alone.iterations)
 
 
@@ -154,16 +159,10 @@ def _checked(
     return solution, shared, band
 
 
-def _reference_of(problem_of: ProblemOf, point: Array, problem: Problem, state: Array) -> ReferenceMember:
-    band = wet_band(problem, state)
-    near = rows_inside(state, band)
-    return _reference(problem_of, point, problem, band, near, factors(crop(problem, *band), near), 0)
-
-
 def _reference(
     problem_of: ProblemOf,
-    point: Array,
     problem: Problem,
+    point: Array,
     band: tuple[int, int],
     state: Array,
     shared: Factors,
