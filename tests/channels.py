@@ -1,6 +1,6 @@
 """Channels that the verification tests share: small, with smooth walls."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -10,14 +10,12 @@ from vegglue.effects.library import library
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import LEVEL, InflowSegment, Problem, VegetatedCells, take
+from vegglue.flow.problem import LEVEL, BedFriction, Boundaries, InflowSegment, Problem, VegetatedCells, take
 from vegglue.resistance import bed_laws
+from vegglue.resistance.plant_laws import PLANT_LAWS
 from vegglue.solver.newton import newton
 
 GRAVITY = 9.81
-NO_PLANTS = VegetatedCells(
-    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((0, 1))
-)
 
 
 def centres(length: float, cells: int) -> Array:
@@ -33,23 +31,31 @@ def make_problem(
     **changes: object,
 ) -> Problem:
     """One friction class, inflow from the west by conveyance, outlet all along the east, a film of 0.1 mm."""
-    nx, ny = bed.shape
-    settings = {
-        "dx": cell[0],
-        "dy": cell[1],
-        "bed": np.ascontiguousarray(bed),
-        "friction_class": np.zeros((nx, ny), np.int64),
-        "law": np.array([friction[0]]),
-        "coefficient": np.array([[friction[1]]]),
-        "plants": NO_PLANTS,
-        "viscosity": np.zeros(1),
-        "inflows": (InflowSegment("west", 0, ny, np.array([discharge])),),
-        "outlet": np.ones(ny, bool),
-        "outlet_level": np.array([level]),
-        "film": 1e-4,
-        "log_argument_minimum": 1.3,
-    }
-    return Problem(**(settings | changes))
+    inflow = InflowSegment("west", 0, bed.shape[1], np.array([discharge]))
+    problem = Problem(
+        dx=cell[0],
+        dy=cell[1],
+        bed=np.ascontiguousarray(bed),
+        friction=BedFriction(
+            np.zeros(bed.shape, np.int64), np.array([friction[0]]), np.array([[friction[1]]]), log_argument_minimum=1.3
+        ),
+        plants=planted((0, 0), 0.0, 0.0, 0.0),
+        viscosity=np.zeros(1),
+        boundaries=Boundaries((inflow,), np.ones(bed.shape[1], bool), np.array([level])),
+        film=1e-4,
+        smallest_shear_depth=False,
+    )
+    return changed(problem, **changes)
+
+
+def changed(problem: Problem, **changes: object) -> Problem:
+    """A problem with other fields, be they its own, or those of its bed friction or its boundaries."""
+    for part in ("friction", "boundaries"):
+        own = {field.name for field in fields(getattr(problem, part))} & changes.keys()
+        if own:
+            other = replace(getattr(problem, part), **{name: changes.pop(name) for name in own})
+            problem = replace(problem, **{part: other})
+    return replace(problem, **changes)
 
 
 def sloping(length: float, cells: int, rows: int, slope: float) -> Array:
@@ -57,11 +63,30 @@ def sloping(length: float, cells: int, rows: int, slope: float) -> Array:
     return np.repeat(-slope * centres(length, cells)[:, None], rows, axis=1)
 
 
-def planted(shape: tuple[int, int], phi: float, canopy_height: float, bare_chezy: float) -> VegetatedCells:
+def planted(
+    shape: tuple[int, int],
+    phi: float,
+    canopy_height: float,
+    bare_chezy: float,
+    law: str = "baptist",
+    proportional: bool = False,
+) -> VegetatedCells:
     """Plants in every cell."""
-    column, row = (index.ravel() for index in np.indices(shape))
-    fields = [np.full((column.size, 1), value) for value in (phi, canopy_height, bare_chezy)]
-    return VegetatedCells(column, row, *fields)
+    return plants_at(*(index.ravel() for index in np.indices(shape)), phi, canopy_height, bare_chezy, law, proportional)
+
+
+def plants_at(
+    column: Array,
+    row: Array,
+    phi: float | Array,
+    canopy_height: float,
+    bare_chezy: float,
+    law: str = "baptist",
+    proportional: bool = False,
+) -> VegetatedCells:
+    """Plants in some cells; phi may differ between them, (cell, 1)."""
+    values = [value + np.zeros((column.size, 1)) for value in (phi, canopy_height, bare_chezy)]
+    return VegetatedCells(column, row, np.full(column.size, PLANT_LAWS.index(law)), *values, proportional)
 
 
 def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple[Array, Array]:
@@ -71,7 +96,7 @@ def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple
     return bed, np.repeat((np.abs(y) > 1.5).astype(np.int64)[None], cells[0], axis=0)
 
 
-def even_ground(bed: Array, banks: Array, cell: tuple[float, float]) -> ChannelGeometry:
+def even_geometry(bed: Array, banks: Array, cell: tuple[float, float]) -> ChannelGeometry:
     """What effects are told of the paper's section, y = 0 on its axis; nothing of plants."""
     nx, ny = bed.shape
     nothing = np.zeros((nx, ny, 1))
@@ -88,7 +113,7 @@ def mixed(problem: Problem, length: float, tolerance: float) -> tuple[Problem, A
     state = solved(problem, tolerance)
     for share in (0.4, 0.7, 1.0) if length else ():
         mixing = ActiveEffect(library()["mixing_length"], {"length": np.array([share * length])})
-        problem = replace(problem, acting=(mixing,))
+        problem = replace(problem, effects=(mixing,))
         solution = newton(problem, state, tolerance)
         assert solution.converged[0]
         state = solution.state
@@ -100,12 +125,11 @@ def river(cells: tuple[int, int] = (60, 24), film: float = 0.002, **changes: obj
     bed, banks = trapezoid(30.0, 4.5, cells)
     x, y = centres(30.0, cells[0]), centres(9.0, cells[1]) - 4.5
     column, row = np.nonzero(((x > 12.0) & (x < 16.0))[:, None] & ((y > 0.0) & (y < 1.5))[None])
-    one = np.ones((column.size, 1))
     settings = {
         "law": np.array([bed_laws.MANNING, bed_laws.KEULEGAN]),
         "coefficient": np.array([[0.06], [1.0]]),
         "friction_class": banks,
-        "plants": VegetatedCells(column, row, 4.0 * one, 0.7 * one, 60.0 * one),
+        "plants": plants_at(column, row, 4.0, 0.7, 60.0),
         "viscosity": np.array([0.01]),
         "film": film,
     }
@@ -142,10 +166,10 @@ def filled(problem: Problem, level: float) -> Array:
     return state
 
 
-def family(places: Array) -> Problem:
-    """The reach for members at places (m, 2) of a unit square: roughness of the floor, density of the plants."""
-    places = np.atleast_2d(places)
-    many = take(river(), np.zeros(len(places), dtype=np.int64))
-    coefficient = np.stack([0.03 + 0.06 * places[:, 0], np.full(len(places), 1.0)])
-    phi = many.plants.phi * 10.0 ** (places[:, 1] - 0.5)
-    return replace(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))
+def family(points: Array) -> Problem:
+    """The reach for members at points (m, 2) of a unit square: roughness of the floor, density of the plants."""
+    points = np.atleast_2d(points)
+    many = take(river(), np.zeros(len(points), dtype=np.int64))
+    coefficient = np.stack([0.03 + 0.06 * points[:, 0], np.full(len(points), 1.0)])
+    phi = many.plants.phi * 10.0 ** (points[:, 1] - 0.5)
+    return changed(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))

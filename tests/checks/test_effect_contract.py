@@ -82,7 +82,7 @@ def of_far(cells, strength):
 
 
 def northward(cells, strength):
-    return {"rate": cells.rate * np.exp(strength * cells.ground.offset)}
+    return {"rate": cells.rate * np.exp(strength * cells.geometry.offset)}
 
 
 def over_speed(cells, strength):

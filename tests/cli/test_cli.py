@@ -13,7 +13,7 @@ from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.cli.main import app
-from vegglue.solver.batch import NEIGHBOURHOOD
+from vegglue.solver.batch import CLUSTER_SIZE
 from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash
 
 pytestmark = pytest.mark.slow  # whole runs through the shell
@@ -117,7 +117,7 @@ def test_an_ensemble_without_measurements_can_be_simulated(
 ) -> None:
     config = write_reach(tmp_path, COARSE, (yaml_part("observations"), ""))
     monkeypatch.chdir(tmp_path)
-    several = 4 * NEIGHBOURHOOD + 1  # more than one chunk
+    several = 4 * CLUSTER_SIZE + 1  # more than one chunk
     assert said_to(monkeypatch, capsys, "simulate", config, "--members", several, "--jobs", 1) == (0, "")
     ensemble = read_ensemble(tmp_path / "runs/brook/ensemble.h5")
     assert ensemble.prediction.shape == (several, 0)

@@ -15,12 +15,12 @@ LINE = np.arange(-2.0, 3.0)
 
 def filled(kind, given, shape):
     """A noun with some fields given, 0 in all others, of one shape; numbers and parts of it as they are."""
-    kept = {name: given[name] for name in ("dx", "dy", "ground", "viscosity", "shear_depth") if name in given}
+    kept = {name: given[name] for name in ("dx", "dy", "geometry", "viscosity", "shear_depth") if name in given}
     names = [item.name for item in fields(kind) if item.name not in kept]
     return kept | {name: np.broadcast_to(np.asarray(given.get(name, 0.0), float), shape) for name in names}
 
 
-def ground(**given):
+def geometry(**given):
     return ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25} | given, (5, 5, 1)))
 
 
@@ -30,10 +30,10 @@ def cells(u=0.0, v=0.0, on=None, **given):
     u, v = (value(x, y) if callable(value) else value for value in (u, v))
     settings = {"depth": 0.8, "rate": 0.1, "bed_rate": 0.05, "u": u, "v": v, "viscosity": np.array([0.01])}
     settings["shear_depth"] = np.zeros((0, 0, 0))
-    return Cells(**filled(Cells, settings | {"ground": on or ground()} | given, (5, 5, 1)))
+    return Cells(**filled(Cells, settings | {"geometry": on or geometry()} | given, (5, 5, 1)))
 
 
-def stand(**given):
+def plant_cells(**given):
     return PlantCells(
         **filled(PlantCells, {"phi": 2.0, "canopy_height": 0.5, "depth": 0.8, "speed": 0.7} | given, (1, 1))
     )
@@ -55,7 +55,7 @@ def boundary():
         level=np.array([0.9]),
         spread=np.ones((2, 2, 1)),
         lateral=np.zeros(1),
-        place=np.array([[[-0.5], [0.5]], [[-0.5], [0.5]]]),
+        position=np.array([[[-0.5], [0.5]], [[-0.5], [0.5]]]),
     )
 
 
@@ -69,55 +69,55 @@ LE = 1.0 - (1.0 - 0.9 * 64.0 ** (-1 / 3)) / (1.0 + 64.0**-1.5 * 8.0)
 
 # name: (what it gets, amplitude and shapes, what it hands on in the middle)
 ROWS = {
-    "floor_level_error": (ground(bank=0.0), {"rise": 0.1}, {"bed": 0.1}),
-    "bank_level_error": (ground(bank=1.0), {"rise": 0.1}, {"bed": 0.1}),
+    "floor_level_error": (geometry(bank=0.0), {"rise": 0.1}, {"bed": 0.1}),
+    "bank_level_error": (geometry(bank=1.0), {"rise": 0.1}, {"bed": 0.1}),
     "bed_slope_error": (
-        ground(x=np.array([0.0, 2.0, 4.0, 6.0, 8.0])[:, None, None]),
+        geometry(x=np.array([0.0, 2.0, 4.0, 6.0, 8.0])[:, None, None]),
         {"slope": 0.01},
         {"bed": 0.01 * (8.0 - 4.0)},
     ),
-    "cross_slope_error": (ground(offset=0.5, half_width=3.0), {"slope": 0.02}, {"bed": 0.02 * 1.5}),
-    "flank_scour": (ground(edge=0.8), {"depth": 0.1, "width": 0.4}, {"bed": -0.1 * exp(-1.0)}),
-    "patch_deposit": (ground(planted=1.0), {"rise": 0.1}, {"bed": 0.1}),
-    "wake_deposit": (ground(wake=6.0), {"rise": 0.1, "length": 3.0}, {"bed": 0.1 * exp(-2.0)}),
+    "cross_slope_error": (geometry(offset=0.5, half_width=3.0), {"slope": 0.02}, {"bed": 0.02 * 1.5}),
+    "flank_scour": (geometry(edge=0.8), {"depth": 0.1, "width": 0.4}, {"bed": -0.1 * exp(-1.0)}),
+    "patch_deposit": (geometry(planted=1.0), {"rise": 0.1}, {"bed": 0.1}),
+    "wake_deposit": (geometry(wake=6.0), {"rise": 0.1, "length": 3.0}, {"bed": 0.1 * exp(-2.0)}),
     "discharge_error": (boundary(), {"relative_error": 0.1}, {"discharge": [[2.2], [1.1]]}),
     "inflow_skew": (boundary(), {"skew": 0.2}, {"spread": [[[0.9], [1.1]]] * 2}),
     "inflow_core": (boundary(), {"excess": 0.4}, {"spread": 1.0 + 0.2 * (1.0 - 0.75)}),
     "lateral_inflow": (boundary(), {"share": 0.1}, {"lateral": 0.3}),
     "outlet_level_error": (boundary(), {"rise": 0.05}, {"level": 0.95}),
-    "streamlining": (stand(), {"vogel_exponent": -1.0, "reference_speed": 0.35}, {"phi": 1.0}),
-    "canopy_height_error": (stand(), {"relative_error": 0.2}, {"phi": 2.4, "canopy_height": 0.6}),
-    "canopy_deflection": (stand(), {"rate": 1.0}, {"canopy_height": 0.5 * exp(-0.7)}),
+    "streamlining": (plant_cells(), {"vogel_exponent": -1.0, "reference_speed": 0.35}, {"phi": 1.0}),
+    "canopy_height_error": (plant_cells(), {"relative_error": 0.2}, {"phi": 2.4, "canopy_height": 0.6}),
+    "canopy_deflection": (plant_cells(), {"rate": 1.0}, {"canopy_height": 0.5 * exp(-0.7)}),
     "canopy_bending": (
-        stand(),
+        plant_cells(),
         {"share": 1.0, "cauchy": 16.0, "buoyancy": 0.0, "reference_speed": 0.35},
         {"phi": 2.0 * LE, "canopy_height": 0.5 * (1.0 - (1.0 - 64.0**-0.25) / (1.0 + 4.0 * 64.0**-0.6 + 8.0 / 4096.0))},
     ),
-    "undergrowth": (stand(depth=0.15), {"drag": 3.0, "height": 0.3}, {"phi": 2.0 + 1.5}),
+    "undergrowth": (plant_cells(depth=0.15), {"drag": 3.0, "height": 0.3}, {"phi": 2.0 + 1.5}),
     "foliage": (
-        stand(depth=0.25),
+        plant_cells(depth=0.25),
         {"drag": 3.0, "vogel_exponent": -1.0, "reference_speed": 0.35},
         {"phi": 2.0 + 3.0 * 0.5 * 0.5},
     ),
-    "emergent_part": (stand(depth=0.3), {"share": 0.5}, {"phi": 2.0 * (1.0 - 0.5 * 0.4)}),
-    "slow_stems": (stand(speed=0.1), {"share": 1.0, "diameter": 0.01}, {"phi": 2.0 * 1.1}),  # Re = 1000, C_D = 1.1
-    "debris_screen": (stand(front=0.5), {"excess": 2.0, "length": 0.5}, {"phi": 2.0 * (1.0 + 2.0 * exp(-1.0))}),
-    "density_trend": (stand(front=2.0), {"trend": 0.3, "length": 2.0}, {"phi": 2.0}),
-    "edge_thinning": (stand(edge=-0.3), {"share": 0.4, "width": 0.3}, {"phi": 2.0 * (1.0 - 0.4 * exp(-1.0))}),
+    "emergent_part": (plant_cells(depth=0.3), {"share": 0.5}, {"phi": 2.0 * (1.0 - 0.5 * 0.4)}),
+    "slow_stems": (plant_cells(speed=0.1), {"share": 1.0, "diameter": 0.01}, {"phi": 2.2}),  # Re = 1000, C_D = 1.1
+    "debris_screen": (plant_cells(front=0.5), {"excess": 2.0, "length": 0.5}, {"phi": 2.0 * (1.0 + 2.0 * exp(-1.0))}),
+    "density_trend": (plant_cells(front=2.0), {"trend": 0.3, "length": 2.0}, {"phi": 2.0}),
+    "edge_thinning": (plant_cells(edge=-0.3), {"share": 0.4, "width": 0.3}, {"phi": 2.0 * (1.0 - 0.4 * exp(-1.0))}),
     "depth_dependent_bank": (
-        cells(on=ground(bank=1.0)),
+        cells(on=geometry(bank=1.0)),
         {"exponent": -1.0, "reference_depth": 0.4},
         {"rate": 0.1 * 0.5},
     ),
     "depth_dependent_bed": (cells(), {"exponent": 2.0, "reference_depth": 0.4}, {"rate": 0.1 * 4.0}),
-    "bank_difference": (cells(on=ground(bank=1.0, offset=-1.3)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(-0.5)}),
-    "steep_bank": (cells(on=ground(side_slope=0.75)), {"share": 1.0}, {"rate": 0.1 * 1.25}),  # 3, 4, 5
+    "bank_difference": (cells(on=geometry(bank=1.0, offset=-1.3)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(-0.5)}),
+    "steep_bank": (cells(on=geometry(side_slope=0.75)), {"share": 1.0}, {"rate": 0.1 * 1.25}),  # 3, 4, 5
     "bank_vegetation": (
-        cells(on=ground(bank=1.0)),
+        cells(on=geometry(bank=1.0)),
         {"drag": 0.6, "height": 0.3},
         {"rate": 0.1 + 0.6 / (2.0 * 0.8)},
     ),
-    "stem_blockage": (cells(on=ground(planted=1.0)), {"share": 0.5}, {"rate": 0.4}),
+    "stem_blockage": (cells(on=geometry(planted=1.0)), {"share": 0.5}, {"rate": 0.4}),
     "viscosity": (cells(), {"added": 0.02}, {"viscosity": 0.02}),
     "elder": (cells(u=0.6), {"coefficient": 0.1}, {"viscosity": 0.1 * 0.8 * 0.2 * U}),  # u* = (0.05 0.8)^(1/2) U
     "smagorinsky": (
@@ -127,7 +127,7 @@ ROWS = {
     ),
     "mixing_length": (cells(u=shear), {"length": 0.5}, {"viscosity": 0.25 * 0.2}),
     "edge_mixing": (
-        cells(u=shear, on=ground(edge=-0.6)),
+        cells(u=shear, on=geometry(edge=-0.6)),
         {"coefficient": 0.2, "width": 0.6},
         {"viscosity": 0.2 * 0.36 * 0.2 * exp(-1.0)},
     ),
@@ -137,12 +137,12 @@ ROWS = {
         {"viscosity": 0.01 * 4.0 * 0.5 * 0.2},
     ),
     "wake_mixing": (
-        cells(u=0.6, on=ground(wake=5.0)),
+        cells(u=0.6, on=geometry(wake=5.0)),
         {"coefficient": 0.05, "length": 5.0},
         {"viscosity": 0.05 * exp(-1.0) * U},
     ),
     "secondary_current": (
-        cells(u=0.6, on=ground(offset=0.5)),
+        cells(u=0.6, on=geometry(offset=0.5)),
         {"strength": 0.02},
         {"xy": 0.02 * sin(pi / 2.0) * exp(-1.0 / 81.0) * 0.8 * 0.36},
     ),
@@ -163,7 +163,7 @@ ROWS = {
     ),
     "wind": (cells(), {"speed": -10.0}, {"x": -1.3e-3 * 1.2e-3 * 100.0 / 0.8}),
     "panel_current": (
-        cells(u=0.6, on=ground(bank=1.0)),
+        cells(u=0.6, on=geometry(bank=1.0)),
         {"strength": 0.1, "slope": 0.001, "bank_ratio": -1.0},
         {"x": 0.1 * 9.81 * 0.001 * 0.6 / U, "y": 0.0},
     ),
@@ -177,7 +177,7 @@ ROWS = {
     "gauge_datum": (gauge(), {"shift": 0.02}, {"value": 0.52}),
     "gauge_head": (gauge(u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),
     "unlisted_object": (
-        cells(on=ground(x=1.0, y=2.0)),
+        cells(on=geometry(x=1.0, y=2.0)),
         {"drag": 2.0, "x": 1.0, "y": 1.5, "radius": 0.5},
         {"rate": 0.1 + 2.0 * exp(-1.0)},
     ),

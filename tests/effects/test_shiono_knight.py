@@ -58,7 +58,7 @@ def developed(chezy, strength, ratio, flow, rows):
     y, shape = centres(WIDTH, rows), (COLUMNS, rows)
     bed = sloping(COLUMNS * SPACING, COLUMNS, rows, SLOPE)
     values = {"strength": strength, "slope": SLOPE, "bank_ratio": ratio}
-    acting = (
+    effects = (
         ActiveEffect(library()["elder"], {"coefficient": np.array([LAMBDA])}),
         ActiveEffect(library()["panel_current"], {name: np.array([value]) for name, value in values.items()}),
     )
@@ -70,8 +70,8 @@ def developed(chezy, strength, ratio, flow, rows):
         friction_class=np.broadcast_to((y > 0.5 * WIDTH).astype(np.int64), shape).copy(),
         law=np.array([bed_laws.CHEZY, bed_laws.CHEZY]),
         coefficient=np.array(chezy)[:, None],
-        acting=acting,
-        ground=panels(bed, rows),
+        effects=effects,
+        geometry=panels(bed, rows),
         film=1e-5,
     )
     state = solved(problem)

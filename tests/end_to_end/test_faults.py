@@ -19,6 +19,7 @@ from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.errors import StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
+from vegglue.solver.status import SOLVED_BY_NEWTON
 from vegglue.storage.result_files import read_ensemble
 
 # So many that a run is still on its way when it is stopped, on a busy machine too: some second.
@@ -107,7 +108,7 @@ def test_the_numbers_do_not_depend_on_the_number_of_jobs(tmp_path: Path, uninter
     vegglue(tmp_path, "simulate", several_chunks(tmp_path).name, "--jobs", 2)
     ensemble = read_ensemble(tmp_path / ENSEMBLE)
     assert_same_numbers(ensemble, uninterrupted)
-    assert (ensemble.status == 0).all()
+    assert (ensemble.status == SOLVED_BY_NEWTON).all()
     assert len(np.unique(ensemble.prediction[:, 0])) == CHUNKS * CHUNK
 
 
@@ -246,7 +247,7 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
     again = []
     solve_ensemble(case, observations, path, 1, again.append)
     assert (again[0].resumed, again[-1].solved) == (CHUNK, CHUNKS * CHUNK)
-    assert (read_ensemble(path).status == 0).all()
+    assert (read_ensemble(path).status == SOLVED_BY_NEWTON).all()
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from reach import COARSE, said_to, write_reach
 from stored import HASH, MEMBERS, X, Y
 
 from vegglue.case.config import load_case
+from vegglue.case.parameter_space import sample_at
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.checks.case_check import check_case
@@ -139,7 +140,7 @@ def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.M
         return replace(solved, status=np.where(np.arange(len(solved.status)) == 1, FAILED, solved.status))
 
     monkeypatch.setattr("vegglue.ensemble.solve_ensemble.solve_members", fail_second)
-    rows = solve_chunk(case, build_site(case), read_observations(case), np.full((3, 2), 0.4))
+    rows = solve_chunk(case, build_site(case), read_observations(case), sample_at(case, np.full((3, 2), 0.4)))
     assert [bool(np.isfinite(fields).any()) for fields in rows["fields"]] == [True, False, True]
 
 

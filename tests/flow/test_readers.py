@@ -78,7 +78,7 @@ def test_discharge_is_what_passes_the_nearest_face(flowing) -> None:
 def test_weights_are_the_derivative_of_the_reading(flowing, kind: str, lifted: bool) -> None:
     problem, state, grid = flowing
     if lifted:
-        problem = replace(problem, lift=0.05 * np.cos(np.arange(24))[None, :, None] * np.ones((30, 1, 1)))
+        problem = replace(problem, bed_rise=0.05 * np.cos(np.arange(24))[None, :, None] * np.ones((30, 1, 1)))
     direction = np.random.default_rng(3).standard_normal((*state.shape[:3], 8))
     direction[:, ACROSS, 0] = 0.0
     weights = reading_weights(problem, state, grid, stations(kind))
@@ -109,8 +109,8 @@ def shown(flowing, name: str, **values: float) -> dict[str, np.ndarray]:
     """What an effect adds to the readings of each kind."""
     problem, state, grid = flowing
     effect = ActiveEffect(library()[name], {key: np.array([value]) for key, value in values.items()})
-    acting = replace(problem, acting=(effect,))
-    return {kind: read((acting, state, grid), kind) - read(flowing, kind) for kind in KINDS}
+    changed = replace(problem, effects=(effect,))
+    return {kind: read((changed, state, grid), kind) - read(flowing, kind) for kind in KINDS}
 
 
 def test_a_gain_acts_on_velocities_of_every_direction(flowing) -> None:

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from channels import even_ground, make_problem, mixed, river, trapezoid
+from channels import changed, even_geometry, make_problem, mixed, river, trapezoid
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.effects.surroundings import weighted_across
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
@@ -51,7 +51,7 @@ def channel(smallest: bool, length: float) -> Problem:
     cell = (problem.dx, problem.dy)
     _, banks = trapezoid(30.0, 4.5, problem.shape)
     mixing = ActiveEffect(library()["mixing_length"], {"length": np.array([length])})
-    return replace(problem, acting=(mixing,), ground=even_ground(problem.bed, banks, cell))
+    return replace(problem, effects=(mixing,), geometry=even_geometry(problem.bed, banks, cell))
 
 
 def test_land_raises_no_viscosity() -> None:
@@ -65,7 +65,7 @@ def test_land_raises_no_viscosity() -> None:
         state[:, ALONG, :, 0] = wet
         depth = faces(problem, state).cell
         edge = wet & ~np.roll(wet, 1, axis=1)
-        found[smallest] = float(closed(problem, state, depth)[1][..., 0][edge].mean())
+        found[smallest] = float(closures(problem, state, depth).viscosity[..., 0][edge].mean())
     assert found[False] > 0.1
     assert found[True] < 0.02
 
@@ -75,11 +75,11 @@ def test_tangent_equals_difference_of_solved_states() -> None:
 
     def with_discharge(factor: float) -> Problem:
         problem = channel(True, 0.3)
-        inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.inflows)
-        return replace(problem, inflows=inflows)
+        inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.boundaries.inflows)
+        return changed(problem, inflows=inflows)
 
     step = 1e-4
-    bare = replace(channel(True, 0.3), acting=())
+    bare = replace(channel(True, 0.3), effects=())
     problem, state = mixed(bare, 0.3, 1e-10)
     assert np.abs(state - mixed(replace(bare, smallest_shear_depth=False), 0.3, 1e-10)[1]).max() > 1e-3
     more, less = with_discharge(1.0 + step), with_discharge(1.0 - step)

@@ -4,7 +4,8 @@ import numpy as np
 from channels import river, solved
 
 from vegglue.flow import thin_water
-from vegglue.flow.equations import eased, faces, residual, slope_of_friction
+from vegglue.flow.chord_equations import eased, slope_of_friction
+from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ACROSS, ALONG
 
 

@@ -12,7 +12,6 @@ from vegglue.case.site_schema import Stand
 from vegglue.checks.trial_channel import CHANNEL
 from vegglue.flow.closures import drag
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import VegetatedCells
 from vegglue.flow.problem_setup import build_problem
 from vegglue.resistance.plant_laws import PLANT_LAWS
 from vegglue.site.gridded_site import build_site
@@ -23,16 +22,8 @@ G, KARMAN, BARE = 9.81, 0.41, 60.0
 def of_law(law, phi, height, depth, bare=BARE, proportional=False):
     """C [m^1/2/s] that the solver uses."""
     shape = (4, 4)
-    plants = planted(shape, phi, height, bare)
-    plants = VegetatedCells(
-        plants.column,
-        plants.row,
-        plants.phi,
-        plants.canopy_height,
-        plants.bare_chezy,
-        np.full(16, PLANT_LAWS.index(law)),
-    )
-    problem = make_problem(np.zeros(shape), (1.0, 1.0), 1.0, 1.0, plants=plants, phi_proportional=proportional)
+    plants = planted(shape, phi, height, bare, law, proportional)
+    problem = make_problem(np.zeros(shape), (1.0, 1.0), 1.0, 1.0, plants=plants)
     rate = drag(problem, np.full((*shape, 1), depth))
     assert np.ptp(rate) == 0.0
     return math.sqrt(G / (float(rate[0, 0, 0]) * depth))
@@ -150,15 +141,7 @@ def test_uniform_flow_over_plants_has_the_speed_of_the_law(law):
     """u = C (h S)^(1/2), 0.9 m of water over plants of 0.5 m."""
     slope, shape = 1e-3, (20, 3)
     chezy = of_law(law, 2.0, 0.5, 0.9)
-    plants = planted(shape, 2.0, 0.5, BARE)
-    plants = VegetatedCells(
-        plants.column,
-        plants.row,
-        plants.phi,
-        plants.canopy_height,
-        plants.bare_chezy,
-        np.full(60, PLANT_LAWS.index(law)),
-    )
+    plants = planted(shape, 2.0, 0.5, BARE, law)
     speed = chezy * math.sqrt(0.9 * slope)
     bed = sloping(40.0, 20, 3, slope)
     problem = make_problem(bed, (2.0, 1.0), speed * 0.9 * 3.0, 0.9 - slope * 40.0, plants=plants, film=1e-5)

@@ -10,17 +10,17 @@ from channels import family
 from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.case.parameter_space import parameters_at, unit_points
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import parameters_at, sample_at
+from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, begin_and_chunks, solve_chunk, solve_ensemble
+from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.site.gridded_site import Site, build_site
-from vegglue.solver.batch import NEIGHBOURHOOD, blend, solve_members
+from vegglue.solver.batch import CLUSTER_SIZE, blend, solve_members
 from vegglue.solver.chord import ChordSolution, stream
-from vegglue.solver.parameter_metric import axes, leaves
+from vegglue.solver.parameter_metric import clusters, principal_axes
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.storage.result_files import read_ensemble
 
@@ -30,7 +30,7 @@ OUTLET = (
     ("level: 0.95", "level: outlet"),
     ("  phi: {dist", "  outlet: {distribution: uniform, low: -3, high: 1, unit: m}\n  phi: {dist"),
 )
-EMPTIED, FILLED = 0.02, 0.98  # places in the prior of the outlet level
+EMPTIED, FILLED = 0.02, 0.98  # points of the prior of the outlet level
 
 Reach = tuple[Case, Site, Observations]
 
@@ -40,32 +40,32 @@ def reach_at(folder: Path, *changes: tuple[str, str]) -> Reach:
     return case, build_site(case), read_observations(case)
 
 
-def places_of(case: Case, members: int) -> np.ndarray:
-    return unit_points(case, sample_prior(case.parameters, members, case.simulate.seed))
+def points_of(case: Case, members: int) -> np.ndarray:
+    return sobol_points(len(case.parameters), members, case.simulate.seed)
 
 
 @pytest.mark.parametrize("members", [1, 2, 15, 16, 17, 100, 1000, 5000])
-@pytest.mark.parametrize("size", [NEIGHBOURHOOD, CHUNK])
-def test_leaves_hold_every_member_once_and_evenly(members: int, size: int) -> None:
-    cut = leaves(np.random.default_rng(members).random((members, 3)), size)
+@pytest.mark.parametrize("size", [CLUSTER_SIZE, CHUNK])
+def test_clusters_hold_every_member_once_and_evenly(members: int, size: int) -> None:
+    cut = clusters(np.random.default_rng(members).random((members, 3)), size)
     np.testing.assert_array_equal(np.sort(np.concatenate(cut)), np.arange(members))
-    sizes = [leaf.size for leaf in cut]
+    sizes = [cluster.size for cluster in cut]
     assert max(sizes) <= size
     assert len(cut) == -(-members // size)
     assert max(sizes) - min(sizes) <= max(2, 0.2 * size)
 
 
-def test_leaves_cope_with_members_at_one_place() -> None:
-    cut = leaves(np.full((50, 3), 0.5), NEIGHBOURHOOD)
+def test_clusters_cope_with_members_at_one_place() -> None:
+    cut = clusters(np.full((50, 3), 0.5), CLUSTER_SIZE)
     np.testing.assert_array_equal(np.sort(np.concatenate(cut)), np.arange(50))
 
 
-def test_leaves_are_neighbours_and_follow_each_other() -> None:
-    places = np.random.default_rng(5).random((128 * NEIGHBOURHOOD, 3))
-    cut = leaves(places, NEIGHBOURHOOD)
-    widths = np.array([np.ptp(places[leaf], axis=0) for leaf in cut])
-    assert widths.max() <= 0.35, "128 leaves of a cube: about a fifth of the prior each way"
-    centres = np.array([places[leaf].mean(axis=0) for leaf in cut])
+def test_clusters_are_neighbours_and_follow_each_other() -> None:
+    points = np.random.default_rng(5).random((128 * CLUSTER_SIZE, 3))
+    cut = clusters(points, CLUSTER_SIZE)
+    widths = np.array([np.ptp(points[cluster], axis=0) for cluster in cut])
+    assert widths.max() <= 0.35, "128 clusters of a cube: about a fifth of the prior each way"
+    centres = np.array([points[cluster].mean(axis=0) for cluster in cut])
     steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
     assert np.median(steps) < 0.35, "at random it would be 0.66"
 
@@ -74,13 +74,13 @@ def test_members_lie_apart_as_their_flows_differ() -> None:
     """Along the direction that changes flows most the axis is longest; what changes nothing still has one."""
     change = np.random.default_rng(6).standard_normal((50, 3))
     both = 1.6 * change[:, 0] + 0.1 * change[:, 1]
-    found = axes([(both, 0.5 * both, np.zeros(50))], 3)
+    found = principal_axes([(both, 0.5 * both, np.zeros(50))], 3)
     lengths = np.sort(np.linalg.norm(found, axis=0))
     assert lengths[-1] == pytest.approx(1.0, abs=0.01)
     assert lengths[:2] == pytest.approx(0.1, abs=0.01)
     longest = found[:, np.linalg.norm(found, axis=0).argmax()]
     assert longest == pytest.approx(np.array([1.0, 0.5, 0.0]) / np.hypot(1.0, 0.5), abs=0.01)
-    assert (axes([], 3) == np.eye(3)).all()
+    assert (principal_axes([], 3) == np.eye(3)).all()
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -90,14 +90,14 @@ def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: p
     handed: list[np.ndarray] = []
 
     def record(*given: Any) -> Iterator[Any]:
-        _, _, _, places, chunks, todo, _, _ = given
-        handed.extend(places[chunks[index]] for index in todo)
+        _, _, _, sample, chunks, todo, _, _ = given
+        handed.extend(sample.points[chunks[index]] for index in todo)
         return iter(())
 
     monkeypatch.setattr("vegglue.ensemble.solve_ensemble._solve_all", record)
     solve_ensemble(case, observations, tmp_path / "ensemble.h5", jobs, lambda progress: None)
-    places = places_of(case, 5 * CHUNK)
-    expected = [places[leaf] for leaf in begin_and_chunks(case, site, places)[1]]
+    points = points_of(case, 5 * CHUNK)
+    expected = [points[cluster] for cluster in starts_and_chunks(case, site, points)[1]]
     assert len(handed) == 5
     for ours, theirs in zip(handed, expected, strict=True):
         np.testing.assert_array_equal(ours, theirs)
@@ -105,15 +105,15 @@ def test_chunks_are_cut_before_the_jobs_are_known(tmp_path: Path, monkeypatch: p
 
 @pytest.mark.slow
 def test_company_does_not_change_a_member(tmp_path: Path) -> None:
-    """Two leaves together against each member alone: below 1e-6 m/s and m, and as small as the tolerance asks for."""
+    """Two clusters together against each member alone: below 1e-6 m/s and m, and as small as the tolerance asks for."""
     case, site, observations = reach_at(tmp_path)
-    places = places_of(case, 2 * NEIGHBOURHOOD)
+    points = points_of(case, 2 * CLUSTER_SIZE)
     largest = {}
     for tolerance in (1e-7, 1e-9):
         numerics = case.numerics.model_copy(update={"tolerance": tolerance})
         asked = case.model_copy(update={"numerics": numerics})
-        together = solve_chunk(asked, site, observations, places)
-        alone = [solve_chunk(asked, site, observations, place[None]) for place in places]
+        together = solve_chunk(asked, site, observations, sample_at(asked, points))
+        alone = [solve_chunk(asked, site, observations, sample_at(asked, point[None])) for point in points]
         apart = np.concatenate([rows["prediction"] for rows in alone])
         largest[tolerance] = np.abs(together["prediction"] - apart).max()
         assert (together["status"] == SOLVED_BY_NEWTON).all()
@@ -125,8 +125,9 @@ def test_a_member_solved_from_far_away_is_the_same(tmp_path: Path) -> None:
     """The corner of the prior reached from its other end, and asked for alone."""
     case, site, observations = reach_at(tmp_path)
     ends = np.array([[0.02, 0.02], [0.98, 0.98]])
-    both = solve_chunk(case, site, observations, ends)["prediction"]
-    alone = np.concatenate([solve_chunk(case, site, observations, end[None])["prediction"] for end in ends])
+    both = solve_chunk(case, site, observations, sample_at(case, ends))["prediction"]
+    each = [solve_chunk(case, site, observations, sample_at(case, end[None])) for end in ends]
+    alone = np.concatenate([rows["prediction"] for rows in each])
     np.testing.assert_allclose(both, alone, atol=1e-5, rtol=0)
     assert np.abs(both[0] - both[1]).max() > 0.1
 
@@ -134,18 +135,31 @@ def test_a_member_solved_from_far_away_is_the_same(tmp_path: Path) -> None:
 def test_a_member_without_steady_state_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
     case, site, observations = reach_at(tmp_path, *OUTLET)
     column = list(case.parameters).index("outlet")
-    places = places_of(case, 6)
-    places[:, column] = FILLED
-    places[2, column] = EMPTIED
-    rows = solve_chunk(case, site, observations, places)
+    points = points_of(case, 6)
+    points[:, column] = FILLED
+    points[2, column] = EMPTIED
+    rows = solve_chunk(case, site, observations, sample_at(case, points))
     failed = np.arange(6) == 2
     np.testing.assert_array_equal(rows["status"] == FAILED, failed)
     np.testing.assert_array_equal(np.isnan(rows["prediction"]).all(axis=1), failed)
     assert rows["reason"][2].startswith("June: no steady state: ")
     assert (rows["reason"][~failed] == "").all()
     assert rows["mass_error"][~failed].max() < 1e-5
-    without = solve_chunk(case, site, observations, places[~failed])
+    without = solve_chunk(case, site, observations, sample_at(case, points[~failed]))
     np.testing.assert_allclose(rows["prediction"][~failed], without["prediction"], atol=1e-5, rtol=0)
+
+
+def test_a_case_says_how_long_to_march(tmp_path: Path) -> None:
+    """Step and span reach the march, and a case that sets neither keeps its hash."""
+    case, site, observations = reach_at(tmp_path, *OUTLET)
+    assert not {"march_step", "march_span"} & case.numerics.model_dump(exclude_none=True).keys()
+    short = case.numerics.model_copy(update={"march_step": 0.01, "march_span": 0.08})
+    case = case.model_copy(update={"numerics": short})
+    points = np.full((1, 3), 0.5)
+    points[:, list(case.parameters).index("outlet")] = EMPTIED
+    rows = solve_chunk(case, site, observations, sample_at(case, points))
+    assert rows["status"][0] == FAILED
+    assert rows["reason"][0].endswith(("after 0.08 s", "of marching"))
 
 
 def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path) -> None:
@@ -164,28 +178,29 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     assert posterior.sample.failed == failed.sum()
     assert (posterior.sample.weights[failed] == 0).all()
     assert posterior.sample.weights.sum() == pytest.approx(1.0)
-    assert parameters_at(case, places_of(case, 8))["outlet"] == pytest.approx(ensemble.parameters["outlet"])
+    np.testing.assert_array_equal(parameters_at(case, points_of(case, 8))["outlet"], ensemble.parameters["outlet"])
 
 
 def test_nobody_solved_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor the head of the next leaf, which comes with this one, when stragglers get centres of their own."""
+    """Nor the central member of the next cluster, which comes with this one, when stragglers become references."""
     done: set[int] = set()
 
     def watched(problem: Problem, queue: np.ndarray, *others: Any) -> None:
         *between, deliver = others
         assert not done.intersection(queue.tolist())
 
-        def note(members: np.ndarray, ended: ChordSolution) -> None:
+        def keep(members: np.ndarray, ended: ChordSolution) -> None:
             done.update(members[ended.converged].tolist())
             deliver(members, ended)
 
-        stream(problem, queue, *between, note)
+        stream(problem, queue, *between, keep)
 
     monkeypatch.setattr("vegglue.solver.batch.stream", watched)
     monkeypatch.setattr("vegglue.solver.batch.MOST_CHORD_STEPS", 5)
-    solved = solve_members(family, np.random.default_rng(1).random((2 * NEIGHBOURHOOD, 2)), 1e-6)
+    points = np.random.default_rng(1).random((2 * CLUSTER_SIZE, 2))
+    solved = solve_members(family(points), points, family, 1e-6)
     assert (solved.status == SOLVED_BY_NEWTON).all()
-    assert len(done) < 2 * NEIGHBOURHOOD - 2, "some were centres besides the heads"
+    assert len(done) < 2 * CLUSTER_SIZE - 2, "some were references besides the central members"
 
 
 def test_starts_are_weighted_sums_of_solved_states_in_the_rows_of_a_band() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, river
+from channels import centres, changed, river
 
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
@@ -21,9 +21,9 @@ STEP = 1e-5
 
 def with_manning(factor):
     problem = river()
-    coefficient = problem.coefficient.copy()
+    coefficient = problem.friction.coefficient.copy()
     coefficient[0] *= factor
-    return replace(problem, coefficient=coefficient)
+    return changed(problem, coefficient=coefficient)
 
 
 def with_phi(factor):
@@ -33,12 +33,13 @@ def with_phi(factor):
 
 def with_discharge(factor):
     problem = river()
-    return replace(problem, inflows=tuple(replace(i, discharge=i.discharge * factor) for i in problem.inflows))
+    inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.boundaries.inflows)
+    return changed(problem, inflows=inflows)
 
 
 def with_level(factor):
     problem = river()
-    return replace(problem, outlet_level=problem.outlet_level * factor)
+    return changed(problem, outlet_level=problem.boundaries.outlet_level * factor)
 
 
 CAUSES = (with_manning, with_phi, with_discharge, with_level)

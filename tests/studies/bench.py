@@ -12,9 +12,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
-from vegglue.case.parameter_space import parameters_at, unit_points
-from vegglue.case.prior import sample_prior
-from vegglue.ensemble.solve_ensemble import begin_and_chunks, begin_at, solve_chunk, solve_ensemble
+from vegglue.case.parameter_space import parameters_at, sobol_sample
+from vegglue.case.prior import sample_prior, sobol_points
+from vegglue.ensemble.solve_ensemble import linearised_medians, solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import crop
@@ -23,20 +23,20 @@ from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 from vegglue.solver.batch import solve_members
 from vegglue.solver.march import advance, march
-from vegglue.solver.parameter_metric import leaves, parameter_metric
+from vegglue.solver.parameter_metric import clusters, parameter_metric
 from vegglue.solver.reference_member import settled
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
 from vegglue.solver.wet_band import rows_inside
 from vegglue.storage.result_files import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {
-    "flow.eased": "residual of chord steps",
+    "chord_equations.eased": "residual of chord steps",
     "jacobian.jacobian": "Jacobian, its residuals included",
-    "blocks.factor": "factorisation",
-    "blocks.solve": "back-substitution",
+    "block_elimination.factor": "factorisation",
+    "block_elimination.solve": "back-substitution",
     "anderson.next_state": "Anderson mixing",
-    "neighbourhood._starts": "starts from solved neighbours",
+    "batch._starts": "starts from solved neighbours",
 }
 PAPER_STEPS = 6000
 SAMPLE = 128
@@ -73,32 +73,31 @@ def marching(case) -> float:  # type: ignore[no-untyped-def]
 
 
 def ensemble(case):  # type: ignore[no-untyped-def]
-    """Site, measurements and the places of all members."""
-    places = unit_points(case, sample_prior(case.parameters, case.simulate.members, case.simulate.seed))
-    return build_site(case), read_observations(case), places
+    """Site, measurements and all members."""
+    return build_site(case), read_observations(case), sobol_sample(case)
 
 
 def steady(case) -> float:  # type: ignore[no-untyped-def]
     """Seconds a member on one core, in a chunk of the 5,000-member ensemble."""
-    site, observations, places = ensemble(case)
-    begin, chunks = begin_and_chunks(case, site, places)
-    chunk = places[chunks[7]]
-    solve_chunk(case, site, observations, chunk[:2], begin)
+    site, observations, sample = ensemble(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    chunk = sample.take(chunks[7])
+    solve_chunk(case, site, observations, chunk.take(np.arange(2)), start_from)
     profile = cProfile.Profile()
     began = time.perf_counter()
-    rows = profile.runcall(solve_chunk, case, site, observations, chunk, begin)
+    rows = profile.runcall(solve_chunk, case, site, observations, chunk, start_from)
     seconds = time.perf_counter() - began
     print(
-        f"steady, 1142 x 40 cells: {len(chunk) / seconds:.1f} members/s on one core, "
+        f"steady, 1142 x 40 cells: {len(chunk.points) / seconds:.1f} members/s on one core, "
         f"{np.median(rows['iterations']):.0f} iterations a member, mass error {np.nanmax(rows['mass_error']):.0e}, "
-        f"{int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed"
+        f"{members_with(rows['status'], SOLVED_BY_MARCHING)} marched, {members_with(rows['status'], FAILED)} failed"
     )
     found = pstats.Stats(profile).stats.items()  # type: ignore[attr-defined]
     calls = {f"{Path(file).stem}.{name}": (value[1], value[3]) for (file, _, name), value in found}
     for name, words in PHASES.items():
         count, spent = calls[name]
         print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
-    return seconds / len(chunk)
+    return seconds / len(chunk.points)
 
 
 def sizes(case) -> None:  # type: ignore[no-untyped-def]
@@ -127,18 +126,19 @@ def on_grid(case, x: tuple[float, float], cell: tuple[float, float]):  # type: i
 
 def timed(case) -> tuple[int, float]:  # type: ignore[no-untyped-def]
     """Cells, and seconds a member on one core."""
-    site, observations, places = ensemble(case)
-    begin = begin_at(case, site)
-    slopes = [known.slopes for known in begin.values() if known is not None]
-    around = [places[leaf] for leaf in leaves(parameter_metric(places, slopes).spots, SAMPLE)]
-    chunk = min(around, key=lambda some: np.linalg.norm(some.mean(axis=0) - 0.5))
-    solve_chunk(case, site, observations, chunk[:2], begin)
+    site, observations, sample = ensemble(case)
+    start_from = linearised_medians(case, site)
+    slopes = [one.slopes for one in start_from.values() if one is not None]
+    around = [sample.take(some) for some in clusters(parameter_metric(sample.points, slopes).coordinates, SAMPLE)]
+    chunk = min(around, key=lambda some: np.linalg.norm(some.points.mean(axis=0) - 0.5))
+    solve_chunk(case, site, observations, chunk.take(np.arange(2)), start_from)
     began = time.perf_counter()
-    rows = solve_chunk(case, site, observations, chunk, begin)
+    rows = solve_chunk(case, site, observations, chunk, start_from)
     seconds = time.perf_counter() - began
-    if (rows["status"] != 0).any():
-        print(f"  {int((rows['status'] == 1).sum())} marched, {int((rows['status'] == 2).sum())} failed")
-    return site.bed.size, seconds / len(chunk)
+    if (rows["status"] != SOLVED_BY_NEWTON).any():
+        marched, failed = (members_with(rows["status"], number) for number in (SOLVED_BY_MARCHING, FAILED))
+        print(f"  {marched} marched, {failed} failed")
+    return site.bed.size, seconds / len(chunk.points)
 
 
 def whole(case) -> None:  # type: ignore[no-untyped-def]
@@ -151,7 +151,7 @@ def whole(case) -> None:  # type: ignore[no-untyped-def]
     print(
         f"{found.status.size:,} members on {nx} x {ny} cells, all cores: {seconds:.0f} s, "
         f"{found.iterations.mean():.1f} steps a member, mass error {np.nanmax(found.mass_error):.0e}, "
-        f"{int((found.status == SOLVED_BY_MARCHING).sum())} marched, {int((found.status == FAILED).sum())} failed"
+        f"{members_with(found.status, SOLVED_BY_MARCHING)} marched, {members_with(found.status, FAILED)} failed"
     )
 
 
@@ -159,13 +159,13 @@ def same(case) -> None:  # type: ignore[no-untyped-def]
     """64 members spread over the priors: by chord steps in an ensemble, by Newton alone, and marched."""
     short = on_grid(case, (300.0, 471.0), (0.5, 0.375))
     site = build_site(short)
-    places = unit_points(short, sample_prior(short.parameters, 64, 1))
+    points = sobol_points(len(short.parameters), 64, 1)
 
     def build(some):  # type: ignore[no-untyped-def]
         return build_problem(short, site, "D3a", parameters_at(short, some))
 
-    solved = solve_members(build, places, 1e-8)
-    tasks = [(build(place[None]), solved.state[..., i : i + 1]) for i, place in enumerate(places)]
+    solved = solve_members(build(points), points, build, 1e-8)
+    tasks = [(build(point[None]), solved.state[..., i : i + 1]) for i, point in enumerate(points)]
     found = Parallel(n_jobs=-1)(delayed(three_ways)(*task) for task in tasks)
     apart, left, minutes = (np.array(each) for each in zip(*found, strict=True))
     print(
@@ -192,15 +192,15 @@ def three_ways(problem, start):  # type: ignore[no-untyped-def]
 
 def cores(case) -> None:  # type: ignore[no-untyped-def]
     """Speed-up from one to two processes over the same two chunks of the 5,000-member ensemble."""
-    site, observations, places = ensemble(case)
-    begin, chunks = begin_and_chunks(case, site, places)
+    site, observations, sample = ensemble(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
     chunks = chunks[8:10]
     members, spent = sum(chunk.size for chunk in chunks), []
     for jobs in (1, 2):
         with Parallel(n_jobs=jobs) as pool:
-            pool(delayed(solve_chunk)(case, site, observations, places[chunk[:2]], begin) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, sample.take(chunk[:2]), start_from) for chunk in chunks)
             began = time.perf_counter()
-            pool(delayed(solve_chunk)(case, site, observations, places[chunk], begin) for chunk in chunks)
+            pool(delayed(solve_chunk)(case, site, observations, sample.take(chunk), start_from) for chunk in chunks)
             spent.append(time.perf_counter() - began)
     gain = spent[0] / spent[1]
     print(f"{members} members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two: {gain:.2f} times faster")

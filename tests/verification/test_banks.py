@@ -7,7 +7,7 @@ The reference solves this on 1,900 cells whose outermost ends at the waterline.
 
 import numpy as np
 import pytest
-from channels import GRAVITY, centres, even_ground, make_problem, mixed, trapezoid
+from channels import GRAVITY, centres, even_geometry, make_problem, mixed, trapezoid
 from scipy.linalg import solve_banded
 
 from vegglue.arrays import Array
@@ -54,7 +54,7 @@ def developed(viscosity: float, length: float, flow: float, rows: int, smallest:
         viscosity=np.array([viscosity]),
         film=0.01,
         smallest_shear_depth=smallest,
-        ground=even_ground(bed, banks, (LENGTH / COLUMNS, 9.0 / rows)),
+        geometry=even_geometry(bed, banks, (LENGTH / COLUMNS, 9.0 / rows)),
     )
     found, i = faces(*mixed(problem, length, 1e-6)), COLUMNS // 2
     u = np.interp(STATIONS, y, found.u[i, :, 0])

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, even_ground, make_problem, mixed, solved, trapezoid
+from channels import centres, even_geometry, make_problem, mixed, plants_at, solved, trapezoid
 
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import LEVEL, VegetatedCells
+from vegglue.flow.problem import LEVEL
 from vegglue.flow.sensor import read_sensors
 from vegglue.resistance import bed_laws
 from vegglue.site.grid import Grid
@@ -47,7 +47,7 @@ def with_the_truth(folder, finer, smallest):
     bed, banks = trapezoid(100.0, 4.5, cells)
     column, row, number = patch_cells(grid.x, grid.y, place["patches"])
     stems = np.array([patch["stems_per_m2"] for patch in place["patches"]])[number][:, None]
-    plants = VegetatedCells(column, row, truth["phi"] * stems / 22.0, 0.0 * stems + truth["hd"], 0.0 * stems + 60.0)
+    plants = plants_at(column, row, truth["phi"] * stems / 22.0, truth["hd"], 60.0)
     changes = {
         "law": np.array([bed_laws.MANNING, bed_laws.KEULEGAN]),
         "coefficient": np.array([[truth["nb"]], [truth["ks"]]]),
@@ -56,7 +56,7 @@ def with_the_truth(folder, finer, smallest):
         "viscosity": np.array([truth["nu"]]),
         "film": 0.002,
         "smallest_shear_depth": smallest,
-        "ground": even_ground(bed, banks, size),
+        "geometry": even_geometry(bed, banks, size),
     }
     problem = make_problem(bed, size, run["discharge_m3_s"], run["downstream_level_m"], **changes)
     return grid, *mixed(problem, answer["settings"].get("mixk", 0.0), 1e-8)
@@ -118,11 +118,10 @@ def papers_channel(case, switched):
         classes[column, row] = 2
         changes = {"law": np.zeros(3, np.int64), "coefficient": np.array([[0.10], [0.12], [0.40]])}
     else:
-        one = np.ones((column.size, 1))
         changes = {
             "law": np.array([bed_laws.MANNING, bed_laws.KEULEGAN]),
             "coefficient": np.array([[0.10], [2.7]]),
-            "plants": VegetatedCells(column, row, 40.0 * one, 0.8 * one, 60.0 * one),
+            "plants": plants_at(column, row, 40.0, 0.8, 60.0),
         }
     changes |= {"friction_class": classes, "viscosity": np.array([0.01]), "film": 0.002}
     if switched:

@@ -1,10 +1,8 @@
 """The residual against the differential operator on smooth flow, and what the film does where there is none."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from channels import GRAVITY, filled, make_problem, order, shown
+from channels import GRAVITY, changed, filled, make_problem, order, shown
 
 from vegglue.flow.equations import faces, residual, storage
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
@@ -205,7 +203,7 @@ def test_film_is_not_carried(above, share):
     """Of u du/dx the film keeps nothing and water everything: h^4 / (h^4 + (2 f)^4), 1e-4 off at 20 f."""
     film = 0.001
     problem = make_problem(np.zeros((12, 4)), (1.0, 1.0), 0.0, above, (bed_laws.CHEZY, 1e9), film=film)
-    problem = replace(problem, inflows=())
+    problem = changed(problem, inflows=())
     state = filled(problem, above)
     state[:, ALONG] = (1.0 + 0.1 * np.arange(12))[:, None, None]
     kept = residual(problem, state)[3:-3, ALONG] / (0.1 * state[3:-3, ALONG])

@@ -36,7 +36,7 @@ def classes(law, value):
 
 
 def plants(phi, height, bare=60.0, proportional=False):
-    return {"plants": planted((COLUMNS, ROWS), phi, height, bare), "phi_proportional": proportional}
+    return {"plants": planted((COLUMNS, ROWS), phi, height, bare, proportional=proportional)}
 
 
 # name: (depth [m], Chezy coefficient [m^1/2/s], what makes the problem)
@@ -140,7 +140,7 @@ def test_emergent_conventions_differ_below_the_canopy_only():
     """phi kept (the printed equation) against phi h / h_d: the resistance ratio is h / h_d for dense plants."""
     bare = 1e6
     kept, _ = uniform(1.0, 50.0, plants(3.0, 0.8, bare))
-    scaled = replace(kept, phi_proportional=True)
+    scaled = replace(kept, plants=replace(kept.plants, proportional=True))
     shape = (COLUMNS, ROWS, 1)
     for depth, ratio in ((0.2, 0.25), (0.6, 0.75), (0.8, 1.0), (1.5, 1.0)):
         cells = np.full(shape, depth)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import GRAVITY, centres, discharge, family, make_problem, river, sloping, solved
+from channels import GRAVITY, centres, changed, discharge, family, make_problem, planted, river, sloping, solved
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -19,7 +19,8 @@ from vegglue.site.grid import Grid
 from vegglue.solver.batch import solve_members
 from vegglue.solver.chord import chord
 from vegglue.solver.jacobian import factors, jacobian
-from vegglue.solver.march import march, settle
+from vegglue.solver.march import USUAL_FALL_BACK, march, march_to_rest
+from vegglue.solver.status import SOLVED_BY_NEWTON
 
 CHANCE = np.random.default_rng(3)
 
@@ -34,10 +35,10 @@ def disturbed(state, size):
 def flipped(problem):
     """The problem seen in a mirror along its axis."""
     rows = problem.shape[1]
-    return replace(
+    return changed(
         problem,
         bed=np.ascontiguousarray(problem.bed[:, ::-1]),
-        friction_class=np.ascontiguousarray(problem.friction_class[:, ::-1]),
+        friction_class=np.ascontiguousarray(problem.friction.friction_class[:, ::-1]),
         plants=replace(problem.plants, row=rows - 1 - problem.plants.row),
     )
 
@@ -64,8 +65,7 @@ def test_mirrored_channel_has_the_mirrored_flow():
 
 
 def test_a_symmetric_channel_has_a_symmetric_flow():
-    none = replace(river().plants, column=np.zeros(0, np.int64), row=np.zeros(0, np.int64))
-    problem = river(plants=replace(none, **{name: np.zeros((0, 1)) for name in ("phi", "canopy_height", "bare_chezy")}))
+    problem = river(plants=planted((0, 0), 0.0, 0.0, 0.0))
     state = solved(problem)
     assert np.abs(state - mirrored(state)).max() < 1e-10
 
@@ -81,7 +81,7 @@ def test_marched_is_newtons():
 
 def test_settle_is_newtons():
     problem = river()
-    settled = settle(problem, backwater(problem), 1e-10)
+    settled = march_to_rest(problem, backwater(problem), 1e-10, USUAL_FALL_BACK)
     assert settled.steady
     assert settled.sentence == ""
     assert settled.state == pytest.approx(solved(problem), abs=1e-9)
@@ -96,8 +96,8 @@ def test_the_step_of_time_does_not_matter():
 
 def test_a_member_alone_is_the_member_in_a_batch():
     """Residual, marching and chord steps, to round-off."""
-    places = np.random.default_rng(2).random((7, 2))
-    batch = family(places)
+    points = np.random.default_rng(2).random((7, 2))
+    batch = family(points)
     centre = solved(take(batch, np.array([0])))
     start = np.repeat(centre, 7, axis=3)
     shared = factors(take(batch, np.array([0])), centre)
@@ -114,17 +114,17 @@ def test_members_do_not_depend_on_their_company():
 
     Members are solved in the band of rows that may be wet, without what the film carries beyond (measured 1e-6 m/s).
     """
-    places = np.random.default_rng(4).random((36, 2))
+    points = np.random.default_rng(4).random((36, 2))
     chosen = np.array([1, 17, 35])
-    everyone, few = solve_members(family, places, 1e-7), solve_members(family, places[chosen], 1e-7)
-    assert (everyone.status == 0).all()
-    assert np.abs(discharge(family(places), everyone.state) / 2.0 - 1.0).max() < 1e-6
-    company = np.abs(everyone.state[..., chosen] - few.state).max()
+    together, few = (solve_members(family(some), some, family, 1e-7) for some in (points, points[chosen]))
+    assert (together.status == SOLVED_BY_NEWTON).all()
+    assert np.abs(discharge(family(points), together.state) / 2.0 - 1.0).max() < 1e-6
+    company = np.abs(together.state[..., chosen] - few.state).max()
     print(f"in company - alone: {company:.1e}")
     assert company < 2e-7
-    for member, place in enumerate(places[chosen]):
-        exact = solved(family(place))[..., 0]
-        wet = exact[:, LEVEL] > family(place).bed
+    for member, point in enumerate(points[chosen]):
+        exact = solved(family(point))[..., 0]
+        wet = exact[:, LEVEL] > family(point).bed
         difference = np.abs(few.state[..., member] - exact)
         print(f"from Newton: {difference[:, LEVEL][wet].max():.1e} m, {difference[:, ALONG][wet].max():.1e} m/s")
         assert difference[:, LEVEL][wet].max() < 5e-6
@@ -204,7 +204,7 @@ def test_jacobian_is_the_derivative_of_the_residual():
     """In deep water with currents both ways across: every row."""
     bed = 0.05 * np.sin(np.arange(20))[:, None] * np.cos(np.arange(8))[None]
     problem = make_problem(bed, (0.5, 0.4), 2.0, 1.0, (bed_laws.MANNING, 0.05), viscosity=np.array([0.02]))
-    problem = replace(problem, inflows=(replace(problem.inflows[0], by_conveyance=False),))
+    problem = changed(problem, inflows=(replace(problem.boundaries.inflows[0], by_conveyance=False),))
     worst = compare_jacobian(problem, disturbed(solved(problem), 0.01))
     print(f"J against differences, deep water: {worst.max():.1e} of the row's size")
     assert worst.max() < 5e-5
@@ -356,7 +356,7 @@ def test_water_shoots_over_a_sill(height):
 
 def test_marching_settles_over_a_sill_too():
     problem = weir(0.2)
-    settled = settle(problem, backwater(problem), 1e-9)
+    settled = march_to_rest(problem, backwater(problem), 1e-9, USUAL_FALL_BACK)
     assert settled.steady
     assert settled.state == pytest.approx(solved(problem, 1e-9), abs=1e-7)
 
@@ -365,7 +365,7 @@ def test_what_cannot_be_solved_says_so():
     """A free fall of 0.4 m from a step: no steady state is claimed, and a sentence says what happened."""
     x = centres(30.0, 60)
     problem = over(0.4 * (x < 15.0) - 0.002 * x)
-    settled = settle(problem, backwater(problem), 1e-8)
+    settled = march_to_rest(problem, backwater(problem), 1e-8, USUAL_FALL_BACK)
     assert settled.steady or "of marching" in settled.sentence or "still changing" in settled.sentence
     if settled.steady:
         assert discharge(problem, settled.state) == pytest.approx(3.0, rel=1e-6)

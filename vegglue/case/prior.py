@@ -46,17 +46,22 @@ def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
-    """x_ij = F_j^-1(s_ij) with s the scrambled Sobol' sequence; one array (members,) per parameter [unit of the prior].
-
-    The first members of a longer sample are the same, because the sequence is drawn up to the next power of two.
-    Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
-    """
+    """x_ij = F_j^-1(s_ij) with s the `sobol_points`; one array (members,) per parameter [unit of the prior]."""
     if not parameters:
         return {}
-    sequence = scipy.stats.qmc.Sobol(len(parameters), scramble=True, seed=seed)
-    points = sequence.random_base2(math.ceil(math.log2(members)))[:members]
-    points = np.clip(points, SMALLEST_PROBABILITY, 1.0 - SMALLEST_PROBABILITY)
+    points = sobol_points(len(parameters), members, seed)
     return {name: quantile(prior, points[:, j]) for j, (name, prior) in enumerate(parameters.items())}
+
+
+def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64]:
+    """s_ij, the first points of the scrambled Sobol' sequence in the unit cube, (members, parameters) [-].
+
+    The first points of a longer sequence are the same, because it is drawn up to the next power of two.
+    Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
+    """
+    sequence = scipy.stats.qmc.Sobol(parameters, scramble=True, seed=seed)
+    points = sequence.random_base2(math.ceil(math.log2(members)))[:members]
+    return np.clip(points, SMALLEST_PROBABILITY, 1.0 - SMALLEST_PROBABILITY)
 
 
 def log_prior(parameters: Mapping[str, Parameter], theta: Mapping[str, ArrayLike]) -> NDArray[np.float64]:

@@ -96,6 +96,12 @@ class Numerics(Part):
     shear_depth: Literal["smallest"] | None = Field(
         default=None, description="shear over the smallest depth of the cells around a point; else over its own"
     )
+    march_step: Positive | None = Field(
+        default=None, description="step of marching where Newton fails, 0.5 when left out [s]"
+    )
+    march_span: Positive | None = Field(
+        default=None, description="flow time after which a marched member has failed, 2400 when left out [s]"
+    )
     tolerance: Positive = Field(
         default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
     )

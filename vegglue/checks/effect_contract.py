@@ -15,7 +15,7 @@ from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
 from vegglue.flow.backwater import backwater
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import Problem, crop, take
 from vegglue.solver.newton import newton
@@ -91,15 +91,15 @@ def _never_pushes(tried: Trial) -> Iterator[str]:
     problem = tried.problem(*sizes(tried.effect))
     for state_of in (at_rest, moving_water, dry):
         state = state_of(problem)
-        rate, viscosity, _ = closed(problem, state, faces(problem, state).cell)
-        if (rate < 0.0).any():
+        closed = closures(problem, state, faces(problem, state).cell)
+        if (closed.rate < 0.0).any():
             yield f"the friction rate falls below 0 in {_name(state_of)} water: drag would push"
-        if (viscosity < 0.0).any():
+        if (closed.viscosity < 0.0).any():
             yield f"the viscosity falls below 0 in {_name(state_of)} water"
     for name, values in _standing(problem).items():
         if (values <= 0.0).any():
             yield f"{name} does not stay above 0"
-    if any((inflow.discharge <= 0.0).any() or (inflow.spread <= 0.0).any() for inflow in problem.inflows):
+    if any((inflow.discharge <= 0.0).any() or (inflow.spread <= 0.0).any() for inflow in problem.boundaries.inflows):
         yield "an inflow does not stay above 0 everywhere"
 
 
@@ -107,10 +107,10 @@ def _standing(problem: Problem) -> dict[str, Array]:
     """phi and canopy height of plants in 0.3 m of water from slow to fast."""
     speed = np.geomspace(0.001, 3.0, 40)[:, None] * np.ones(problem.members)
     one = np.ones_like(speed)
-    stand = PlantCells(
+    plants = PlantCells(
         2.0 * one, 0.5 * one, 0.3 * one, speed, one[:, :1], -0.1 * one[:, :1], one[:, :1], 0.0 * one[:, :1]
     )
-    return applied(problem.acting, "plants", stand, {"phi": stand.phi, "canopy_height": stand.canopy_height})
+    return applied(problem.effects, "plants", plants, {"phi": plants.phi, "canopy_height": plants.canopy_height})
 
 
 def _mirrors(tried: Trial) -> Iterator[str]:

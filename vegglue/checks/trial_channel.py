@@ -76,7 +76,7 @@ def trial(effect: Effect, own: Path | None = None) -> Trial:
 def at_rest(problem: Problem) -> Array:
     """Still water at the level of the outlet, for every member."""
     state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
-    state[:, LEVEL] = problem.outlet_level
+    state[:, LEVEL] = problem.boundaries.outlet_level
     return state
 
 

@@ -13,6 +13,7 @@ from vegglue.report_page.posterior_words import describe
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import check
 from vegglue.workflow.extend import StepwiseExtension
 from vegglue.workflow.infer import Method, infer
@@ -103,7 +104,8 @@ def show(case: Case, runs: Path, result: Any) -> None:
 
 def _solved(ensemble: Ensemble) -> str:
     status = ensemble.status
+    marched, failed = (members_with(status, number) for number in (SOLVED_BY_MARCHING, FAILED))
     return (
-        f"{len(status):,} members, {int((status == 1).sum())} by marching, {int((status == 2).sum())} failed, "
-        f"largest mass error {ensemble.mass_error[status != 2].max(initial=0.0):.1e}"
+        f"{len(status):,} members, {marched} by marching, {failed} failed, "
+        f"largest mass error {ensemble.mass_error[status != FAILED].max(initial=0.0):.1e}"
     )

@@ -76,9 +76,9 @@ def _cell(points: Array, centres: Array, step: float) -> np.ndarray:
     return np.clip(np.rint((points - centres[0]) / step), 0, centres.size - 1).astype(np.int64)
 
 
-def _zone(ground: ChannelGeometry, i: int, j: int) -> str:
-    if abs(ground.edge[i, j, 0]) < AT_EDGE * ground.half_width[i, j, 0]:
+def _zone(geometry: ChannelGeometry, i: int, j: int) -> str:
+    if abs(geometry.edge[i, j, 0]) < AT_EDGE * geometry.half_width[i, j, 0]:
         return "edge"
-    if ground.planted[i, j, 0]:
+    if geometry.planted[i, j, 0]:
         return "plants"
-    return "bank" if ground.bank[i, j, 0] else "floor"
+    return "bank" if geometry.bank[i, j, 0] else "floor"

@@ -29,7 +29,7 @@ class ActiveEffect:
 
 
 def applied(
-    acting: tuple[ActiveEffect, ...], stage: Stage, stand: Any, neutral: Mapping[str, Array]
+    effects: tuple[ActiveEffect, ...], stage: Stage, surroundings: Any, neutral: Mapping[str, Array]
 ) -> dict[str, Array]:
     """What a stage hands on after all effects that act there, in the order of the case.
 
@@ -37,18 +37,18 @@ def applied(
     """
     added = ADDED.get(stage, ())
     now = dict(neutral)
-    for one in acting:
-        on = one.on
-        if one.effect.stage != stage or not on.any():
+    for active in effects:
+        on = active.on
+        if active.effect.stage != stage or not on.any():
             continue
-        change = one.effect.act(stand, **one.values)
+        change = active.effect.act(surroundings, **active.values)
         for name, value in change.items():
             if name in added:
                 now[name] = now[name] + _chosen(on, value, np.zeros(1))
             else:
                 now[name] = _chosen(on, value, now[name])
         if not added:
-            stand = replace(stand, **{name: now[name] for name in change})
+            surroundings = replace(surroundings, **{name: now[name] for name in change})
     return now
 
 

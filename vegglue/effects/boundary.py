@@ -12,12 +12,12 @@ def discharge_error(boundary: BoundaryValues, relative_error: Array) -> dict[str
 
 def inflow_skew(boundary: BoundaryValues, skew: Array) -> dict[str, Array]:
     """q -> q (1 + a s), s = -1 .. 1 across each inflow."""
-    return {"spread": boundary.spread * (1.0 + skew * boundary.place)}
+    return {"spread": boundary.spread * (1.0 + skew * boundary.position)}
 
 
 def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
     """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow."""
-    return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.place**2) / 2.0)}
+    return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.position**2) / 2.0)}
 
 
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:

@@ -1,11 +1,11 @@
 """What a physical effect is: a small pure function of the flow at cell centres, declared beside its parameters.
 
-Each effect acts at one stage. Its function gets what stands there and its parameters, (m,) each, and returns what it
-changes, by name:
+Each effect acts at one stage. Its function gets what is to be seen there (`surroundings`) and its parameters, (m,)
+each, and returns what it changes, by name:
 
-    site        act(ground, ...)    -> {"bed"}                                   added to the bed level [m]
+    site        act(geometry, ...)  -> {"bed"}                                   added to the bed level [m]
     boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}        takes their place
-    plants      act(stand, ...)     -> {"phi", "canopy_height"}                           takes their place
+    plants      act(plants, ...)    -> {"phi", "canopy_height"}                           takes their place
     resistance  act(cells, ...)     -> {"rate"}                                           takes its place [1/m]
     exchange    act(cells, ...)     -> {"viscosity"} [m2/s], {"xx", "xy", "yy"} [m3/s2]   added
     force       act(cells, ...)     -> {"x", "y"}                                         added [m/s2]

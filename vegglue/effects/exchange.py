@@ -21,7 +21,7 @@ def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
 def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
     """nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)."""
     strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
-    return {"viscosity": coefficient**2 * cells.ground.dx * cells.ground.dy * np.sqrt(strain)}
+    return {"viscosity": coefficient**2 * cells.geometry.dx * cells.geometry.dy * np.sqrt(strain)}
 
 
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
@@ -33,7 +33,7 @@ def edge_mixing(cells: Cells, coefficient: Array, width: Array) -> dict[str, Arr
     """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch: d |du/dy| is the difference
     of speed across the layer.
     """
-    band = np.exp(-((cells.ground.edge / width) ** 2))
+    band = np.exp(-((cells.geometry.edge / width) ** 2))
     return {"viscosity": coefficient * width**2 * band * np.abs(cells.u_y)}
 
 
@@ -45,12 +45,12 @@ def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_dep
 
 def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
     """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end."""
-    return {"viscosity": coefficient * np.exp(-cells.ground.wake / length) * cells.speed}
+    return {"viscosity": coefficient * np.exp(-cells.geometry.wake / length) * cells.speed}
 
 
 def secondary_current(cells: Cells, strength: Array) -> dict[str, Array]:
     """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width."""
-    eta = cells.ground.offset
+    eta = cells.geometry.offset
     return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / 1.5) ** 4))) * cells.depth * cells.u**2}
 
 

@@ -5,9 +5,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
-from vegglue.resistance.physical_constants import GRAVITY
-
-AIR_OVER_WATER = 1.2e-3
+from vegglue.resistance.physical_constants import AIR_OVER_WATER, GRAVITY
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
@@ -18,7 +16,7 @@ def wind(cells: Cells, speed: Array) -> dict[str, Array]:
 
 def panel_current(cells: Cells, strength: Array, slope: Array, bank_ratio: Array) -> dict[str, Array]:
     """f = -k g S u / |U| on the floor, r times that on the banks; nothing at rest."""
-    bank = cells.ground.bank
+    bank = cells.geometry.bank
     held = -strength * GRAVITY * slope * (1.0 - bank + bank_ratio * bank) / cells.speed
     return {"x": held * cells.u, "y": held * cells.v}
 

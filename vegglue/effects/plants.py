@@ -5,23 +5,22 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import PlantCells
+from vegglue.resistance.physical_constants import WATER_VISCOSITY
 
-WATER_VISCOSITY = 1e-6
 
-
-def streamlining(stand: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
+def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
     """phi -> phi (|U| / U_0)^chi, |U| at least 0.02 m/s."""
-    return {"phi": stand.phi * (np.maximum(stand.speed, 0.02) / reference_speed) ** vogel_exponent}
+    return {"phi": plants.phi * (np.maximum(plants.speed, 0.02) / reference_speed) ** vogel_exponent}
 
 
-def canopy_height_error(stand: PlantCells, relative_error: Array) -> dict[str, Array]:
+def canopy_height_error(plants: PlantCells, relative_error: Array) -> dict[str, Array]:
     """h_d -> h_d (1 + e), phi in proportion."""
-    return {"phi": stand.phi * (1.0 + relative_error), "canopy_height": stand.canopy_height * (1.0 + relative_error)}
+    return {"phi": plants.phi * (1.0 + relative_error), "canopy_height": plants.canopy_height * (1.0 + relative_error)}
 
 
-def canopy_deflection(stand: PlantCells, rate: Array) -> dict[str, Array]:
+def canopy_deflection(plants: PlantCells, rate: Array) -> dict[str, Array]:
     """h_d -> h_d exp(-k |U|)."""
-    return {"canopy_height": stand.canopy_height * np.exp(-rate * stand.speed)}
+    return {"canopy_height": plants.canopy_height * np.exp(-rate * plants.speed)}
 
 
 def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
@@ -39,51 +38,51 @@ def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
 
 
 def canopy_bending(
-    stand: PlantCells, share: Array, cauchy: Array, buoyancy: Array, reference_speed: Array
+    plants: PlantCells, share: Array, cauchy: Array, buoyancy: Array, reference_speed: Array
 ) -> dict[str, Array]:
     """phi -> phi (1 - s (1 - l_e/l)), h_d -> h_d (1 - s (1 - h/l)) with Ca = Ca_0 (|U| / U_0)^2."""
-    length, height = bent_blade(cauchy * (stand.speed / reference_speed) ** 2, buoyancy)
+    length, height = bent_blade(cauchy * (plants.speed / reference_speed) ** 2, buoyancy)
     return {
-        "phi": stand.phi * (1.0 - share * (1.0 - length)),
-        "canopy_height": stand.canopy_height * (1.0 - share * (1.0 - height)),
+        "phi": plants.phi * (1.0 - share * (1.0 - length)),
+        "canopy_height": plants.canopy_height * (1.0 - share * (1.0 - height)),
     }
 
 
-def undergrowth(stand: PlantCells, drag: Array, height: Array) -> dict[str, Array]:
+def undergrowth(plants: PlantCells, drag: Array, height: Array) -> dict[str, Array]:
     """phi + phi_u min(h / h_u, 1)."""
-    return {"phi": stand.phi + drag * np.minimum(stand.depth / height, 1.0)}
+    return {"phi": plants.phi + drag * np.minimum(plants.depth / height, 1.0)}
 
 
-def foliage(stand: PlantCells, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
+def foliage(plants: PlantCells, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
     """phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.02 m/s."""
-    bent = (np.maximum(stand.speed, 0.02) / reference_speed) ** vogel_exponent
-    return {"phi": stand.phi + drag * bent * np.minimum(stand.depth / stand.canopy_height, 1.0)}
+    bent = (np.maximum(plants.speed, 0.02) / reference_speed) ** vogel_exponent
+    return {"phi": plants.phi + drag * bent * np.minimum(plants.depth / plants.canopy_height, 1.0)}
 
 
-def emergent_part(stand: PlantCells, share: Array) -> dict[str, Array]:
+def emergent_part(plants: PlantCells, share: Array) -> dict[str, Array]:
     """phi -> phi (1 - s (1 - min(h / h_d, 1)))."""
-    return {"phi": stand.phi * (1.0 - share * (1.0 - np.minimum(stand.depth / stand.canopy_height, 1.0)))}
+    return {"phi": plants.phi * (1.0 - share * (1.0 - np.minimum(plants.depth / plants.canopy_height, 1.0)))}
 
 
-def slow_stems(stand: PlantCells, share: Array, diameter: Array) -> dict[str, Array]:
+def slow_stems(plants: PlantCells, share: Array, diameter: Array) -> dict[str, Array]:
     """phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D / nu at least 20."""
-    reynolds = np.maximum(stand.speed * diameter / WATER_VISCOSITY, 20.0)
-    return {"phi": stand.phi * (1.0 + share * 10.0 * reynolds ** (-2 / 3))}
+    reynolds = np.maximum(plants.speed * diameter / WATER_VISCOSITY, 20.0)
+    return {"phi": plants.phi * (1.0 + share * 10.0 * reynolds ** (-2 / 3))}
 
 
-def debris_screen(stand: PlantCells, excess: Array, length: Array) -> dict[str, Array]:
+def debris_screen(plants: PlantCells, excess: Array, length: Array) -> dict[str, Array]:
     """phi -> phi (1 + a exp(-f / L)), f the distance from the front of the patch."""
-    return {"phi": stand.phi * (1.0 + excess * np.exp(-stand.front / length))}
+    return {"phi": plants.phi * (1.0 + excess * np.exp(-plants.front / length))}
 
 
-def density_trend(stand: PlantCells, trend: Array, length: Array) -> dict[str, Array]:
+def density_trend(plants: PlantCells, trend: Array, length: Array) -> dict[str, Array]:
     """phi -> phi (1 + a tanh(f / L - 1)), f the distance from the front of the patch."""
-    return {"phi": stand.phi * (1.0 + trend * np.tanh(stand.front / length - 1.0))}
+    return {"phi": plants.phi * (1.0 + trend * np.tanh(plants.front / length - 1.0))}
 
 
-def edge_thinning(stand: PlantCells, share: Array, width: Array) -> dict[str, Array]:
+def edge_thinning(plants: PlantCells, share: Array, width: Array) -> dict[str, Array]:
     """phi -> phi (1 - a exp(-e / w)), e the distance inward from the sides of the patch."""
-    return {"phi": stand.phi * (1.0 - share * np.exp(np.minimum(stand.edge, 0.0) / width))}
+    return {"phi": plants.phi * (1.0 - share * np.exp(np.minimum(plants.edge, 0.0) / width))}
 
 
 REFERENCE_SPEED = Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.35, 0.05, 2.0)

@@ -10,35 +10,35 @@ from vegglue.effects.surroundings import Cells
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
     """k -> k (h / h_0)^e on the banks."""
     depth = cells.depth.clip(0.02)
-    return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.ground.bank)}
+    return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.bank)}
 
 
 def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
     """k -> k (h / h_0)^e on the floor where no plants stand."""
-    open_floor = (1.0 - cells.ground.bank) * (1.0 - cells.ground.planted)
+    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
     return {"rate": cells.rate * (cells.depth.clip(0.02) / reference_depth) ** (exponent * open_floor)}
 
 
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
     """k -> k exp(+-a / 2) on the banks, + on that of larger y."""
-    return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.ground.bank * np.sign(cells.ground.offset))}
+    return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.bank * np.sign(cells.geometry.offset))}
 
 
 def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
     """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|."""
-    longer = np.sqrt(1.0 + cells.ground.side_slope**2) - 1.0
+    longer = np.sqrt(1.0 + cells.geometry.side_slope**2) - 1.0
     return {"rate": cells.rate * (1.0 + share * longer)}
 
 
 def bank_vegetation(cells: Cells, drag: Array, height: Array) -> dict[str, Array]:
     """k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
     standing = np.minimum(1.0 / height, 1.0 / cells.depth)
-    return {"rate": cells.rate + 0.5 * drag * standing * cells.ground.bank}
+    return {"rate": cells.rate + 0.5 * drag * standing * cells.geometry.bank}
 
 
 def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
     """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s)."""
-    return {"rate": cells.rate * (1.0 - share * cells.ground.planted) ** -2.0}
+    return {"rate": cells.rate * (1.0 - share * cells.geometry.planted) ** -2.0}
 
 
 REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0)

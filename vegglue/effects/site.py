@@ -7,40 +7,40 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import ChannelGeometry
 
 
-def floor_level(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
+def floor_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz on the floor."""
-    return {"bed": rise * (1.0 - ground.bank)}
+    return {"bed": rise * (1.0 - geometry.bank)}
 
 
-def bank_level(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
+def bank_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz on the banks."""
-    return {"bed": rise * ground.bank}
+    return {"bed": rise * geometry.bank}
 
 
-def bed_slope(ground: ChannelGeometry, slope: Array) -> dict[str, Array]:
+def bed_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
     """z_b + s (x_end - x): the bed at the outlet stays."""
-    return {"bed": slope * (ground.x[-1] - ground.x) * np.ones_like(ground.bed)}
+    return {"bed": slope * (geometry.x[-1] - geometry.x) * np.ones_like(geometry.bed)}
 
 
-def cross_slope(ground: ChannelGeometry, slope: Array) -> dict[str, Array]:
+def cross_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
     """z_b + s (y - y_axis)."""
-    return {"bed": slope * ground.offset * ground.half_width}
+    return {"bed": slope * geometry.offset * geometry.half_width}
 
 
-def flank_scour(ground: ChannelGeometry, depth: Array, width: Array) -> dict[str, Array]:
+def flank_scour(geometry: ChannelGeometry, depth: Array, width: Array) -> dict[str, Array]:
     """z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them."""
-    beside = np.where(np.isfinite(ground.edge), ground.edge, -1e3)
+    beside = np.where(np.isfinite(geometry.edge), geometry.edge, -1e3)
     return {"bed": np.where(beside > 0.0, -depth * np.exp(-(((beside - width) / width) ** 2)), 0.0)}
 
 
-def patch_deposit(ground: ChannelGeometry, rise: Array) -> dict[str, Array]:
+def patch_deposit(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
     """z_b + dz where plants stand."""
-    return {"bed": rise * ground.planted}
+    return {"bed": rise * geometry.planted}
 
 
-def wake_deposit(ground: ChannelGeometry, rise: Array, length: Array) -> dict[str, Array]:
+def wake_deposit(geometry: ChannelGeometry, rise: Array, length: Array) -> dict[str, Array]:
     """z_b + dz exp(-s / L) behind a patch, s the distance from its end."""
-    return {"bed": rise * np.exp(-ground.wake / length)}
+    return {"bed": rise * np.exp(-geometry.wake / length)}
 
 
 FOLLETT = "Follett and Nepf (2012), shape assumed"

@@ -41,7 +41,7 @@ class Cells:
     either side, (nx, ny - 1, m) [m], the smaller depth of the two cells, or empty.
     """
 
-    ground: ChannelGeometry
+    geometry: ChannelGeometry
     depth: Array
     level: Array
     u: Array
@@ -63,21 +63,21 @@ class Cells:
 
     @property
     def u_x(self) -> Array:
-        return along(self.u, self.ground.dx)
+        return along(self.u, self.geometry.dx)
 
     @property
     def u_y(self) -> Array:
         if self.shear_depth.size:
-            return weighted_across(self.u, self.shear_depth, self.ground.dy)
-        return across(self.u, self.ground.dy)
+            return weighted_across(self.u, self.shear_depth, self.geometry.dy)
+        return across(self.u, self.geometry.dy)
 
     @property
     def v_x(self) -> Array:
-        return along(self.v, self.ground.dx)
+        return along(self.v, self.geometry.dx)
 
     @property
     def v_y(self) -> Array:
-        return across(self.v, self.ground.dy)
+        return across(self.v, self.geometry.dy)
 
 
 @dataclass(frozen=True)
@@ -99,15 +99,15 @@ class PlantCells:
 @dataclass(frozen=True)
 class BoundaryValues:
     """What enters and leaves: discharge of each inflow and member (inflow, m) [m3/s], outlet level (m,) [m], relative
-    spread across the inflows (inflow, cell, m) [-], lateral inflow along the reach (m,) [m3/s]; place: -1 .. 1 across
-    each inflow (inflow, cell, 1).
+    spread across the inflows (inflow, cell, m) [-], lateral inflow along the channel (m,) [m3/s]; position:
+    -1 .. 1 across each inflow (inflow, cell, 1).
     """
 
     discharge: Array
     level: Array
     spread: Array
     lateral: Array
-    place: Array
+    position: Array
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from vegglue.effects.surroundings import Cells
 
 def unlisted_object(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """k -> k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2), no less than 0."""
-    away = ((cells.ground.x - x) ** 2 + (cells.ground.y - y) ** 2) / radius**2
+    away = ((cells.geometry.x - x) ** 2 + (cells.geometry.y - y) ** 2) / radius**2
     return {"rate": np.maximum(cells.rate + drag * np.exp(-away), 0.0)}
 
 

@@ -94,7 +94,7 @@ def _force_response(model: Model, point: Point, experiment: str, time_step: floa
     predictions = []
     for force in (SMALL_FORCE, -SMALL_FORCE):
         pushed = ActiveEffect(POINT_FORCE, {"force": np.full(x.size, force), "x": x, "y": y})
-        problem = replace(many, acting=(*many.acting, pushed), ground=geometry)
+        problem = replace(many, effects=(*many.effects, pushed), geometry=geometry)
         predictions.append(_read(model, experiment, problem, _rested(problem, start, time_step, longest)))
     response = (predictions[0] - predictions[1]).T / (2.0 * SMALL_FORCE)
     return response.reshape(-1, grid.x.size, grid.y.size)
@@ -134,7 +134,9 @@ def _read(model: Model, experiment: str, problem: Problem, state: Array) -> Arra
 
 def _point_force(cells: Cells, force: Array, x: Array, y: Array) -> dict[str, Array]:
     """f_x = force in the cell around (x, y), 0 elsewhere [m/s2]."""
-    here = (np.abs(cells.ground.x - x) < 0.5 * cells.ground.dx) & (np.abs(cells.ground.y - y) < 0.5 * cells.ground.dy)
+    here = (np.abs(cells.geometry.x - x) < 0.5 * cells.geometry.dx) & (
+        np.abs(cells.geometry.y - y) < 0.5 * cells.geometry.dy
+    )
     return {"x": force * here}
 
 

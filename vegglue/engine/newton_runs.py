@@ -14,6 +14,7 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import read_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.batch import solve_members
+from vegglue.solver.march import fall_back
 from vegglue.solver.status import FAILED
 
 # Points solved together: as many as fit the lanes of chord steps from one point.
@@ -52,22 +53,29 @@ def _sets(index: np.ndarray) -> list[np.ndarray]:
 def _alone(model: Model, z: Array) -> Array:
     """The same from no point, as members of an ensemble are solved."""
     found = np.full((len(z), len(model.station)), np.nan)
-    points = ndtr(z)
-    tasks = [(model, experiment, points) for experiment in model.case.experiments]
+    tasks = [(model, experiment, z) for experiment in model.case.experiments]
     for experiment, readings in zip(model.case.experiments, in_threads(_read_alone, tasks), strict=True):
         found[:, model.rows[experiment]] = readings
     found[np.isnan(found).any(axis=1)] = np.nan
     return found
 
 
-def _read_alone(model: Model, experiment: str, points: Array) -> Array:
-    build = partial(_problem, model, experiment)
-    solved = solve_members(build, points, model.case.numerics.tolerance)
+def _read_alone(model: Model, experiment: str, z: Array) -> Array:
+    numerics = model.case.numerics
+    how = fall_back(numerics.march_step, numerics.march_span)
+    problem = _problem(model, experiment, z)
+    build = partial(_problem_at, model, experiment)
+    solved = solve_members(problem, ndtr(z), build, numerics.tolerance, how=how)
     state = np.ascontiguousarray(solved.state)
-    prediction = read_sensors(build(points), state, model.site.grid, model.station_of(experiment), ()).prediction
+    prediction = read_sensors(problem, state, model.site.grid, model.station_of(experiment), ()).prediction
     prediction[solved.status == FAILED] = np.nan
     return prediction
 
 
-def _problem(model: Model, experiment: str, points: Array) -> Problem:
-    return build_problem(model.case, model.site, experiment, theta_at(model.case, ndtri(points)))
+def _problem(model: Model, experiment: str, z: Array) -> Problem:
+    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
+
+
+def _problem_at(model: Model, experiment: str, points: Array) -> Problem:
+    """The same at points of the unit cube."""
+    return _problem(model, experiment, ndtri(points))

@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vegglue.case.parameter_space import parameters_at, unit_points
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import Problem, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
 from vegglue.measurements.kinds import velocity_rows
@@ -29,19 +28,22 @@ from vegglue.results.ensemble import Header
 from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.site.zones import refuse_ranges_without_cells
-from vegglue.solver.batch import NEIGHBOURHOOD, solve_members
-from vegglue.solver.parameter_metric import leaves, parameter_metric
-from vegglue.solver.reference_member import SolvedMember, known_middle
-from vegglue.solver.status import FAILED
+from vegglue.solver.batch import CLUSTER_SIZE, solve_members
+from vegglue.solver.march import FallBack, fall_back
+from vegglue.solver.parameter_metric import clusters, parameter_metric
+from vegglue.solver.reference_member import LinearisedMember, linearised_median
+from vegglue.solver.status import FAILED, members_with
 from vegglue.storage.resume import ensemble_writer
 from vegglue.version import VERSION
 
-# Chunks are as large as LARGEST_CHUNK, to share a cold start, but at least FEWEST_CHUNKS, to share the cores.
+# Members of a chunk at most, to share what leads to the first of them, and chunks at least, to share the cores [-].
+# Chosen, not measured: smaller chunks share the work more evenly and lose less when a run is killed, larger ones reach
+# fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
-# Members read by the sensors at once, so that their fields stay small.
-READ = 16
+# Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
+READ_TOGETHER = 16
 Rows = dict[str, np.ndarray]
-Begin = dict[str, SolvedMember | None]
+StartFrom = dict[str, LinearisedMember | None]
 
 
 def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch = silent) -> None:
@@ -56,73 +58,73 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
-    theta = sample_prior(case.parameters, case.simulate.members, case.simulate.seed)
-    places = unit_points(case, theta)
-    begin, chunks = begin_and_chunks(case, site, places)
-    header = make_header(case, observations, theta, chunks, window_of(case, site.grid))
+    sample = sobol_sample(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed = resumed, 0
-        watch(Progress(case.name, solved, len(places), failed, resumed))
-        for index, rows in _solve_all(case, site, observations, places, chunks, todo, begin, jobs):
+        watch(Progress(case.name, solved, header.members, failed, resumed))
+        for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)
-            solved, failed = solved + chunks[index].size, failed + int((rows["status"] == FAILED).sum())
-            watch(Progress(case.name, solved, len(places), failed, resumed))
+            solved, failed = solved + chunks[index].size, failed + members_with(rows["status"], FAILED)
+            watch(Progress(case.name, solved, header.members, failed, resumed))
 
 
 def chunk_size(members: int) -> int:
     """Members solved by one task at most; it depends on nothing but the size of the ensemble."""
-    return min(max(-(-members // FEWEST_CHUNKS), NEIGHBOURHOOD), LARGEST_CHUNK)
+    return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
 
 
-def begin_and_chunks(case: Case, site: Site, places: np.ndarray) -> tuple[Begin, list[np.ndarray]]:
+def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
     """Where members come from, and what one task solves; a single chunk needs no common beginning."""
-    size = chunk_size(len(places))
-    begin = begin_at(case, site) if len(places) > size else {}
-    slopes = [known.slopes for known in begin.values() if known is not None]
-    return begin, leaves(parameter_metric(places, slopes).spots, size)
+    size = chunk_size(len(points))
+    start_from = linearised_medians(case, site) if len(points) > size else {}
+    slopes = [one.slopes for one in start_from.values() if one is not None]
+    return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
 
 
 def _solve_all(
     case: Case,
     site: Site,
     observations: Observations,
-    places: np.ndarray,
+    sample: PriorSample,
     chunks: list[np.ndarray],
     todo: list[int],
-    begin: Begin,
+    start_from: StartFrom,
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    tasks = ((index, case, site, observations, places[chunks[index]], begin) for index in todo)
+    tasks = ((index, case, site, observations, sample.take(chunks[index]), start_from) for index in todo)
     yield from as_finished(_solve_numbered, tasks, jobs)
 
 
 def _solve_numbered(
-    index: int, case: Case, site: Site, observations: Observations, places: np.ndarray, begin: Begin
+    index: int, case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom
 ) -> tuple[int, Rows]:
-    return index, solve_chunk(case, site, observations, places, begin)
+    return index, solve_chunk(case, site, observations, sample, start_from)
 
 
-def begin_at(case: Case, site: Site) -> Begin:
-    """Of every experiment, the member in the middle of the prior."""
+def linearised_medians(case: Case, site: Site) -> StartFrom:
+    """Of every experiment, the member at the medians of all priors; None where it had to be marched."""
+    parameters, tolerance = len(case.parameters), case.numerics.tolerance
     return {
-        experiment: known_middle(
-            partial(_problem_at, case, site, experiment), len(case.parameters), case.numerics.tolerance
+        experiment: linearised_median(
+            partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case)
         )
         for experiment in case.experiments
     }
 
 
 def solve_chunk(
-    case: Case, site: Site, observations: Observations, places: np.ndarray, begin: Begin | None = None
+    case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
 ) -> Rows:
-    """The rows of the ensemble file for members at `places` of the unit cube, every experiment of the case, and as
-    `fields` (member, experiment, quantity, x, y) what is kept of their flow. begin: where members come from.
+    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
+    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from.
     """
-    station, sections = observations.table, section_places(observations)
-    members, window = len(places), window_of(case, site.grid)
+    station, sections = observations.table, section_positions(observations)
+    members, window, tolerance = len(sample.points), window_of(case, site.grid), case.numerics.tolerance
     kept = window.columns if window else slice(0, 0)
     fields_shape = (members, len(case.experiments), len(QUANTITIES), kept.stop - kept.start, site.grid.y.size)
     rows: Rows = {
@@ -137,13 +139,15 @@ def solve_chunk(
     }
     for number, experiment in enumerate(case.experiments):
         began = time.perf_counter()
-        build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(build, places, case.numerics.tolerance, (begin or {}).get(experiment))
+        problem = build_problem(case, site, experiment, sample.theta)
+        build, origin = partial(_problem_at, case, site, experiment), (start_from or {}).get(experiment)
+        solved = solve_members(problem, sample.points, build, tolerance, origin, _fall_back(case))
         here = (station["experiment"] == experiment).to_numpy()
-        for first in range(0, members, READ):
-            few = slice(first, min(first + READ, members))
+        for first in range(0, members, READ_TOGETHER):
+            few = slice(first, min(first + READ_TOGETHER, members))
             state = np.ascontiguousarray(solved.state[..., few])
-            readings = read_sensors(build(places[few]), state, site.grid, station[here], sections, kept)
+            part = take(problem, np.arange(members)[few])
+            readings = read_sensors(part, state, site.grid, station[here], sections, kept)
             rows["prediction"][few, here] = readings.prediction
             rows["section_flow"][few, number] = readings.section_flow
             rows["fields"][few, number] = readings.fields
@@ -162,18 +166,23 @@ def solve_chunk(
 def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
     """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
     site = build_site(case)
-    place = unit_points(case, {name: np.array([theta[name]]) for name in case.parameters})
+    sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
     fields = {}
     for experiment in case.experiments:
+        problem = build_problem(case, site, experiment, sample.theta)
         build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(build, place, case.numerics.tolerance)
+        solved = solve_members(problem, sample.points, build, case.numerics.tolerance, how=_fall_back(case))
         if solved.status[0] != FAILED:
-            fields[experiment] = flow_fields(build(place), solved.state, site.grid)
+            fields[experiment] = flow_fields(problem, solved.state, site.grid)
     return fields
 
 
-def _problem_at(case: Case, site: Site, experiment: str, places: np.ndarray) -> Problem:
-    return build_problem(case, site, experiment, parameters_at(case, places))
+def _fall_back(case: Case) -> FallBack:
+    return fall_back(case.numerics.march_step, case.numerics.march_span)
+
+
+def _problem_at(case: Case, site: Site, experiment: str, points: np.ndarray) -> Problem:
+    return build_problem(case, site, experiment, parameters_at(case, points))
 
 
 def make_header(
@@ -188,7 +197,7 @@ def make_header(
         units={name: parameter.unit for name, parameter in case.parameters.items()},
         station=observations.table,
         experiments=tuple(case.experiments),
-        sections=section_places(observations),
+        sections=section_positions(observations),
         chunks=len(chunks),
         cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
         config=resolved_yaml(case),
@@ -199,7 +208,7 @@ def make_header(
     )
 
 
-def section_places(observations: Observations) -> tuple[tuple[str, float], ...]:
+def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
     """Name and mean x [m] of every section a velocity was measured in."""
     velocity = observations.table[velocity_rows(observations.table)]
     return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())

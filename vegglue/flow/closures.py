@@ -3,26 +3,26 @@
 All at cell centres; nothing here knows a face of the grid.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.effects.active_effect import ActiveEffect, applied
+from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells
-from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
+from vegglue.flow.problem import ACROSS, ALONG, EMPTY, LEVEL, Problem
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.site.channel_geometry import part_of
 
-# Columns worked on together, so that what lies between fits the cache.
+# Columns worked on together [-], so that what lies between fits the cache: chosen, not measured. No number hangs on it.
 CLOSURE_STRIP = 40
+ZERO = np.zeros(1)
 
 
 @dataclass(frozen=True)
 class Closures:
-    """Friction rate k [1/m] and viscosity [m2/s], (nx, ny, m); momentum fluxes h T [m3/s2] and forces [m/s2] by name,
-    as far as there are any.
+    """Friction rate k [1/m] and viscosity nu [m2/s], (nx, ny, m); forces x, y [m/s2] and momentum fluxes xx, xy, yy = h
+    T [m3/s2] by name, as far as there are any.
     """
 
     rate: Array
@@ -31,139 +31,122 @@ class Closures:
 
 
 @dataclass(frozen=True)
-class BareClosures:
-    """What effects at cell centres start from: depth h [m], friction rate k [1/m] and the part of it that is the bed's,
-    (nx, ny, m), viscosity [m2/s]; whether shear acts over the smallest depth, see `Problem`.
-    """
+class _Friction:
+    """What the laws say: depth h [m], friction rate k [1/m] and the part of it that is the bed's, (nx, ny, m)."""
 
     depth: Array
     rate: Array
     bed_rate: Array
-    viscosity: Array
-    smallest_shear_depth: bool
 
 
-def stages_of(acting: tuple[ActiveEffect, ...]) -> set[str]:
-    return {one.effect.stage for one in acting}
+def closures(problem: Problem, state: Array, depth: Array) -> Closures:
+    """k, nu, h T and f of a state (nx, 3, ny, m) with depths (nx, ny, m) [m], effects included."""
+    stages, geometry = {active.effect.stage for active in problem.effects}, problem.geometry
+    plants = (problem.plants.phi, problem.plants.canopy_height)
+    if "plants" in stages and geometry is not None:
+        plants = _plants_after_effects(problem, geometry, state, depth)
+    rate = bed_drag(problem, depth)
+    if geometry is None or not stages & {"resistance", "exchange", "force"}:
+        _add_plant_drag(problem, rate, depth, plants)
+        return Closures(rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {})
+    bed_rate = rate.copy()
+    _add_plant_drag(problem, rate, depth, plants)
+    return _after_effects(problem, geometry, state, _Friction(depth, rate, bed_rate))
 
 
-def stand_values(
-    acting: tuple[ActiveEffect, ...],
-    ground: ChannelGeometry,
-    column: NDArray[np.int64],
-    row: NDArray[np.int64],
-    plants: tuple[Array, Array],
-    state: Array,
-    depth: Array,
+def bed_drag(problem: Problem, depth: Array, columns: slice = slice(None)) -> Array:
+    """k [1/m] of the laws of the bed at the centres of some columns of cells, see `bed_laws`; depth (nx, ny, m) [m]."""
+    bed = problem.friction
+    return bed_laws.class_drag(
+        depth,
+        problem.bed_half_range[columns],
+        bed.friction_class[columns],
+        bed.law,
+        bed.coefficient,
+        bed.log_argument_minimum,
+        problem.film,
+    )
+
+
+def drag(problem: Problem, depth: Array) -> Array:
+    """k [1/m] of bed and plants at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m]."""
+    rate = bed_drag(problem, depth)
+    _add_plant_drag(problem, rate, depth, (problem.plants.phi, problem.plants.canopy_height))
+    return rate
+
+
+def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[Array, Array]) -> None:
+    """The laws of plants in place of those of the bed where plants stand; values: phi and canopy height (cell, m)."""
+    plants = problem.plants
+    plant_laws.plant_drag(
+        rate, depth, plants.column, plants.row, plants.law, *values, plants.bare_chezy, plants.proportional
+    )
+
+
+def _plants_after_effects(
+    problem: Problem, geometry: ChannelGeometry, state: Array, depth: Array
 ) -> tuple[Array, Array]:
     """phi and canopy height (cell, m) of vegetated cells after the effects of the stage plants."""
-    phi, canopy_height = plants
+    column, row = problem.plants.column, problem.plants.row
     before = np.maximum(column - 1, 0)
     u = 0.5 * (state[column, ALONG, row] + state[before, ALONG, row])
     north = np.minimum(row + 1, state.shape[2] - 1)
     beyond = np.where((row + 1 < state.shape[2])[:, None], state[column, ACROSS, north], 0.0)
     v = 0.5 * (state[column, ACROSS, row] + beyond)
-    stand = PlantCells(
+    phi, canopy_height = problem.plants.phi, problem.plants.canopy_height
+    seen = PlantCells(
         phi=phi,
         canopy_height=canopy_height,
         depth=depth[column, row],
         speed=np.sqrt(u**2 + v**2 + 1e-6),
-        front=ground.front[column, row],
-        edge=ground.edge[column, row],
-        x=ground.x[column, 0],
-        y=ground.y[0, row],
+        front=geometry.front[column, row],
+        edge=geometry.edge[column, row],
+        x=geometry.x[column, 0],
+        y=geometry.y[0, row],
     )
-    now = applied(acting, "plants", stand, {"phi": phi, "canopy_height": canopy_height})
+    now = applied(problem.effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
     return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])
 
 
-def closures(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry, state: Array, bare: BareClosures) -> Closures:
+def _after_effects(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction) -> Closures:
     """All that the stages resistance, exchange and force hand on."""
-    nx = state.shape[0]
-    found: dict[str, Array] = {"rate": np.empty_like(bare.rate), "viscosity": np.empty_like(bare.rate)}
+    nx, effects, rate = state.shape[0], problem.effects, friction.rate
+    found: dict[str, Array] = {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
     for first in range(0, nx, CLOSURE_STRIP):
         stop = min(first + CLOSURE_STRIP, nx)
         wide = slice(max(first - 1, 0), min(stop + 1, nx))
         inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(part_of(ground, wide, slice(None)), state, bare, wide)
-        values = applied(acting, "resistance", cells, {"rate": cells.rate})
-        cells = Cells(**{**cells.__dict__, "rate": values["rate"]})
-        values |= applied(acting, "exchange", cells, {"viscosity": bare.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO})
-        values |= applied(acting, "force", cells, {"x": ZERO, "y": ZERO})
+        cells = _cells(problem, geometry, state, friction, wide)
+        values = applied(effects, "resistance", cells, {"rate": cells.rate})
+        cells = replace(cells, rate=values["rate"])
+        values |= applied(
+            effects, "exchange", cells, {"viscosity": cells.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO}
+        )
+        values |= applied(effects, "force", cells, {"x": ZERO, "y": ZERO})
         for name, value in values.items():
             if value is ZERO:
                 continue
             if name not in found:
-                found[name] = np.zeros_like(bare.rate)
+                found[name] = np.zeros_like(rate)
             found[name][first:stop] = np.broadcast_to(value, cells.depth.shape)[inner]
     momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
     return Closures(found["rate"], found["viscosity"], momentum)
 
 
-ZERO, EMPTY = np.zeros(1), np.zeros((0, 0, 0))
-
-
-def _cells(ground: ChannelGeometry, state: Array, bare: BareClosures, columns: slice) -> Cells:
-    here, depth = state[columns], bare.depth[columns]
+def _cells(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction, columns: slice) -> Cells:
+    """What effects see of some columns."""
+    here, depth = state[columns], friction.depth[columns]
     before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
     v = 0.5 * here[:, ACROSS]
     v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
     return Cells(
-        ground=ground,
+        geometry=part_of(geometry, columns, slice(None)),
         depth=depth,
         level=here[:, LEVEL],
         u=0.5 * (here[:, ALONG] + before),
         v=v,
-        rate=bare.rate[columns],
-        bed_rate=bare.bed_rate[columns],
-        viscosity=bare.viscosity,
-        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) if bare.smallest_shear_depth else EMPTY,
+        rate=friction.rate[columns],
+        bed_rate=friction.bed_rate[columns],
+        viscosity=problem.viscosity,
+        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) if problem.smallest_shear_depth else EMPTY,
     )
-
-
-def bed_drag(problem: Problem, depth: Array) -> Array:
-    """k [1/m] of the class laws at cell centres, see `roughness`; depth (nx, ny, m) [m]."""
-    classes = problem.friction_class, problem.law, problem.coefficient
-    return bed_laws.class_drag(depth, problem.reach, *classes, problem.log_argument_minimum, problem.film)
-
-
-def drag(problem: Problem, depth: Array, plants: tuple[Array, Array] | None = None) -> Array:
-    """Friction k [1/m] of classes and plants at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m].
-
-    plants: phi and canopy height (cell, m) when they are not those of the problem.
-    """
-    rate = bed_drag(problem, depth)
-    add_plant_drag(problem, rate, depth, plants or (problem.plants.phi, problem.plants.canopy_height))
-    return rate
-
-
-def add_plant_drag(problem: Problem, rate: Array, depth: Array, plants: tuple[Array, Array]) -> None:
-    law = problem.plants.law
-    plant_laws.plant_drag(
-        rate,
-        depth,
-        problem.plants.column,
-        problem.plants.row,
-        law if law.size else np.zeros_like(problem.plants.row),
-        *plants,
-        problem.plants.bare_chezy,
-        problem.phi_proportional,
-    )
-
-
-def closed(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array, dict[str, Array]]:
-    """Friction rate [1/m] and viscosity [m2/s] (nx, ny, m), momentum fluxes and forces by name, effects included."""
-    stages = stages_of(problem.acting)
-    plants = (problem.plants.phi, problem.plants.canopy_height)
-    if "plants" in stages and problem.ground is not None:
-        column, row = problem.plants.column, problem.plants.row
-        plants = stand_values(problem.acting, problem.ground, column, row, plants, state, depth)
-    rate = bed_drag(problem, depth)
-    if problem.ground is None or not stages & {"resistance", "exchange", "force"}:
-        add_plant_drag(problem, rate, depth, plants)
-        return rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {}
-    of_bed = rate.copy()
-    add_plant_drag(problem, rate, depth, plants)
-    bare = BareClosures(depth, rate, of_bed, problem.viscosity, problem.smallest_shear_depth)
-    found = closures(problem.acting, problem.ground, state, bare)
-    return found.rate, found.viscosity, found.momentum

@@ -13,9 +13,11 @@ from vegglue.compilation import compiled
 from vegglue.flow.wet_and_dry import afloat, depths
 from vegglue.resistance.physical_constants import GRAVITY
 
-# Speed [m/s] below which friction becomes linear, so that its derivative exists at rest.
+# Speed [m/s] below which friction becomes linear, so that its derivative exists at rest. Chosen, not measured, below
+# what instruments resolve: larger ones add friction to slow water, smaller ones sharpen the bend that Newton meets.
 REST_SPEED = 1e-3
-# Columns computed together, and those beside them they look at.
+# Columns computed together, so that what lies between fits the cache (chosen, not measured; no number hangs on it), and
+# those beside them they look at: upwinding looks two columns upstream, and depths of their faces one further.
 STRIP, HALO = 40, 3
 
 
@@ -229,7 +231,9 @@ def velocities(state, first, stop, cell, west, south, north):
 
 
 @compiled
-def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, outlet_level, film, smallest, dx, dy):
+def rates(
+    state, bed, rise, half_range, film, smallest, drag, viscosity, west, south, north, outlet, outlet_level, dx, dy
+):
     """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
     nx = state.shape[0]
     out = np.empty_like(state)
@@ -237,7 +241,7 @@ def rates(state, bed, lift, reach, drag, viscosity, west, south, north, outlet, 
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
-        cell, face_x, face_y, corner = depths(level, bed[a:b], lift[a:b], reach[a:b], outlet_level, film, smallest)
+        cell, face_x, face_y, corner = depths(level, bed[a:b], rise[a:b], half_range[a:b], film, smallest, outlet_level)
         u, v = velocities(state, a, b, cell, west, south, north)
         wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
         lo, hi = first - a, stop - a

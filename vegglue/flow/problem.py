@@ -1,4 +1,4 @@
-"""The nouns of the flow: a Problem (everything the equations need), a State (what they are solved for), their residual.
+"""The problem of the flow, all that its equations need, and the layout of a state, what they are solved for.
 
     dh/dt + d(hu)/dx + d(hv)/dy = 0
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
@@ -10,6 +10,7 @@ east face of each cell.
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,40 @@ from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.site.channel_geometry import rows_of
 
 LEVEL, ACROSS, ALONG = 0, 1, 2
+# An array (nx, ny, m) of something that is not there.
+EMPTY = np.zeros((0, 0, 0))
+ProblemPart = TypeVar("ProblemPart", "BedFriction", "VegetatedCells", "InflowSegment", "Boundaries")
+
+
+@dataclass(frozen=True)
+class BedFriction:
+    """Friction of the bed: class of each cell (nx, ny), law of each class (an index, see `bed_laws`), and its
+    coefficient for each member (class, m) [s m^(-1/3), m or m^1/2/s].
+
+    log_argument_minimum: what 12 h/k_s is not let below [-].
+    """
+
+    friction_class: NDArray[np.int64]
+    law: NDArray[np.int64]
+    coefficient: Array
+    log_argument_minimum: float
+
+
+@dataclass(frozen=True)
+class VegetatedCells:
+    """Vegetated cells (column, row), the law of each (an index into PLANT_LAWS), and their values per cell and member:
+    phi [-], h_d [m], C_b [m^1/2/s].
+
+    proportional: phi h/h_d in place of phi where plants stand out of the water.
+    """
+
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
+    law: NDArray[np.int64]
+    phi: Array
+    canopy_height: Array
+    bare_chezy: Array
+    proportional: bool
 
 
 @dataclass(frozen=True)
@@ -40,122 +75,130 @@ class InflowSegment:
 
 
 @dataclass(frozen=True)
-class VegetatedCells:
-    """Vegetated cells (column, row) and their values per cell and member: phi [-], h_d [m], C_b [m^1/2/s].
+class Boundaries:
+    """What enters and leaves: inflows, rows of the east side that are the outlet (ny,), the level there (m,) [m].
 
-    law: of each cell, an index into canopy.LAWS; Baptist's when empty.
+    lateral_inflow (nx, ny, m) or empty: water that enters from above or below, without momentum [m/s].
     """
 
-    column: NDArray[np.int64]
-    row: NDArray[np.int64]
-    phi: Array
-    canopy_height: Array
-    bare_chezy: Array
-    law: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    inflows: tuple[InflowSegment, ...]
+    outlet: NDArray[np.bool_]
+    outlet_level: Array
+    lateral_inflow: Array = field(default_factory=lambda: EMPTY)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One experiment for m members on one grid: bed (nx, ny) [m], friction classes, plants, boundaries, viscosity
-    [m2/s].
+    """One experiment for m members on one grid of cells dx by dy [m]: bed (nx, ny) [m], its friction, plants, eddy
+    viscosity (m,) [m2/s], boundaries, and the effects at work in the flow and its readings.
 
-    lift (nx, ny, m) or empty: by how much members' beds lie higher [m]; source (nx, ny, m) or empty: water that enters
-    from above or below, without momentum [m/s]; acting: effects at work in the flow and its readings.
+    film: a tenth of it stays on dry land [m]; smallest_shear_depth: whether shear acts over the smallest depth of the
+    cells around a point, not the mean; bed_rise (nx, ny, m) or empty: by how much members' beds lie higher [m];
+    geometry: what effects see of the channel, none without effects.
     """
 
     dx: float
     dy: float
     bed: Array
-    friction_class: NDArray[np.int64]
-    law: NDArray[np.int64]
-    coefficient: Array
+    friction: BedFriction
     plants: VegetatedCells
     viscosity: Array
-    inflows: tuple[InflowSegment, ...]
-    outlet: NDArray[np.bool_]
-    outlet_level: Array
+    boundaries: Boundaries
     film: float
-    log_argument_minimum: float
-    phi_proportional: bool = False
-    smallest_shear_depth: bool = False
-    lift: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    source: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    acting: tuple[ActiveEffect, ...] = ()
-    ground: ChannelGeometry | None = None
+    smallest_shear_depth: bool
+    bed_rise: Array = field(default_factory=lambda: EMPTY)
+    effects: tuple[ActiveEffect, ...] = ()
+    geometry: ChannelGeometry | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Cells along and across, nx and ny."""
         return self.bed.shape[0], self.bed.shape[1]
 
+    @property
+    def members(self) -> int:
+        return self.boundaries.outlet_level.size
+
     @cached_property
-    def reach(self) -> Array:
+    def bed_half_range(self) -> Array:
         """Half the range of the bed across the flow within each cell, (nx, ny) [m], at least four films.
 
         Along x the surface falls with the bed, so that a slope there does not make a cell deep and shallow at once.
         """
-        rise = np.gradient(self.bed, axis=1) if self.shape[1] > 1 else np.zeros_like(self.bed)
-        return np.maximum(0.5 * np.abs(rise), 4.0 * self.film)
+        step = np.gradient(self.bed, axis=1) if self.shape[1] > 1 else np.zeros_like(self.bed)
+        return np.maximum(0.5 * np.abs(step), 4.0 * self.film)
 
     @property
-    def members(self) -> int:
-        return self.outlet_level.size
+    def wetting(self) -> tuple[Array, Array, Array, float]:
+        """What depths are made of, in the order in which the compiled loops take it."""
+        return self.bed, self.bed_rise, self.bed_half_range, self.film
 
 
 def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
     """The same problem for some of its members (an index array; an index may repeat)."""
-    pick = lambda values: np.ascontiguousarray(values[..., members])  # noqa: E731
-    plants = problem.plants
+    boundaries = _taken(problem.boundaries, members, "outlet_level", "lateral_inflow")
     return replace(
         problem,
-        coefficient=pick(problem.coefficient),
-        plants=replace(
-            plants, phi=pick(plants.phi), canopy_height=pick(plants.canopy_height), bare_chezy=pick(plants.bare_chezy)
-        ),
-        viscosity=pick(problem.viscosity),
-        inflows=tuple(
-            replace(
-                inflow,
-                discharge=pick(inflow.discharge),
-                spread=pick(inflow.spread) if inflow.spread.shape[-1] > 1 else inflow.spread,
-            )
-            for inflow in problem.inflows
-        ),
-        outlet_level=pick(problem.outlet_level),
-        lift=pick(problem.lift) if problem.lift.size else problem.lift,
-        source=pick(problem.source) if problem.source.size else problem.source,
-        acting=tuple(
-            replace(one, values={name: pick(value) for name, value in one.values.items()}) for one in problem.acting
+        friction=_taken(problem.friction, members, "coefficient"),
+        plants=_taken(problem.plants, members, "phi", "canopy_height", "bare_chezy"),
+        viscosity=_some(problem.viscosity, members),
+        boundaries=replace(boundaries, inflows=tuple(_inflow_of(one, members) for one in boundaries.inflows)),
+        bed_rise=_some(problem.bed_rise, members),
+        effects=tuple(
+            replace(active, values={name: _some(value, members) for name, value in active.values.items()})
+            for active in problem.effects
         ),
     )
 
 
 def crop(problem: Problem, south: int, north: int) -> Problem:
     """The rows south..north-1 of a problem, with walls beside them; inflows through a side cut off must not exist."""
-    plants = problem.plants
-    inside = (plants.row >= south) & (plants.row < north)
-    kept = VegetatedCells(
-        plants.column[inside],
-        plants.row[inside] - south,
-        plants.phi[inside],
-        plants.canopy_height[inside],
-        plants.bare_chezy[inside],
-        plants.law[inside] if plants.law.size else plants.law,
-    )
-    inflows = tuple(_cropped(inflow, south, north) if inflow.side == "west" else inflow for inflow in problem.inflows)
+
+    def cut(values: Any) -> Any:
+        return np.ascontiguousarray(values[:, south:north])
+
     return replace(
         problem,
-        bed=np.ascontiguousarray(problem.bed[:, south:north]),
-        friction_class=np.ascontiguousarray(problem.friction_class[:, south:north]),
-        plants=kept,
-        inflows=inflows,
-        outlet=problem.outlet[south:north],
-        lift=np.ascontiguousarray(problem.lift[:, south:north]),
-        source=np.ascontiguousarray(problem.source[:, south:north]),
-        ground=None if problem.ground is None else rows_of(problem.ground, south, north),
+        bed=cut(problem.bed),
+        friction=replace(problem.friction, friction_class=cut(problem.friction.friction_class)),
+        plants=_plants_between(problem.plants, south, north),
+        boundaries=replace(
+            problem.boundaries,
+            inflows=tuple(_inflow_between(one, south, north) for one in problem.boundaries.inflows),
+            outlet=problem.boundaries.outlet[south:north],
+            lateral_inflow=cut(problem.boundaries.lateral_inflow),
+        ),
+        bed_rise=cut(problem.bed_rise),
+        geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
     )
 
 
-def _cropped(inflow: InflowSegment, south: int, north: int) -> InflowSegment:
+def _some(values: Array, members: NDArray[np.int64]) -> Array:
+    """Some members of an array (.., m), in one piece of memory; nothing of what is not there."""
+    return np.ascontiguousarray(values[..., members]) if values.shape[-1] else values
+
+
+def _taken(part: ProblemPart, members: NDArray[np.int64], *names: str) -> ProblemPart:
+    """A part of a problem of which some fields (.., m) keep some members only."""
+    kept: dict[str, Any] = {name: _some(getattr(part, name), members) for name in names}
+    return replace(part, **kept)
+
+
+def _inflow_of(inflow: InflowSegment, members: NDArray[np.int64]) -> InflowSegment:
+    alike = inflow.spread.shape[-1] == 1
+    return _taken(inflow, members, "discharge") if alike else _taken(inflow, members, "discharge", "spread")
+
+
+def _inflow_between(inflow: InflowSegment, south: int, north: int) -> InflowSegment:
+    if inflow.side != "west":
+        return inflow
     start, stop = max(inflow.start, south), min(inflow.stop, north)
     spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
     return replace(inflow, start=start - south, stop=stop - south, spread=spread)
+
+
+def _plants_between(plants: VegetatedCells, south: int, north: int) -> VegetatedCells:
+    inside = (plants.row >= south) & (plants.row < north)
+    names = ("column", "row", "law", "phi", "canopy_height", "bare_chezy")
+    kept = replace(plants, **{name: getattr(plants, name)[inside] for name in names})
+    return replace(kept, row=kept.row - south)

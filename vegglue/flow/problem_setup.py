@@ -1,7 +1,5 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
-import dataclasses
-
 import numpy as np
 
 from vegglue.arrays import Array
@@ -9,8 +7,9 @@ from vegglue.case.case_effects import Theta, active_effects, value_of
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.site_schema import Inflow, Stand, StandOverride
 from vegglue.effects.active_effect import ActiveEffect, applied
+from vegglue.effects.definition import REPLACED
 from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
-from vegglue.flow.problem import InflowSegment, Problem, VegetatedCells
+from vegglue.flow.problem import EMPTY, BedFriction, Boundaries, InflowSegment, Problem, VegetatedCells
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.site.channel_geometry import channel_geometry, patches_present
 from vegglue.site.gridded_site import Site
@@ -27,59 +26,67 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     refuse_ranges_without_cells(case, site.grid)
     members = len(next(iter(theta.values()))) if theta else 1
     setting = case.experiments[experiment]
-    classes = [case.friction.classes[name] for name in site.class_names]
-    acting = active_effects(case, experiment, theta, members)
-    ground = channel_geometry(case, site, experiment) if acting else None
-    boundary = bounded(acting, _boundary(case, site, setting, theta, members))
+    effects = active_effects(case, experiment, theta, members)
+    geometry = channel_geometry(case, site, experiment) if effects else None
+    values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
         bed=site.bed,
-        friction_class=site.friction_class,
-        law=np.array([BED_LAWS[item.law][0] for item in classes], dtype=np.int64),
-        coefficient=np.array([value_of(getattr(item, BED_LAWS[item.law][1]), theta, members) for item in classes]),
+        friction=_bed_friction(case, site, theta, members),
         plants=_plants(case, site, experiment, theta, members),
         viscosity=value_of(case.eddy_viscosity, theta, members),
-        inflows=tuple(
-            _inflow(inflow, site, discharge, spread)
-            for inflow, discharge, spread in zip(
-                case.inflows.values(), boundary.discharge, boundary.spread, strict=True
-            )
-        ),
-        outlet=centres_within(case.outlet.range, site.grid.y),
-        outlet_level=boundary.level,
+        boundaries=_boundaries(case, site, values, geometry),
         film=case.numerics.film_depth,
-        log_argument_minimum=case.numerics.bank_argument_minimum,
-        phi_proportional=case.numerics.emergent == "proportional",
         smallest_shear_depth=case.numerics.shear_depth == "smallest",
-        lift=lifted(acting, ground) if ground else np.zeros((0, 0, 0)),
-        source=_source(boundary.lateral, ground) if ground else np.zeros((0, 0, 0)),
-        acting=acting,
-        ground=ground,
+        bed_rise=bed_rise(effects, geometry) if geometry else EMPTY,
+        effects=effects,
+        geometry=geometry,
     )
 
 
-def _boundary(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> BoundaryValues:
-    """What the case says of inflows and outlet; spread and place have as many cells as the longest side."""
+def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFriction:
+    """Laws of the classes of a site, each with its one coefficient."""
+    classes = [case.friction.classes[name] for name in site.class_names]
+    return BedFriction(
+        friction_class=site.friction_class,
+        law=np.array([BED_LAWS[item.law][0] for item in classes], dtype=np.int64),
+        coefficient=np.array([value_of(getattr(item, BED_LAWS[item.law][1]), theta, members) for item in classes]),
+        log_argument_minimum=case.numerics.bank_argument_minimum,
+    )
+
+
+def _boundaries(case: Case, site: Site, values: BoundaryValues, geometry: ChannelGeometry | None) -> Boundaries:
+    inflows = zip(case.inflows.values(), values.discharge, values.spread, strict=True)
+    return Boundaries(
+        inflows=tuple(_inflow(inflow, site, discharge, spread) for inflow, discharge, spread in inflows),
+        outlet=centres_within(case.outlet.range, site.grid.y),
+        outlet_level=values.level,
+        lateral_inflow=_lateral_inflow(values.lateral, geometry) if geometry else EMPTY,
+    )
+
+
+def _boundary_values(case: Case, site: Site, setting: Experiment, theta: Theta, members: int) -> BoundaryValues:
+    """What the case says of inflows and outlet; spread and position have as many cells as the longest side."""
     cells = [inflow_cells(inflow, site.grid).size for inflow in case.inflows.values()]
-    place = np.zeros((len(cells), max(cells), 1))
+    position = np.zeros((len(cells), max(cells), 1))
     for inflow, size in enumerate(cells):
-        place[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+        position[inflow, :size, 0] = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     return BoundaryValues(
         discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
         level=value_of(setting.level, theta, members),
         spread=np.ones((len(cells), max(cells), 1)),
         lateral=np.zeros(members),
-        place=place,
+        position=position,
     )
 
 
-def _source(lateral: Array, ground: ChannelGeometry) -> Array:
-    """Lateral inflow spread over the floor, (nx, ny, m) [m/s]; empty without one."""
+def _lateral_inflow(lateral: Array, geometry: ChannelGeometry) -> Array:
+    """Q_lateral / (area of the floor) on the floor, (nx, ny, m) [m/s]; empty without one."""
     if not lateral.any():
-        return np.zeros((0, 0, 0))
-    floor = 1.0 - ground.bank
-    return np.ascontiguousarray(floor * lateral / (floor.sum() * ground.dx * ground.dy))
+        return EMPTY
+    floor = 1.0 - geometry.bank
+    return np.ascontiguousarray(floor * lateral / (floor.sum() * geometry.dx * geometry.dy))
 
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
@@ -93,7 +100,8 @@ def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int)
         phi, height, chezy = _stand(stand, case.experiments[experiment].stands.get(name), theta, members)
         fields[:, index == patch] = np.stack([phi * stems / stand.stems, height, chezy])[:, None]
         law[index == patch] = plant_laws.PLANT_LAWS.index(stand.law)
-    return VegetatedCells(column, row, fields[0], fields[1], fields[2], law)
+    proportional = case.numerics.emergent == "proportional"
+    return VegetatedCells(column, row, law, fields[0], fields[1], fields[2], proportional)
 
 
 def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: int) -> tuple[Array, Array, Array]:
@@ -115,17 +123,16 @@ def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> Infl
     )
 
 
-def lifted(acting: tuple[ActiveEffect, ...], ground: ChannelGeometry) -> Array:
+def bed_rise(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> Array:
     """By how much members' beds lie higher, (nx, ny, m) [m]; empty when no effect says so."""
-    nothing = np.zeros((0, 0, 0))
-    if not any(one.effect.stage == "site" and one.on.any() for one in acting):
-        return nothing
-    members = len(next(iter(acting[0].values.values())))
-    change = applied(acting, "site", ground, {"bed": np.zeros((*ground.bed.shape[:2], members))})
+    if not any(active.effect.stage == "site" and active.on.any() for active in effects):
+        return EMPTY
+    members = len(next(iter(effects[0].values.values())))
+    change = applied(effects, "site", geometry, {"bed": np.zeros((*geometry.bed.shape[:2], members))})
     return np.ascontiguousarray(change["bed"])
 
 
-def bounded(acting: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
+def boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
     """What enters and leaves after the effects of the stage boundary."""
-    neutral = {item.name: getattr(boundary, item.name) for item in dataclasses.fields(boundary) if item.name != "place"}
-    return BoundaryValues(**applied(acting, "boundary", boundary, neutral), place=boundary.place)
+    neutral = {name: getattr(boundary, name) for name in REPLACED["boundary"]}
+    return BoundaryValues(**applied(effects, "boundary", boundary, neutral), position=boundary.position)

@@ -78,9 +78,9 @@ def bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
 
 def between(points: Array, first: float, step: float, size: int) -> tuple[NDArray[np.int64], Array]:
     """Of `size` centres a step apart: the one below each point, and the share of the next one in what it reads [-]."""
-    place = np.clip((points - first) / step, 0.0, size - 1.0)
-    lower = np.minimum(place.astype(np.int64), size - 2)
-    return lower, place - lower
+    steps = np.clip((points - first) / step, 0.0, size - 1.0)
+    lower = np.minimum(steps.astype(np.int64), size - 2)
+    return lower, steps - lower
 
 
 def nearest_face(grid: Grid, x: float) -> int:
@@ -172,8 +172,8 @@ def _discharge_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     of level minus bed. In the west the inflow sets Q, at the outlet its level sets h: these do not answer.
     """
     weights, now, dy = _no_weights(flow, x.size), flow.at_faces, flow.problem.dy
-    for n, place in enumerate(x):
-        face = nearest_face(flow.grid, place)
+    for n, x_n in enumerate(x):
+        face = nearest_face(flow.grid, x_n)
         if face > 0:
             weights[face - 1, ALONG, :, n] = now.face_x[face, :, 0] * dy
         if 0 < face < flow.grid.x.size:
@@ -186,10 +186,10 @@ def _wet_share(flow: GriddedFlow, face: int) -> Array:
     """dh/da of a face between two columns (ny,) [-], a the mean of level minus bed: that of `wet_depth`, exactly."""
     problem, sides = flow.problem, [face - 1, face]
     above = flow.level[sides, :, 0] - problem.bed[sides]
-    if problem.lift.size:
-        above = above - problem.lift[sides, :, 0]
-    reach = problem.reach[sides].mean(axis=0)
-    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / reach + 0.5, 0.0, 1.0)
+    if problem.bed_rise.size:
+        above = above - problem.bed_rise[sides, :, 0]
+    half_range = problem.bed_half_range[sides].mean(axis=0)
+    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / half_range + 0.5, 0.0, 1.0)
 
 
 def _no_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import closures
 from vegglue.flow.equations import Faces, faces
 from vegglue.flow.problem import Problem
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
@@ -61,7 +61,7 @@ def read_sensors(
     prediction = np.empty((len(station), problem.members))
     for kind, rows, x, y in _by_kind(station):
         prediction[rows] = READERS[kind.name].read(flow, x, y)
-    if any(one.effect.stage == "sensor" for one in problem.acting):
+    if any(active.effect.stage == "sensor" for active in problem.effects):
         prediction = _shown(flow, prediction, station)
     through = flow.discharge
     error = np.abs(through / _entered(problem) - 1.0).max(axis=0)
@@ -84,19 +84,19 @@ def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     problem, now = flow.problem, flow.at_faces
     canopy = np.zeros_like(now.cell)
     canopy[problem.plants.column, problem.plants.row] = problem.plants.canopy_height
-    fields = {"depth": now.cell, "u": flow.u, "rate": closed(problem, flow.state, now.cell)[0]}
+    fields = {"depth": now.cell, "u": flow.u, "rate": closures(problem, flow.state, now.cell).rate}
     fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
     there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
     there |= _measured_by_probes(flow, value, station) | {"x": x[:, None], "y": y[:, None]}
-    for one in problem.acting:
+    for active in problem.effects:
         rows = np.ones(len(station), dtype=bool)
-        if one.sections:
-            rows &= station["section"].isin(one.sections).to_numpy()
-        if one.devices:
-            rows &= station["device"].isin(one.devices).to_numpy()
+        if active.sections:
+            rows &= station["section"].isin(active.sections).to_numpy()
+        if active.devices:
+            rows &= station["device"].isin(active.devices).to_numpy()
         reading = Reading(value=value, **there)
-        value = np.where(rows[:, None], applied((one,), "sensor", reading, {"value": value})["value"], value)
+        value = np.where(rows[:, None], applied((active,), "sensor", reading, {"value": value})["value"], value)
     return value
 
 
@@ -144,9 +144,9 @@ def _entered(problem: Problem) -> Array:
     """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s]."""
     nx = problem.shape[0]
     entered = np.zeros((nx + 1, problem.members))
-    if problem.source.size:
-        entered[1:] += problem.source.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
-    for inflow in problem.inflows:
+    if problem.boundaries.lateral_inflow.size:
+        entered[1:] += problem.boundaries.lateral_inflow.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
+    for inflow in problem.boundaries.inflows:
         if inflow.side == "west":
             entered += inflow.discharge
     return entered + _from_sides(problem, nx)
@@ -155,7 +155,7 @@ def _entered(problem: Problem) -> Array:
 def _from_sides(problem: Problem, nx: int) -> Array:
     """The part that enters through the sides, counted by its even share; exact beyond the segment."""
     entered = np.zeros((nx + 1, problem.members))
-    for inflow in problem.inflows:
+    for inflow in problem.boundaries.inflows:
         if inflow.side != "west":
             share = np.clip((np.arange(nx + 1) - inflow.start) / (inflow.stop - inflow.start), 0.0, 1.0)
             entered += share[:, None] * inflow.discharge

@@ -5,13 +5,13 @@ Steps with another member's Jacobian overshoot along the waterline long after th
 on thin faces,
 
     rows of momentum are written as slope (u - u*), u* their root in u, all else as it is;
-    the unknown is w = rho u, rho = h / h_c, with h_c the depth at the centre: what it carries is linear in w.
+    the unknown is w = rho u, rho = h / h_c, with h_c the depth at the reference member: what it carries is linear in w.
 
-Deep water stays as it is, roots stay roots, and at the centre nothing changes. With the rows alone a member of one
-chunk of an ensemble of 5,000 took 8 steps instead of 15, of another 15 instead of 30 (means of 100, when they came).
-With both, the median of four chunks is 6 to 9 instead of 8 to 11; the mean, which stragglers rule, did not fall. A
-nonlinear preconditioner from the left and one from the right, as in Cai and Keyes 2002, doi:10.1137/S106482750037620X;
-not checked against it.
+Deep water stays as it is, roots stay roots, and at the reference member nothing changes. With the rows alone a member
+of one chunk of an ensemble of 5,000 took 8 steps instead of 15, of another 15 instead of 30 (means of 100, when they
+came). With both, the median of four chunks is 6 to 9 instead of 8 to 11; the mean, which stragglers rule, did not fall.
+A nonlinear preconditioner from the left and one from the right, as in Cai and Keyes 2002,
+doi:10.1137/S106482750037620X; not checked against it.
 """
 
 import math
@@ -23,7 +23,7 @@ from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.wet_and_dry import wet_depth
 from vegglue.resistance.physical_constants import FILM_ON_LAND
 
-# Films of depth above which a face stays as it is. Of the rows, 2 needs two more steps in ten, 10 none fewer;
+# Films of depth above which a face stays as it is [-]. Of the rows, 2 needs two more steps in ten, 10 none fewer;
 # of rho, 20 and 100 none fewer.
 THIN = 5.0
 
@@ -82,7 +82,7 @@ def ease(out, state, depth, drag, west, slope, film):
                 if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
                     continue
                 a, b, one, two, three, four = _beside(state, before, i, j, e == 2)
-                at_centre = slope[i, e, j, 0]
+                at_reference = slope[i, e, j, 0]
                 for k in range(m):
                     other = 0.25 * (one[k] + two[k] + three[k] + four[k])
                     pair = depth[i, j, k] + depth[a, b, k]
@@ -90,7 +90,7 @@ def ease(out, state, depth, drag, west, slope, film):
                     rate = out[i, e, j, k]
                     gap = _gap(state[i, e, j, k], other * other + REST_SPEED * REST_SPEED, rough, rate)
                     share = min(pair * per_thin, 1.0)
-                    out[i, e, j, k] = rate + (1.0 - share * share) * (at_centre * gap - rate)
+                    out[i, e, j, k] = rate + (1.0 - share * share) * (at_reference * gap - rate)
 
 
 @compiled
@@ -102,27 +102,27 @@ def _beyond(i, e, j):
 
 
 @compiled
-def _above(state, bed, lift, i, j, a, b, k):
+def _above(state, bed, rise, i, j, a, b, k):
     """Level above the bed [m] at the face between the cells i, j and a, b, the mean of both."""
     above = 0.5 * (state[i, 0, j, k] - bed[i, j] + state[a, 0, b, k] - bed[a, b])
-    return above - 0.5 * (lift[i, j, k] + lift[a, b, k]) if lift.size else above
+    return above - 0.5 * (rise[i, j, k] + rise[a, b, k]) if rise.size else above
 
 
 @compiled
-def answers(state, bed, lift, reach, film, thick):
+def answers(state, bed, rise, half_range, film, thick):
     """u d(rho)/dz [1/s] of one member's faces (nx, 3, ny) where rho is one, z the level of either cell beside."""
     answer = np.zeros(thick.shape)
     for i, e, j in np.argwhere(thick < THIN * film):
         a, b = _beyond(i, e, j)
-        wide, share = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j] / (THIN * film)
-        wet = min(max(0.5 * (_above(state, bed, lift, i, j, a, b, 0) - FILM_ON_LAND * film + wide) / wide, 0.0), 1.0)
+        wide, share = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j] / (THIN * film)
+        wet = min(max(0.5 * (_above(state, bed, rise, i, j, a, b, 0) - FILM_ON_LAND * film + wide) / wide, 0.0), 1.0)
         answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / thick[i, e, j] * state[i, e, j, 0]
     return answer
 
 
 @compiled
-def thin_places(state, bed, lift, reach, film, thick):
-    """Cells and faces (nx, 3, ny) that are thin at the centre (thick, faces only) or in any member of a state."""
+def thin_cells_and_faces(state, bed, rise, half_range, film, thick):
+    """Cells and faces (nx, 3, ny) that are thin in any member of a state, or, faces only, at the reference member."""
     nx, _, ny, m = state.shape
     found = np.zeros((nx, 3, ny), np.bool_)
     for i in range(nx):
@@ -133,21 +133,21 @@ def thin_places(state, bed, lift, reach, film, thick):
                 a, b = _beyond(i, e, j)
                 lowest = np.inf
                 for k in range(m):
-                    lowest = min(lowest, _above(state, bed, lift, i, j, a, b, k))
-                least = wet_depth(lowest, 0.5 * (reach[i, j] + reach[a, b]), film)
+                    lowest = min(lowest, _above(state, bed, rise, i, j, a, b, k))
+                least = wet_depth(lowest, 0.5 * (half_range[i, j] + half_range[a, b]), film)
                 found[i, e, j] = min(least, thick[i, e, j]) < THIN * film
     return found
 
 
 @compiled
-def _rho(h: float, centre: float, per_thin: float) -> float:
+def _rho(h: float, reference: float, per_thin: float) -> float:
     """h / h_c of a thin face, one of a deep one."""
-    share = min(min(h, centre) * per_thin, 1.0)
-    return 1.0 + (1.0 - share * share) * (h / centre - 1.0)
+    share = min(min(h, reference) * per_thin, 1.0)
+    return 1.0 + (1.0 - share * share) * (h / reference - 1.0)
 
 
 @compiled
-def stretch(values, state, faces, bed, lift, reach, film, thick, back):
+def stretch(values, state, faces, bed, rise, half_range, film, thick, back):
     """Entries of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx, 3,
     ny, m).
     """
@@ -159,10 +159,10 @@ def stretch(values, state, faces, bed, lift, reach, film, thick, back):
                 if not faces[i, e, j]:
                     continue
                 a, b = _beyond(i, e, j)
-                wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
+                wide, reference = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j]
                 for k in range(m):
-                    h = wet_depth(_above(state, bed, lift, i, j, a, b, k), wide, film)
-                    rho = _rho(h, centre, per_thin)
+                    h = wet_depth(_above(state, bed, rise, i, j, a, b, k), wide, film)
+                    rho = _rho(h, reference, per_thin)
                     values[i, e, j, k] *= 1.0 / rho if back else rho
 
 
@@ -181,7 +181,7 @@ def tilt(step, answer):
 
 
 @compiled
-def correction(step, state, thin, bed, lift, reach, film, thick):
+def correction(step, state, thin, bed, rise, half_range, film, thick):
     """Largest change of each member (m,) [m, m/s] by a step in the unknowns of chord steps, NaN if any is.
 
     In thin places in proportion to the depth there, that of its face for a velocity.
@@ -198,14 +198,14 @@ def correction(step, state, thin, bed, lift, reach, film, thick):
                         total[k] += change
                     continue
                 a, b = _beyond(i, e, j)
-                wide, centre = 0.5 * (reach[i, j] + reach[a, b]), thick[i, e, j]
+                wide, reference = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j]
                 for k in range(m):
-                    above = _above(state, bed, lift, i, j, a, b, k)
+                    above = _above(state, bed, rise, i, j, a, b, k)
                     h, change = wet_depth(above, wide, film), step[i, e, j, k]
                     if e > 0:
                         risen = wet_depth(above + 0.5 * (step[i, 0, j, k] + step[a, 0, b, k]), wide, film)
-                        carried = _rho(h, centre, per_thin) * state[i, e, j, k] + change
-                        change = carried / _rho(risen, centre, per_thin) - state[i, e, j, k]
+                        carried = _rho(h, reference, per_thin) * state[i, e, j, k] + change
+                        change = carried / _rho(risen, reference, per_thin) - state[i, e, j, k]
                     change = abs(change) * min(h * per_thin, 1.0)
                     largest[k] = max(largest[k], change)
                     total[k] += change

@@ -7,8 +7,8 @@ from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 
 @compiled
-def wet_depth(above: float, reach: float, film: float) -> float:
-    """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = `reach`.
+def wet_depth(above: float, half_range: float, film: float) -> float:
+    """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = half_range.
 
     h - f/10 is the mean of max(a - s, 0) over s in (-w, w), a = above - f/10: a cell wets from its lowest corner (the
     idea of Defina 2000, doi:10.1029/2000WR900167), and h has a derivative everywhere. The f/10 that stays on dry land
@@ -16,8 +16,8 @@ def wet_depth(above: float, reach: float, film: float) -> float:
     """
     dry = FILM_ON_LAND * film
     lifted = above - dry
-    share = min(max(0.5 * lifted * (1.0 / reach) + 0.5, 0.0), 1.0)
-    return dry + reach * share * share + max(lifted - reach, 0.0)
+    share = min(max(0.5 * lifted * (1.0 / half_range) + 0.5, 0.0), 1.0)
+    return dry + half_range * share * share + max(lifted - half_range, 0.0)
 
 
 @compiled
@@ -36,15 +36,15 @@ def afloat(depth: float, half_per_film: float) -> float:
 
 
 @compiled
-def depths(level, bed, lift, reach, outlet_level, film, smallest):
+def depths(level, bed, rise, half_range, film, smallest, outlet_level):
     """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed, at corners
     that of the point itself, or the smallest of the four cells around it.
 
-    reach (nx, ny): half the range of the bed within a cell [m]; lift (nx, ny, m): by how much members' beds lie higher
-    [m], or empty.
+    half_range (nx, ny): half the range of the bed within a cell [m]; rise (nx, ny, m): by how much members' beds lie
+    higher [m], or empty.
     """
-    if lift.size:
-        level = level - lift
+    if rise.size:
+        level = level - rise
     nx, ny, m = level.shape
     cell = np.empty((nx, ny, m))
     face_x = np.empty((nx + 1, ny, m))
@@ -54,16 +54,16 @@ def depths(level, bed, lift, reach, outlet_level, film, smallest):
         w = max(i - 1, 0)
         for j in range(ny):
             s = max(j - 1, 0)
-            reach_x = 0.5 * (reach[i, j] + reach[w, j])
-            reach_y = 0.5 * (reach[i, j] + reach[i, s])
+            half_range_x = 0.5 * (half_range[i, j] + half_range[w, j])
+            half_range_y = 0.5 * (half_range[i, j] + half_range[i, s])
             for k in range(m):
                 here = level[i, j, k] - bed[i, j]
                 west = level[w, j, k] - bed[w, j]
                 south = level[i, s, k] - bed[i, s]
                 diagonal = level[w, s, k] - bed[w, s]
-                cell[i, j, k] = wet_depth(here, reach[i, j], film)
-                face_x[i, j, k] = wet_depth(0.5 * (here + west), reach_x, film)
-                face_y[i, j, k] = wet_depth(0.5 * (here + south), reach_y, film)
+                cell[i, j, k] = wet_depth(here, half_range[i, j], film)
+                face_x[i, j, k] = wet_depth(0.5 * (here + west), half_range_x, film)
+                face_y[i, j, k] = wet_depth(0.5 * (here + south), half_range_y, film)
                 at_point = min(here, west, south, diagonal) if smallest else 0.25 * (here + west + south + diagonal)
                 corner[i, j, k] = _sheared(at_point, film)
         for k in range(m):
@@ -74,22 +74,22 @@ def depths(level, bed, lift, reach, outlet_level, film, smallest):
     for j in range(ny):
         for k in range(m):
             edge = bed[last, j] + 0.5 * (bed[last, j] - bed[before, j])
-            above = outlet_level[k] - edge - (lift[last, j, k] if lift.size else 0.0)
-            face_x[nx, j, k] = wet_depth(above, reach[last, j], film)
+            above = outlet_level[k] - edge - (rise[last, j, k] if rise.size else 0.0)
+            face_x[nx, j, k] = wet_depth(above, half_range[last, j], film)
     return cell, face_x, face_y, corner
 
 
 @compiled
-def cell_depth(state, bed, lift, reach, film):
+def cell_depth(state, bed, rise, half_range, film):
     """h (nx, ny, m) at cell centres [m] of a state (nx, 3, ny, m)."""
     nx, _, ny, m = state.shape
     depth = np.empty((nx, ny, m))
     for i in range(nx):
         for j in range(ny):
-            if lift.size:
+            if rise.size:
                 for k in range(m):
-                    depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j] - lift[i, j, k], reach[i, j], film)
+                    depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j] - rise[i, j, k], half_range[i, j], film)
                 continue
             for k in range(m):
-                depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j], reach[i, j], film)
+                depth[i, j, k] = wet_depth(state[i, 0, j, k] - bed[i, j], half_range[i, j], film)
     return depth

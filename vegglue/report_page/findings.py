@@ -28,7 +28,7 @@ from vegglue.report_page.posterior_words import UNBELIEVED, drawn_in_words, tied
 from vegglue.report_page.run import Run, patches_drawn
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
+from vegglue.solver.status import STATUS_WORDS, members_with
 
 MASS_LIMIT = 1e-4  # of |Q/Q_in - 1|: what a stored member is held to
 
@@ -228,9 +228,7 @@ def _weights(posterior: Posterior) -> Finding:
 
 
 def _members(ensemble: Ensemble) -> Finding:
-    newton, marched, failed = (
-        int(np.sum(ensemble.status == k)) for k in (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING, FAILED)
-    )
+    newton, marched, failed = (members_with(ensemble.status, number) for number in STATUS_WORDS)
     text = f"{count(newton, 'member')} solved by Newton's method, {marched:,} by marching in time, {failed:,} failed"
     return Finding(
         "members", text + ("; they have no weight." if failed else "."), doubt=failed > 0.01 * len(ensemble.status)

@@ -18,14 +18,9 @@ from vegglue.report_page.posterior_words import how_known
 from vegglue.report_page.run import Run, zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CorrectedCanopy
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
+from vegglue.solver.status import FAILED, STATUS_WORDS, members_with
 
 SHORTLY = {"identified": "yes", "not identified": "no"}
-STATUS = {
-    SOLVED_BY_NEWTON: "solved by Newton's method",
-    SOLVED_BY_MARCHING: "solved by marching in time",
-    FAILED: "failed",
-}
 
 
 @dataclass(frozen=True)
@@ -199,7 +194,7 @@ def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
 
 def members(ensemble: Ensemble) -> list[tuple[str, int, str]]:
     """How many members ended how, and their share."""
-    counts = [(word, int(np.sum(ensemble.status == number))) for number, word in STATUS.items()]
+    counts = [(word, members_with(ensemble.status, number)) for number, word in STATUS_WORDS.items()]
     return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
 
 

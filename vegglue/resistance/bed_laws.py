@@ -8,25 +8,27 @@ from vegglue.compilation import compiled
 from vegglue.resistance.elementary import cube_root, logarithm
 from vegglue.resistance.physical_constants import FILM_ON_LAND, GRAVITY
 
+# The laws by number, as a loop can tell them.
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
+# 18 log10 x = LOG_SLOPE ln x [m^1/2/s].
 LOG_SLOPE = 18.0 / math.log(10.0)
 
 
 @compiled
-def _wet_depths(out, depth, reach, dry):
+def _wet_depths(out, depth, half_range, dry):
     """Mean depth [m] of the wet part of one cell for all members, f + a^(1/2) (a^4 + w^4)^(1/8), a = h - f.
 
     f: depth of the film. Without it (a w)^(1/2) where the waterline crosses the cell, a far from it, smooth between.
     """
-    reach_4 = reach**4
+    half_range_4 = half_range**4
     for k in range(depth.size):
         mean = max(depth[k] - dry, 1e-12)
         square = mean * mean
-        out[k] = dry + math.sqrt(mean * math.sqrt(math.sqrt(square * square + reach_4)))
+        out[k] = dry + math.sqrt(mean * math.sqrt(math.sqrt(square * square + half_range_4)))
 
 
 @compiled
-def _chezys(out, wet, reach, law, coefficient, floor):
+def _chezys(out, wet, half_range, law, coefficient, floor):
     """C [m^1/2/s] of the wet part of one cell for all members, of mean depth h: between h - w and h + w, or 0 and 2 h.
 
     h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, floor))
@@ -38,7 +40,7 @@ def _chezys(out, wet, reach, law, coefficient, floor):
     elif law == KEULEGAN:
         log_floor = math.log(floor)
         for k in range(wet.size):
-            per, half = 12.0 / coefficient[k], min(wet[k], reach)
+            per, half = 12.0 / coefficient[k], min(wet[k], half_range)
             high, low = per * (wet[k] + half), per * (wet[k] - half)
             up, down = max(high, floor), max(low, floor)
             above = up * (logarithm(up) - 1.0 - log_floor) - down * (logarithm(down) - 1.0 - log_floor)
@@ -49,13 +51,13 @@ def _chezys(out, wet, reach, law, coefficient, floor):
 
 
 @compiled
-def class_drag(depth, reach, friction_class, law, coefficient, log_argument_minimum, film):
+def class_drag(depth, half_range, friction_class, law, coefficient, log_argument_minimum, film):
     """k = g h^2 / (s K(h_w) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
 
-    depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; reach: half the range of the bed across the flow
-    in a cell, w [m]. The slope of the surface drives either part, as in the subgrid friction of Volp et al. 2013,
+    depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; half_range: half the range of the bed across the
+    flow in a cell, w [m]. The slope of the surface drives either part, as in the subgrid friction of Volp et al. 2013,
     doi:10.1002/wrcr.20324; but the wet part is asked once, at its mean depth, and not each depth as if the water beside
-    it did not matter (`test_verification_banks`).
+    it did not matter (`verification/test_banks`).
     """
     (nx, ny, m), dry = depth.shape, FILM_ON_LAND * film
     drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))
@@ -65,8 +67,8 @@ def class_drag(depth, reach, friction_class, law, coefficient, log_argument_mini
     for i in range(nx):
         for j in range(ny):
             c, out = friction_class[i, j], drag[i, j]
-            _wet_depths(wet, depth[i, j], reach[i, j], dry)
-            _chezys(out, wet, reach[i, j], law[c], coefficient[c], log_argument_minimum)
+            _wet_depths(wet, depth[i, j], half_range[i, j], dry)
+            _chezys(out, wet, half_range[i, j], law[c], coefficient[c], log_argument_minimum)
             for k in range(m):
                 share = max(depth[i, j, k] - dry, 1e-12) / (wet[k] - dry)
                 carried = share * out[k] * wet[k] * math.sqrt(wet[k]) + (1.0 - share) * on_film[c, k]

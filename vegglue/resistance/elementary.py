@@ -11,6 +11,7 @@ import numpy as np
 from vegglue.compilation import compiled
 
 LN2, ROOT2 = math.log(2.0), math.sqrt(2.0)
+# Of the bit pattern of a double: its 52 bits after the point, and the pattern of the number one.
 FRACTION, ONE = 0xFFFFFFFFFFFFF, 0x3FF0000000000000
 # Of the bit pattern of a cube root: two thirds of that of one; 3.3 % off at most.
 TWO_THIRDS = 0x2A9F7893782DA1CE

@@ -16,8 +16,8 @@ Baptist's takes the bed under the plants into the canopy part; all others add it
 
 Under h_d all are C = (2g/phi)^(1/2), stone-shen with (1 - r) (1 - pi/4 r^2)^(1/2). The papers were not at hand:
 huthoff, klopstra and luhar-nepf were read in the source of TELEMAC-2D (V8P2), stone-shen and yang-choi follow from
-balances of forces, their constants are from memory and unverified. SPACING, INTERFACE and SOLIDITY (s, C_i, r) are
-fixed at plausible values.
+balances of forces, their constants are from memory and unverified. STEM_SPACING, INTERFACE and SOLIDITY (s, C_i, r)
+are fixed at plausible values, see there.
 """
 
 import math
@@ -27,9 +27,11 @@ from vegglue.resistance.physical_constants import GRAVITY, KARMAN
 
 PLANT_LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
 BAPTIST, HUTHOFF, KLOPSTRA, LUHAR_NEPF, STONE_SHEN, YANG_CHOI = range(6)
-STEM_SPACING = 0.1
-INTERFACE = 0.1
-SOLIDITY = 0.05
+# Distance s between stems in Huthoff's law [m], friction C_i at the top of the plants in Luhar's and Nepf's [-], width
+# of a stem over the distance between stems, r, in Stone's and Shen's [-]: chosen, not measured, for no case gives them.
+# Twice as much of each lowers C by 21, 21 and 5 % (phi = 2, 0.9 m of water over plants of 0.5 m).
+STEM_SPACING, INTERFACE, SOLIDITY = 0.1, 0.1, 0.05
+# phi/h_d [1/m] beyond which C_u of Yang's and Choi's law is 2 and not 1: theirs, from memory.
 DENSE = 5.0
 
 
@@ -100,7 +102,7 @@ def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float
 
 @compiled
 def plant_drag(drag, depth, column, row, law, phi, canopy, bare_chezy, proportional):
-    """Overwrite k = g / (C^2 h) [1/m] on plant cells by that of the law of each, an index into LAWS."""
+    """Overwrite k = g / (C^2 h) [1/m] on plant cells by that of the law of each, an index into PLANT_LAWS."""
     m = depth.shape[2]
     for p in range(column.size):
         i, j = column[p], row[p]

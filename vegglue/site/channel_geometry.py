@@ -20,7 +20,7 @@ KEPT = 8
 
 def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
     """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
-    return _ground(site, patches_present(case, experiment))
+    return _geometry(site, patches_present(case, experiment))
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
@@ -33,7 +33,7 @@ def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
 
 def half_width(site: Site) -> float:
     """Half width of the floor [m], the median of its cross-sections."""
-    return float(np.median(_ground(site, ()).half_width))
+    return float(np.median(_geometry(site, ()).half_width))
 
 
 def cells_across(site: Site) -> float:
@@ -42,7 +42,7 @@ def cells_across(site: Site) -> float:
 
 
 @lru_cache(KEPT)  # every problem of every member asks for the same
-def _ground(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
+def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
     floor = ~beyond(side_slope > BREAK, bed)
@@ -67,18 +67,18 @@ def _ground(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
     )
 
 
-def rows_of(ground: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
+def rows_of(geometry: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
     """Rows south..north-1 of it."""
-    return part_of(ground, slice(None), slice(south, north))
+    return part_of(geometry, slice(None), slice(south, north))
 
 
-def part_of(ground: ChannelGeometry, columns: slice, rows: slice) -> ChannelGeometry:
+def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGeometry:
     """Some columns and rows of it."""
     cut = {
-        name: getattr(ground, name)[columns, rows]
+        name: getattr(geometry, name)[columns, rows]
         for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
     }
-    return ChannelGeometry(x=ground.x[columns], y=ground.y[:, rows], dx=ground.dx, dy=ground.dy, **cut)
+    return ChannelGeometry(x=geometry.x[columns], y=geometry.y[:, rows], dx=geometry.dx, dy=geometry.dy, **cut)
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

@@ -12,11 +12,13 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.solver import block_elimination
 
+# Steps remembered [-]: six as in a sketch of the solver, where all members of five clusters then took 3 to 8 steps;
+# not measured since. More need more memory, by which a step is bound.
 MEMORY_DEPTH = 6
 
 
 class Memory:
-    """The last DEPTH changes of every lane's correction, for Anderson's mixing; filled in place, slot by slot."""
+    """The last MEMORY_DEPTH changes of every lane's correction, for Anderson's mixing; slots are filled in place."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.turns: Single = np.zeros((MEMORY_DEPTH, -(-shape[0] // block_elimination.SPARSE), *shape[1:]), np.float32)
@@ -43,21 +45,21 @@ class Memory:
         self.gram[..., lanes], self.since[lanes] = 0.0, self.count
 
     def next_state(self, state: Array, step: Single) -> None:
-        """x <- x + f, less what the memory knows to overshoot, in place."""
-        known = min(self.count, MEMORY_DEPTH)
-        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(known, step, *self.last)
-        self.last = step, block_elimination.mix(state, step, self.sums[:known], weights)
+        """x <- x + f, less what the steps remembered say is too much, in place."""
+        slots = min(self.count, MEMORY_DEPTH)
+        weights = np.zeros((0, step.shape[-1])) if self.last is None else self._weights(slots, step, *self.last)
+        self.last = step, block_elimination.mix(state, step, self.sums[:slots], weights)
         self.count += 1
 
-    def _weights(self, known: int, step: Single, last_step: Single, moved: Single) -> Array:
-        """g (slots, m) of what is known, its next slot filled."""
+    def _weights(self, slots: int, step: Single, last_step: Single, moved: Single) -> Array:
+        """g (slots, m) of the slots filled so far, the next one filled before."""
         slot = (self.count - 1) % MEMORY_DEPTH
-        row, right = block_elimination.remember(self.turns[:known], self.sums, slot, moved, step, last_step)
+        row, right = block_elimination.remember(self.turns[:slots], self.sums, slot, moved, step, last_step)
         self.filled[slot] = self.count
-        own = self.filled[:known, None] > self.since
+        own = self.filled[:slots, None] > self.since
         row, right = np.where(own & own[slot], row, 0.0), np.where(own, right, 0.0)
-        self.gram[slot, :known], self.gram[:known, slot] = row, row
-        return np.asarray(block_elimination.minimise(np.ascontiguousarray(self.gram[:known, :known]), right))
+        self.gram[slot, :slots], self.gram[:slots, slot] = row, row
+        return np.asarray(block_elimination.minimise(np.ascontiguousarray(self.gram[:slots, :slots]), right))
 
 
 def kept(values: Any, lanes: np.ndarray) -> Any:

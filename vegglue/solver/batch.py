@@ -1,6 +1,6 @@
-"""Members solved together: cut into neighbourhoods of the prior, each led by a centre whose factors serve the others.
+"""Members solved together: cut into clusters of neighbours, each with a reference member whose factors serve all.
 
-Places s (m, d) are those of the members in the unit cube (prior probabilities); who is near whom, `nearness` says.
+Members are points s (m, d) of the unit cube (prior probabilities); how near they are, `parameter_metric` says.
 """
 
 from dataclasses import dataclass, replace
@@ -11,27 +11,50 @@ from scipy.interpolate import RBFInterpolator
 
 from vegglue.arrays import Array
 from vegglue.compilation import compiled
-from vegglue.flow.problem import Problem, crop
+from vegglue.flow.problem import Problem, crop, take
 from vegglue.solver.chord import ChordSolution, stream
-from vegglue.solver.parameter_metric import ParameterMetric, leaves, nearest_members, parameter_metric, spread, squared
-from vegglue.solver.reference_member import ProblemOf, ReferenceMember, SolvedMember, lead_at, lead_beside, solve_centre
+from vegglue.solver.march import USUAL_FALL_BACK, FallBack
+from vegglue.solver.parameter_metric import (
+    ParameterMetric,
+    clusters,
+    farthest_first,
+    nearest_members,
+    parameter_metric,
+    squared_distances,
+)
+from vegglue.solver.reference_member import (
+    LinearisedMember,
+    ProblemOf,
+    ReferenceMember,
+    reference_at,
+    reference_beside,
+    solve_reference,
+)
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import overflows, rows_inside, walled, widen
 
-# Neighbours that one factorisation serves, and how many are solved at once.
-NEIGHBOURHOOD, MEMBER_LANES = 64, 24
-# Who is not there after so many steps waits for a centre of its own.
+# Members that one factorisation serves at most: chosen, not measured; in a sketch of the solver one served 16 in 3 to 8
+# steps each. Fewer cost more factorisations, more take more steps.
+CLUSTER_SIZE = 64
+# Members solved side by side: 3 to 5 % more of them a second than with 16; with 32 no more.
+MEMBER_LANES = 24
+# Steps after which a member waits for a nearer reference: of an ensemble of 5,000 members 42 take more (DECISIONS).
 MOST_CHORD_STEPS = 30
-# How far tangents reach, in spots: on the way to four chunks Newton had to help twice with 0.3, once with 0.2, and not
-# with 0.14, which takes more strides. A correction of ROUGHLY [m, m/s] will do there.
-STRIDE, ROUGHLY = 0.2, 1e-3
-# Solved members that a start is drawn from.
-NEAREST = 48
+# How far tangents reach, in coordinates [-]: on the way to four chunks Newton had to help twice with 0.3, once with
+# 0.2, and not with 0.14, which takes more strides.
+STRIDE = 0.2
+# The correction [m, m/s] to which members on the way are solved: chosen, not measured. They only lead on.
+STRIDE_TOLERANCE = 1e-3
+# Solved members that a start is drawn from: chosen, not measured. Splines through more cost more than they help.
+SPLINE_MEMBERS = 48
 
 
 @dataclass(frozen=True)
 class SolvedMembers:
-    """Members in the order asked for: states (nx, 3, ny, m), each in one piece of memory, and how each was reached."""
+    """Members in the order asked for: states (nx, 3, ny, m), each in one piece of memory, and how each was reached.
+
+    Their entries are filled in place while they are solved.
+    """
 
     state: Array
     status: np.ndarray
@@ -39,173 +62,197 @@ class SolvedMembers:
     iterations: np.ndarray
 
 
-def solve_members(
-    problem_of: ProblemOf, places: Array, tolerance: float, begin: SolvedMember | None = None
-) -> SolvedMembers:
-    """Steady states of all places; a member's does not depend on who else is asked for, beyond `tolerance`.
-
-    begin: where to come from; from a rough estimate if not given.
+@dataclass(frozen=True)
+class _Batch:
+    """What members are solved with: their problem, that of members at any points, how near they are, the largest
+    correction [m, m/s] a solved one may still ask for, and how they are marched where Newton fails.
     """
-    whole = problem_of(places)
-    (nx, ny), m = whole.shape, len(places)
+
+    problem: Problem
+    problem_of: ProblemOf
+    metric: ParameterMetric
+    tolerance: float
+    fall_back: FallBack
+
+
+def solve_members(
+    problem: Problem,
+    points: Array,
+    problem_of: ProblemOf,
+    tolerance: float,
+    start_from: LinearisedMember | None = None,
+    how: FallBack = USUAL_FALL_BACK,
+) -> SolvedMembers:
+    """Steady states of all members of a problem; one does not depend on who else is asked for, beyond `tolerance`.
+
+    points (m, d): where they are in the unit cube; problem_of: the problem of members at other points; start_from: a
+    member to come from, a rough estimate if not given; how: what to do where Newton fails.
+    """
+    (nx, ny), m = problem.shape, len(points)
     state = np.moveaxis(np.empty((m, nx, 3, ny)), 0, -1)
     solved = SolvedMembers(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
-    known = [] if begin is None else [begin]
-    everyone = parameter_metric(places, [one.slopes for one in known])
-    cuts = leaves(everyone.spots, NEIGHBOURHOOD)
-    heads = [_middle(everyone.spots, leaf) for leaf in cuts]
-    for leaf, head, next_head in zip(cuts, heads, [*heads[1:], None], strict=True):
-        pending, centre = leaf, head
-        while True:
-            lead = _lead_to(problem_of, everyone, centre, solved, known, tolerance)
-            pending = pending[pending != centre]
-            if lead.known is not None:
-                known.append(lead.known)
-                queue = _queue(everyone, pending, centre, next_head)
-                _follow(whole, everyone, queue, lead, solved, tolerance)
-                pending, next_head = pending[solved.status[pending] == FAILED], None
-            if not pending.size:
-                break
-            centre = _nearest_to_solved(everyone.spots, pending, _there(solved))
+    linearised = [] if start_from is None else [start_from]
+    metric = parameter_metric(points, [one.slopes for one in linearised])
+    batch = _Batch(problem, problem_of, metric, tolerance, how)
+    found = clusters(metric.coordinates, CLUSTER_SIZE)
+    central = [_central_member(metric.coordinates, cluster) for cluster in found]
+    for cluster, first, following in zip(found, central, [*central[1:], None], strict=True):
+        _solve_cluster(batch, cluster, first, following, solved, linearised)
     solved.state[..., solved.status == FAILED] = np.nan
     return solved
 
 
-def _middle(spots: Array, leaf: np.ndarray) -> int:
-    return int(nearest_members(spots, leaf, spots[leaf].mean(axis=0), 1)[0])
+def _solve_cluster(
+    batch: _Batch,
+    cluster: np.ndarray,
+    first: int,
+    following: int | None,
+    solved: SolvedMembers,
+    linearised: list[LinearisedMember],
+) -> None:
+    """Solve a cluster and the central member of the following one: with the factors of its own central member, then
+    with those of one after the other of the members still left.
+    """
+    pending, member = cluster, first
+    while True:
+        reference = _reference_for(batch, member, solved, linearised)
+        pending = pending[pending != member]
+        if reference.linearised is not None:
+            linearised.append(reference.linearised)
+            _solve_queue(batch, _queue(batch.metric, pending, member, following), reference, solved)
+            pending, following = pending[solved.status[pending] == FAILED], None
+        if not pending.size:
+            return
+        member = _next_reference(batch.metric.coordinates, pending, _reached(solved))
 
 
-def _nearest_to_solved(spots: Array, pending: np.ndarray, solved: np.ndarray) -> int:
-    """Which of those pending is the next centre: the one nearest to a solved one, if there is any."""
-    if not solved.size:
+def _central_member(coordinates: Array, cluster: np.ndarray) -> int:
+    return int(nearest_members(coordinates, cluster, coordinates[cluster].mean(axis=0), 1)[0])
+
+
+def _next_reference(coordinates: Array, pending: np.ndarray, reached: np.ndarray) -> int:
+    """Which of those pending is the next reference: the one nearest to a solved one, if there is any."""
+    if not reached.size:
         return int(pending[0])
-    distance = ((spots[pending][:, None] - spots[solved][None]) ** 2).sum(axis=2).min(axis=1)
+    distance = ((coordinates[pending][:, None] - coordinates[reached][None]) ** 2).sum(axis=2).min(axis=1)
     return int(pending[np.argmin(distance)])
 
 
-def _lead_to(
-    problem_of: ProblemOf,
-    everyone: ParameterMetric,
-    centre: int,
-    solved: SolvedMembers,
-    known: list[SolvedMember],
-    tolerance: float,
+def _reference_for(
+    batch: _Batch, member: int, solved: SolvedMembers, linearised: list[LinearisedMember]
 ) -> ReferenceMember:
-    """A centre, noted in `solved`: its factors if it came with the leaf before, else on the way from what is known."""
-    place = everyone.places[centre]
-    if solved.status[centre] == SOLVED_BY_NEWTON:
-        return lead_at(problem_of, place, solved.state[..., centre : centre + 1])
-    lead, spent = _approached(problem_of, everyone, centre, known, tolerance)
-    if lead is None:
-        lead = solve_centre(problem_of, place, _warm_start(everyone, centre, solved, known), tolerance)
-        spent += lead.iterations
-    solved.iterations[centre] += spent
-    solved.status[centre], solved.reason[centre] = lead.status, lead.reason
-    solved.state[..., centre] = lead.state[..., 0]
-    return lead
-
-
-def _queue(everyone: ParameterMetric, pending: np.ndarray, centre: int, next_head: int | None) -> np.ndarray:
-    """Those pending around a centre, with the last of them the head of the next leaf: what starts lean on is then
-    solved.
+    """A member as reference, kept in `solved`: its factors if the cluster before solved it, else reached from those
+    linearised so far.
     """
-    queue = spread(everyone.spots, pending, everyone.spots[centre])
-    return queue if next_head is None else np.insert(queue, max(queue.size - MEMBER_LANES, 0), next_head)
+    point, problem = batch.metric.points[member], take(batch.problem, np.array([member]))
+    if solved.status[member] == SOLVED_BY_NEWTON:
+        return reference_at(batch.problem_of, problem, point, solved.state[..., member : member + 1])
+    reference, spent = _reached_by_strides(batch, problem, point, linearised)
+    if reference is None:
+        warm = _warm_start(batch.metric, member, solved, linearised)
+        reference = solve_reference(batch.problem_of, problem, point, warm, batch.tolerance, batch.fall_back)
+        spent += reference.iterations
+    solved.iterations[member] += spent
+    solved.status[member], solved.reason[member] = reference.status, reference.reason
+    solved.state[..., member] = reference.state[..., 0]
+    return reference
 
 
-def _there(solved: SolvedMembers) -> np.ndarray:
+def _queue(metric: ParameterMetric, pending: np.ndarray, reference: int, following: int | None) -> np.ndarray:
+    """Those pending around a reference, with the last of them the central member of the following cluster: what starts
+    lean on is then solved.
+    """
+    queue = farthest_first(metric.coordinates, pending, metric.coordinates[reference])
+    return queue if following is None else np.insert(queue, max(queue.size - MEMBER_LANES, 0), following)
+
+
+def _reached(solved: SolvedMembers) -> np.ndarray:
+    """Members solved so far, by whatever way."""
     return np.flatnonzero(solved.status != FAILED)
 
 
-def _follow(
-    whole: Problem,
-    everyone: ParameterMetric,
-    queue: np.ndarray,
-    lead: ReferenceMember,
-    solved: SolvedMembers,
-    tolerance: float,
-) -> None:
-    """Solve a queue of members with the factors of a centre and note those in `solved` that neither fail nor outgrow
+def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, solved: SolvedMembers) -> None:
+    """Solve a queue of members with the factors of a reference and keep those in `solved` that neither fail nor outgrow
     its band.
     """
-    assert lead.factors is not None
-    part, band, ny = crop(whole, *lead.band), lead.band, solved.state.shape[2]
+    assert reference.factors is not None
+    part, band, ny = crop(batch.problem, *reference.band), reference.band, solved.state.shape[2]
 
-    def note(members: np.ndarray, ended: ChordSolution) -> None:
+    def keep(members: np.ndarray, ended: ChordSolution) -> None:
         solved.iterations[members] += ended.iterations
         good = ended.converged & ~overflows(part, ended.state, band, ny)
         solved.status[members[good]] = SOLVED_BY_NEWTON
         solved.state[..., members[good]] = widen(ended.state[..., good], ny, band)
 
     def starts_of(members: np.ndarray) -> Array:
-        return _starts(everyone, lead, solved, members)
+        return _starts(batch.metric, reference, solved, members)
 
-    stream(part, queue, starts_of, lead.factors, tolerance, MOST_CHORD_STEPS, MEMBER_LANES, note)
+    stream(part, queue, starts_of, reference.factors, batch.tolerance, MOST_CHORD_STEPS, MEMBER_LANES, keep)
 
 
-def _starts(everyone: ParameterMetric, lead: ReferenceMember, solved: SolvedMembers, batch: np.ndarray) -> Array:
-    """Cubic splines through the solved members nearest to the centre, its tangents while there are too few; in its
+def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedMembers, members: np.ndarray) -> Array:
+    """Cubic splines through the solved members nearest to the reference, its tangents while there are too few; in its
     band.
     """
-    assert lead.known is not None
-    spots = everyone.spots
-    there = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
-    near = nearest_members(spots, there, lead.known.place @ everyone.axes, NEAREST)
-    if near.size < 3 * (spots.shape[1] + 1):
-        return rows_inside(lead.known.predict(everyone.places[batch]), lead.band)
-    spline = RBFInterpolator(spots[near], np.eye(near.size), kernel="cubic", degree=1)
-    blended = blend(np.moveaxis(solved.state, -1, 0), near, spline(spots[batch]), *lead.band)
+    assert reference.linearised is not None
+    coordinates = metric.coordinates
+    by_newton = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
+    near = nearest_members(coordinates, by_newton, reference.linearised.point @ metric.axes, SPLINE_MEMBERS)
+    if near.size < 3 * (coordinates.shape[1] + 1):
+        return rows_inside(reference.linearised.predict(metric.points[members]), reference.band)
+    spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel="cubic", degree=1)
+    blended = blend(np.moveaxis(solved.state, -1, 0), near, spline(coordinates[members]), *reference.band)
     return walled(blended)
 
 
-def _approached(
-    problem_of: ProblemOf, everyone: ParameterMetric, centre: int, known: list[SolvedMember], tolerance: float
+def _reached_by_strides(
+    batch: _Batch, problem: Problem, target: Array, linearised: list[LinearisedMember]
 ) -> tuple[ReferenceMember | None, int]:
-    """A centre far from what is known, in strides that tangents reach, each with the factors of the last and noted in
-    `known`, and iterations spent; no centre if it is near, or could not be reached.
+    """The reference at a point far from all linearised so far, in strides that tangents reach, each with the factors of
+    the last and added to `linearised`, and iterations spent; none if it is near, or could not be reached.
     """
-    target, spent = everyone.places[centre], 0
-    origin = _nearest_known(everyone, target, known) if known else None
-    if origin is None or _apart(everyone, target, origin) <= STRIDE:
+    metric, spent = batch.metric, 0
+    origin = _nearest_linearised(metric, target, linearised) if linearised else None
+    if origin is None or _distance(metric, target, origin) <= STRIDE:
         return None, spent
-    lead = lead_at(problem_of, origin.place, origin.state)
-    while lead.known is not None:
-        here, distance = lead.known, _apart(everyone, target, lead.known)
+    reference = reference_at(batch.problem_of, batch.problem_of(origin.point[None]), origin.point, origin.state)
+    while reference.linearised is not None:
+        here, distance = reference.linearised, _distance(metric, target, reference.linearised)
         last = distance <= STRIDE
-        place = target if last else here.place + (target - here.place) * (STRIDE / distance)
-        lead = lead_beside(problem_of, place, lead, tolerance if last else max(tolerance, ROUGHLY))
-        spent += lead.iterations
-        if lead.known is not None:
+        point = target if last else here.point + (target - here.point) * (STRIDE / distance)
+        tolerance = batch.tolerance if last else max(batch.tolerance, STRIDE_TOLERANCE)
+        there = problem if last else batch.problem_of(point[None])
+        reference = reference_beside(batch.problem_of, there, point, reference, tolerance, batch.fall_back)
+        spent += reference.iterations
+        if reference.linearised is not None:
             if last:
-                return lead, spent
-            known.append(lead.known)
+                return reference, spent
+            linearised.append(reference.linearised)
     return None, spent
 
 
-def _apart(everyone: ParameterMetric, place: Array, known: SolvedMember) -> float:
-    return float(np.sqrt(squared(place[None] @ everyone.axes, known.place @ everyone.axes)[0]))
+def _distance(metric: ParameterMetric, point: Array, other: LinearisedMember) -> float:
+    return float(np.sqrt(squared_distances(point[None] @ metric.axes, other.point @ metric.axes)[0]))
 
 
-def _nearest_known(everyone: ParameterMetric, place: Array, known: list[SolvedMember]) -> SolvedMember:
-    spots = np.array([one.place for one in known]) @ everyone.axes
-    return known[int(np.argmin(squared(spots, place @ everyone.axes)))]
+def _nearest_linearised(metric: ParameterMetric, point: Array, linearised: list[LinearisedMember]) -> LinearisedMember:
+    coordinates = np.array([one.point for one in linearised]) @ metric.axes
+    return linearised[int(np.argmin(squared_distances(coordinates, point @ metric.axes)))]
 
 
 def _warm_start(
-    everyone: ParameterMetric, centre: int, solved: SolvedMembers, known: list[SolvedMember]
+    metric: ParameterMetric, member: int, solved: SolvedMembers, linearised: list[LinearisedMember]
 ) -> Array | None:
     """From the nearest solved member, along the nearest tangents."""
-    if not known:
+    if not linearised:
         return None
-    here, place = everyone.spots[centre], everyone.places[centre]
-    tangents = _nearest_known(everyone, place, known)
-    there = _there(solved)
-    if there.size == 0:
-        return tangents.predict(place[None])
-    start = int(nearest_members(everyone.spots, there, here, 1)[0])
-    return replace(tangents, place=everyone.places[start], state=solved.state[..., start : start + 1]).predict(
-        place[None]
-    )
+    point, reached = metric.points[member], _reached(solved)
+    tangents = _nearest_linearised(metric, point, linearised)
+    if reached.size == 0:
+        return tangents.predict(point[None])
+    start = int(nearest_members(metric.coordinates, reached, metric.coordinates[member], 1)[0])
+    moved = replace(tangents, point=metric.points[start], state=solved.state[..., start : start + 1])
+    return moved.predict(point[None])
 
 
 @compiled

@@ -2,7 +2,7 @@
 channel.
 
 Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from
-downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the reach above
+downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the channel above
 it under a given level: no exchange of rows between blocks is needed. Also the loops of `anderson` over such states.
 """
 
@@ -14,7 +14,8 @@ from vegglue.compilation import compiled_exactly
 # unknowns this far apart may be disturbed together.
 ALONG_PERIOD, ROWS_REACH = 4, 2
 ACROSS_PERIOD = 2 * ROWS_REACH + 1
-# Of so many columns one tells Anderson's mixing how steps change.
+# Of so many columns [-] one tells Anderson's mixing how steps change. With one of four it takes 1 to 4 % more steps
+# than with all, each of which reads a third less memory (DECISIONS).
 SPARSE = 4
 
 

@@ -1,7 +1,7 @@
 """Chord steps x <- x - M^-1 R(x) of many members with the factors M of one, accelerated by Anderson's mixing.
 
 Members pass through a few lanes that are computed side by side; as soon as some are done, others enter their lanes.
-Thin water is eased, see `easing`. A member is there when its correction, in m and m/s, is below the tolerance.
+Thin water is eased, see `thin_water`. A member is there when its correction, in m and m/s, is below the tolerance.
 """
 
 from collections.abc import Callable
@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.flow.equations import carry_thin, eased, largest_correction, where_thin
+from vegglue.flow.chord_equations import carry_thin, eased, largest_correction, where_thin
 from vegglue.flow.problem import Problem, take
 from vegglue.solver.anderson import Memory, kept
 from vegglue.solver.jacobian import Factors
 
-# So many lanes are free before other members enter them.
+# So many lanes are free before other members enter them [-]: chosen, not measured. One would rebuild the problem of all
+# lanes for each member, more leave lanes idle.
 ENTER = 2
-# A step this long [m, m/s] leaves the range where the linearisation means anything.
+# A step this long [m, m/s] leaves the range where the linearisation means anything: chosen, not measured, about a
+# fourth of the depth and of the speed of the channels in `configs`.
 LONGEST_CORRECTION = 0.25
 
 
@@ -173,9 +175,9 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
         np.empty_like(start), np.empty(members.size), members.copy(), np.zeros(members.size, dtype=bool)
     )
 
-    def note(some: np.ndarray, ended: ChordSolution) -> None:
+    def keep(some: np.ndarray, ended: ChordSolution) -> None:
         end.state[..., some], end.correction[some] = ended.state, ended.correction
         end.iterations[some], end.converged[some] = ended.iterations, ended.converged
 
-    stream(problem, members, lambda some: start[..., some], shared, tolerance, most, members.size, note)
+    stream(problem, members, lambda some: start[..., some], shared, tolerance, most, members.size, keep)
     return end

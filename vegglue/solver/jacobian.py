@@ -6,12 +6,15 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.flow import thin_water
-from vegglue.flow.equations import residual, slope_of_friction, thickness
+from vegglue.flow.chord_equations import slope_of_friction, thickness
+from vegglue.flow.equations import residual
 from vegglue.flow.problem import Problem, take
 from vegglue.solver import block_elimination
 
+# Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
+# ones digits of the residual. Factors only lead to the root, so that no result hangs on it.
 COLOUR_STEP = 1e-6
-# Disturbed together: 15, as many as there are colours in a quarter, take a quarter longer than 16.
+# Colours disturbed together [-]: 15, as many as there are colours in a quarter, take a quarter longer than 16.
 COLOUR_LANES = 16
 
 
@@ -19,8 +22,8 @@ COLOUR_LANES = 16
 class Factors:
     """The eliminated Jacobian of one member: J^-1 costs three products a column.
 
-    Beside it what chord steps need of the state it was made at, see `easing`: slopes of friction [1/s], depths of faces
-    [m] and how velocities answer to levels there [1/s].
+    Beside it what chord steps need of the state it was made at, see `thin_water`: slopes of friction [1/s], depths of
+    faces [m] and how velocities answer to levels there [1/s].
     """
 
     columns: Single

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.closures import closed
+from vegglue.flow.closures import Closures, closures
 from vegglue.flow.equations import Faces, faces, residual, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.problem import LEVEL, Problem
 from vegglue.solver import sweeps
 from vegglue.solver.newton import newton
 
-FALL_BACK_STEP = 0.5
-FALL_BACK_SPAN = 600.0
-FALL_BACK_TRIES = 4
+# Newton tries to finish a march after each of so many equal parts [-]: chosen, not measured. More tries end sooner
+# where one succeeds, and cost up to 25 factorisations each where none does.
+TRIES = 4
 
 
 def march(problem: Problem, state: Array, time_step: float, steps: int, theta: float = 1.0) -> Array:
@@ -33,14 +33,35 @@ def march(problem: Problem, state: Array, time_step: float, steps: int, theta: f
 def advance(problem: Problem, state: Array, time_step: float, theta: float) -> Array:
     """The change of a state over one step."""
     now = faces(problem, state)
-    rough, viscosity, _ = closed(problem, state, now.cell)
     # Never below a thousandth, so that dry land keeps a water table.
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
-    along, across = _damping(problem, now, rough, viscosity)
-    change = -residual(problem, state)
-    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, problem.outlet, time_step, theta, problem.dx)
+    along, across = _damping(problem, now, closures(problem, state, now.cell))
+    change, outlet = -residual(problem, state), problem.boundaries.outlet
+    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, problem.dx)
     sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
+
+
+@dataclass(frozen=True)
+class FallBack:
+    """How members are marched where Newton fails: steps [s], and the flow time [s] after which one has failed.
+
+    Chosen, not measured: a wave runs through 171 m of water 1 m deep within a minute, so that 40 minutes let it come
+    and go many times; a step of 0.5 s takes about as long as the water needs through a cell. Longer channels may
+    need more time (`numerics.march_span`), a march that runs away shorter steps (`numerics.march_step`).
+    """
+
+    step: float = 0.5
+    span: float = 2400.0
+
+
+USUAL_FALL_BACK = FallBack()
+
+
+def fall_back(step: float | None, span: float | None) -> FallBack:
+    """What a case asks for; what it leaves out is as usual."""
+    usual = USUAL_FALL_BACK
+    return FallBack(usual.step if step is None else step, usual.span if span is None else span)
 
 
 @dataclass(frozen=True)
@@ -53,29 +74,29 @@ class Marched:
     sentence: str
 
 
-def settle(problem: Problem, start: Array, tolerance: float) -> Marched:
+def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBack) -> Marched:
     """March one member until Newton can finish it; its steady state is judged as any other, by its residual."""
-    state, per_try = start, round(FALL_BACK_SPAN / FALL_BACK_STEP)
-    for tried in range(1, FALL_BACK_TRIES + 1):
+    state, per_try = start, max(round(how.span / TRIES / how.step), 1)
+    for tried in range(1, TRIES + 1):
         with np.errstate(over="ignore", invalid="ignore"):  # a march that runs away is told by its end
-            state = march(problem, state, FALL_BACK_STEP, per_try)
+            state = march(problem, state, how.step, per_try)
+        steps = tried * per_try
         if not np.isfinite(state).all():
-            return Marched(state, False, tried * per_try, f"not finite within {tried * FALL_BACK_SPAN:g} s of marching")
+            return Marched(state, False, steps, f"not finite within {steps * how.step:g} s of marching")
         polished = newton(problem, state, tolerance, most=25, time_step=50.0)
         if polished.converged[0]:
-            return Marched(polished.state, True, tried * per_try, "")
-    rate = float(np.abs(advance(problem, state, FALL_BACK_STEP, 1.0)).max()) / FALL_BACK_STEP
-    span = FALL_BACK_TRIES * FALL_BACK_SPAN
-    return Marched(state, False, FALL_BACK_TRIES * per_try, f"still changing by {rate:.1e} per second after {span:g} s")
+            return Marched(polished.state, True, steps, "")
+    rate = float(np.abs(advance(problem, state, how.step, 1.0)).max()) / how.step
+    return Marched(state, False, steps, f"still changing by {rate:.1e} per second after {steps * how.step:g} s")
 
 
-def _damping(problem: Problem, now: Faces, rough: Array, viscosity: Array) -> tuple[Array, Array]:
+def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Array]:
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    cell = 2.0 * rough * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
+    cell = 2.0 * closed.rate * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
     # Shear acts on a thin cell over the depth of its deeper corners.
     sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
-    cell += 4.0 * viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
+    cell += 4.0 * closed.viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
     across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])

@@ -1,7 +1,8 @@
-"""Which members are near one another: coordinates in which they lie as far apart as their flows differ, sets of
+"""How near members are to one another: coordinates in which they lie as far apart as their flows differ, clusters of
 neighbours, and the order to solve them in.
 
-Places s (m, d) are prior probabilities, in which every parameter is alike; spots s A are places along other axes.
+A member is a point s (d,) of the unit cube, its prior probabilities, in which every parameter is alike. Its coordinates
+are s A, along other axes A (d, d).
 """
 
 from collections.abc import Sequence
@@ -11,31 +12,32 @@ import numpy as np
 
 from vegglue.arrays import Array
 
-# The shortest axis, relative to the longest: no parameter is left out of account.
-SHORTEST = 0.1
+# The shortest axis over the longest [-]: no parameter is left out of account. Chosen, not measured: with less a cluster
+# holds members that differ much in what changes flows little.
+SHORTEST_AXIS = 0.1
 
 
 @dataclass(frozen=True)
 class ParameterMetric:
-    """Members: their places in the unit cube and their spots (m, d), and the axes A (d, d) of these."""
+    """Members: their points in the unit cube and their coordinates (m, d), and the axes A (d, d) of these."""
 
-    places: Array
+    points: Array
     axes: Array
-    spots: Array
+    coordinates: Array
 
 
-def parameter_metric(places: Array, slopes: Sequence[tuple[Array, ...]]) -> ParameterMetric:
-    """Members at places, nearness as the tangents of some flows have it."""
-    found = axes(slopes, places.shape[1])
-    return ParameterMetric(places, found, places @ found)
+def parameter_metric(points: Array, slopes: Sequence[tuple[Array, ...]]) -> ParameterMetric:
+    """Members at points (m, d), how near they are as the tangents of some flows have it."""
+    axes = principal_axes(slopes, points.shape[1])
+    return ParameterMetric(points, axes, points @ axes)
 
 
-def axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
+def principal_axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
     """A (d, d), the principal axes of G = sum S'S, S the tangents d state/ds of one flow or more; each as long as the
     square root of the change along it, the longest one.
 
-    Along axes as long as the change itself members take more steps (DECISIONS). Rounded, so that sets cut with them are
-    the same on another machine. The unit cube without tangents.
+    Along axes as long as the change itself members take more steps (DECISIONS). Rounded, so that clusters cut with them
+    are the same on another machine. The unit cube without tangents.
     """
     gram = np.zeros((parameters, parameters))
     for some in slopes:
@@ -45,11 +47,11 @@ def axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
         return np.eye(parameters)
     squares, found = np.linalg.eigh(gram)
     found *= np.sign(found[np.abs(found).argmax(axis=0), np.arange(parameters)])
-    length = np.maximum(np.maximum(squares, 0.0) / squares[-1], SHORTEST**4) ** 0.25
+    length = np.maximum(np.maximum(squares, 0.0) / squares[-1], SHORTEST_AXIS**4) ** 0.25
     return np.round(found * length, 2)
 
 
-def leaves(spots: Array, size: int) -> list[np.ndarray]:
+def clusters(coordinates: Array, size: int) -> list[np.ndarray]:
     """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the
     last.
     """
@@ -57,33 +59,33 @@ def leaves(spots: Array, size: int) -> list[np.ndarray]:
     def cut(index: np.ndarray, parts: int, upwards: bool) -> list[np.ndarray]:
         if parts == 1:
             return [index]
-        longest = int(np.argmax(np.ptp(spots[index], axis=0)))
-        ordered = index[np.argsort(spots[index, longest], kind="stable")]
+        longest = int(np.argmax(np.ptp(coordinates[index], axis=0)))
+        ordered = index[np.argsort(coordinates[index, longest], kind="stable")]
         fewer = parts // 2
         border = index.size * fewer // parts
         low, high = (ordered[:border], fewer), (ordered[border:], parts - fewer)
         first, second = (low, high) if upwards else (high, low)
         return cut(*first, True) + cut(*second, False)
 
-    return cut(np.arange(len(spots)), -(-len(spots) // size), True)
+    return cut(np.arange(len(coordinates)), -(-len(coordinates) // size), True)
 
 
-def spread(spots: Array, pending: np.ndarray, centre: Array) -> np.ndarray:
-    """Pending members, the furthest from all before first, so that most of them lie between others."""
-    chosen, order = spots[pending], []
-    distance = squared(chosen, centre)
+def farthest_first(coordinates: Array, pending: np.ndarray, centre: Array) -> np.ndarray:
+    """Pending members, the farthest from all before first, so that most of them lie between others."""
+    chosen, order = coordinates[pending], []
+    distance = squared_distances(chosen, centre)
     for _ in range(pending.size):
         order.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, squared(chosen, chosen[order[-1]]))
+        distance = np.minimum(distance, squared_distances(chosen, chosen[order[-1]]))
         distance[order] = -1.0
     return pending[order]
 
 
-def nearest_members(spots: Array, some: np.ndarray, centre: Array, most: int) -> np.ndarray:
-    """Of some members, those nearest to a spot, the nearest first."""
-    return some[np.argsort(squared(spots[some], centre), kind="stable")[:most]]
+def nearest_members(coordinates: Array, some: np.ndarray, centre: Array, most: int) -> np.ndarray:
+    """Of some members, those nearest to one of these coordinates, the nearest first."""
+    return some[np.argsort(squared_distances(coordinates[some], centre), kind="stable")[:most]]
 
 
-def squared(spots: Array, spot: Array) -> Array:
-    """Squared distances from one spot, (m,)."""
-    return np.asarray(((spots - spot) ** 2).sum(axis=1))
+def squared_distances(coordinates: Array, centre: Array) -> Array:
+    """Squared distances of members (m, d) from one of these coordinates, (m,)."""
+    return np.asarray(((coordinates - centre) ** 2).sum(axis=1))

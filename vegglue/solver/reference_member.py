@@ -1,5 +1,5 @@
-"""One member solved alone or beside another, with what neighbours need of it: factors, tangents, and the band they
-hold for.
+"""One member solved alone or beside another, and what makes it the reference of its neighbours: factors, tangents, and
+the band of rows they hold for.
 """
 
 from collections.abc import Callable
@@ -13,88 +13,97 @@ from vegglue.flow.equations import residual
 from vegglue.flow.problem import Problem, crop
 from vegglue.solver.chord import ChordSolution
 from vegglue.solver.jacobian import Factors, factors
-from vegglue.solver.march import settle
+from vegglue.solver.march import FallBack, march_to_rest
 from vegglue.solver.newton import CLOSE, finish, newton
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
 
+# Step [-] in the unit cube of the one-sided differences of tangents. Chosen, not measured: tangents only say where to
+# begin, and are off by the curvature over such a step.
 TANGENT_STEP = 1e-4
+# The problem of members at points (m, d) of the unit cube.
 ProblemOf = Callable[[Array], Problem]
 Attempt = tuple[ChordSolution, Factors | None, tuple[int, int]]
 
 
 @dataclass(frozen=True)
-class SolvedMember:
-    """A state (nx, 3, ny, 1) solved at one place of the unit cube, on the way to others roughly, and d state / d s_p
-    there.
+class LinearisedMember:
+    """A state (nx, 3, ny, 1) at one point (d,) of the unit cube, rough where it was only a stride on the way to others,
+    and d state / d s_p there.
     """
 
-    place: Array
+    point: Array
     state: Array
     slopes: tuple[Array, ...]
 
-    def predict(self, places: Array) -> Array:
-        """state + sum_p slope_p (s_p - place_p), (nx, 3, ny, m)."""
-        predicted = np.repeat(self.state, len(places), axis=3)
+    def predict(self, points: Array) -> Array:
+        """state + sum_p slope_p (s_p - point_p), (nx, 3, ny, m)."""
+        predicted = np.repeat(self.state, len(points), axis=3)
         for p, slope in enumerate(self.slopes):
-            predicted += slope * (places[:, p] - self.place[p])
+            predicted += slope * (points[:, p] - self.point[p])
         return predicted
 
 
 @dataclass(frozen=True)
 class ReferenceMember:
-    """A centre: its state (nx, 3, ny, 1) and, unless it had to be marched, what its neighbours need of it."""
+    """A member that others lean on: its state (nx, 3, ny, 1) and, unless it had to be marched, its tangents and the
+    factors in its band of rows.
+    """
 
     state: Array
     status: int
     reason: str
     iterations: int
-    known: SolvedMember | None
+    linearised: LinearisedMember | None
     factors: Factors | None
     band: tuple[int, int]
 
 
-def known_middle(problem_of: ProblemOf, parameters: int, tolerance: float) -> SolvedMember | None:
-    """The member in the middle of the prior, for all others to begin from; None if it has to be marched."""
-    middle = np.full(parameters, 0.5)
-    return solve_centre(problem_of, middle, None, tolerance).known
+def linearised_median(
+    problem_of: ProblemOf, parameters: int, tolerance: float, how: FallBack
+) -> LinearisedMember | None:
+    """The member at the medians of all priors, for others to begin from; None if it has to be marched."""
+    point = np.full(parameters, 0.5)
+    return solve_reference(problem_of, problem_of(point[None]), point, None, tolerance, how).linearised
 
 
-def solve_centre(problem_of: ProblemOf, place: Array, warm: Array | None, tolerance: float) -> ReferenceMember:
-    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching."""
-    problem = problem_of(place[None])
+def solve_reference(
+    problem_of: ProblemOf, problem: Problem, point: Array, warm: Array | None, tolerance: float, how: FallBack
+) -> ReferenceMember:
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching.
+
+    problem: of the one member at the point.
+    """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
         solution, shared, band = settled(problem, start, tolerance)
         spent += int(solution.iterations[0])
         if shared is None:
             continue
-        return _lead(problem_of, place, problem, band, solution.state, shared, spent)
-    return _marched(problem, spent, tolerance)
+        return _reference(problem_of, problem, point, band, solution.state, shared, spent)
+    return _marched(problem, spent, tolerance, how)
 
 
-def lead_at(problem_of: ProblemOf, place: Array, state: Array) -> ReferenceMember:
-    """What neighbours need of a solved state (nx, 3, ny, 1)."""
-    return _lead_in(problem_of, place, problem_of(place[None]), state)
-
-
-def _lead_in(problem_of: ProblemOf, place: Array, problem: Problem, state: Array) -> ReferenceMember:
+def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
+    """A member already solved, its state (nx, 3, ny, 1), as a reference."""
     band = wet_band(problem, state)
     near = rows_inside(state, band)
-    return _lead(problem_of, place, problem, band, near, factors(crop(problem, *band), near), 0)
+    return _reference(problem_of, problem, point, band, near, factors(crop(problem, *band), near), 0)
 
 
-def lead_beside(problem_of: ProblemOf, place: Array, lead: ReferenceMember, tolerance: float) -> ReferenceMember:
-    """A centre near another: with the factors of that one, if they reach, else on its own."""
-    assert lead.known is not None
-    assert lead.factors is not None
-    problem, start = problem_of(place[None]), lead.known.predict(place[None])
-    end = chord_in_band(problem, rows_inside(start, lead.band), lead.factors, lead.band, tolerance)
+def reference_beside(
+    problem_of: ProblemOf, problem: Problem, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
+) -> ReferenceMember:
+    """A reference near another: with the factors of that one, if they reach, else on its own."""
+    assert other.linearised is not None
+    assert other.factors is not None
+    start = other.linearised.predict(point[None])
+    end = chord_in_band(problem, rows_inside(start, other.band), other.factors, other.band, tolerance)
     spent = int(end.iterations[0])
     if end.converged[0]:
-        state = widen(end.state, problem.shape[1], lead.band)
-        return replace(_lead_in(problem_of, place, problem, state), state=state, iterations=spent)
-    alone = solve_centre(problem_of, place, start, tolerance)
+        state = widen(end.state, problem.shape[1], other.band)
+        return replace(reference_at(problem_of, problem, point, state), state=state, iterations=spent)
+    alone = solve_reference(problem_of, problem, point, start, tolerance, how)
     return replace(alone, iterations=spent + alone.iterations)
 
 
@@ -150,37 +159,37 @@ def _checked(
     return solution, shared, band
 
 
-def _lead(
+def _reference(
     problem_of: ProblemOf,
-    place: Array,
     problem: Problem,
+    point: Array,
     band: tuple[int, int],
     state: Array,
     shared: Factors,
     spent: int,
 ) -> ReferenceMember:
     part, ny = crop(problem, *band), problem.shape[1]
-    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, place, part, band, state, shared))
+    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, point, part, band, state, shared))
     wide = widen(state, ny, band)
-    return ReferenceMember(wide, SOLVED_BY_NEWTON, "", spent, SolvedMember(place, wide, slopes), shared, band)
+    return ReferenceMember(wide, SOLVED_BY_NEWTON, "", spent, LinearisedMember(point, wide, slopes), shared, band)
 
 
 def _tangents(
-    problem_of: ProblemOf, place: Array, part: Problem, band: tuple[int, int], state: Array, shared: Factors
+    problem_of: ProblemOf, point: Array, part: Problem, band: tuple[int, int], state: Array, shared: Factors
 ) -> list[Array]:
     """-J^-1 dR/ds_p by one-sided differences of the residual in s, good enough to start from."""
     base = residual(part, state)
-    steps = np.where(place < 0.5, TANGENT_STEP, -TANGENT_STEP)
-    moved = crop(problem_of(place + np.diag(steps)), *band)
-    rates = residual(moved, np.repeat(state, place.size, axis=3))
+    steps = np.where(point < 0.5, TANGENT_STEP, -TANGENT_STEP)
+    moved = crop(problem_of(point + np.diag(steps)), *band)
+    rates = residual(moved, np.repeat(state, point.size, axis=3))
     tangents = -shared.solve((rates - base) / steps)
-    return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(place.size)]
+    return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
 
 
-def _marched(problem: Problem, spent: int, tolerance: float) -> ReferenceMember:
+def _marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
     """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
     start = backwater(problem)
-    marched = settle(problem, start, tolerance)
+    marched = march_to_rest(problem, start, tolerance, how)
     status = SOLVED_BY_MARCHING if marched.steady else FAILED
     reason = "" if marched.steady else f"no steady state: {marched.sentence}"
     state = marched.state if marched.steady else np.full_like(start, np.nan)

@@ -17,10 +17,12 @@ from vegglue.flow.problem import Problem, take
 from vegglue.solver import block_elimination
 from vegglue.solver.jacobian import Factors
 
-# Step [m, m/s] of the central difference along a direction scaled to one.
+# Step [m, m/s] of the central difference along a direction scaled to one: chosen, not measured. Tangents agree with
+# differences of solved states to 1e-4 (test_tangent).
 DIRECTION_STEP = 1e-5
+# Rounds of residuals at most [-]: chosen, not measured; where factors are those of the state itself a few are enough.
 MOST_ROUNDS = 12
-# Causes answered together: what has been tried for each is kept.
+# Causes answered together [-]: what has been tried for each is kept, so that more need more memory.
 CAUSE_LANES = 16
 
 

@@ -12,38 +12,38 @@ from vegglue.resistance.physical_constants import GRAVITY
 Act = Callable[..., Mapping[str, Array]]
 
 
-def _away(ground: ChannelGeometry, x: Array, y: Array, radius: Array) -> Array:
+def _away(geometry: ChannelGeometry, x: Array, y: Array, radius: Array) -> Array:
     """Squared distance from a place over the squared radius [-]."""
-    return ((ground.x - x) ** 2 + (ground.y - y) ** 2) / radius**2
+    return ((geometry.x - x) ** 2 + (geometry.y - y) ** 2) / radius**2
 
 
 def pier(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """k -> k + c exp(-(s / r)^4), s the distance from a place: a block with sharp sides."""
-    return {"rate": cells.rate + drag * np.exp(-(_away(cells.ground, x, y, radius) ** 2))}
+    return {"rate": cells.rate + drag * np.exp(-(_away(cells.geometry, x, y, radius) ** 2))}
 
 
 def jet(cells: Cells, push: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """f_x = g a exp(-(s / r)^2)."""
-    return {"x": GRAVITY * push * np.exp(-_away(cells.ground, x, y, radius))}
+    return {"x": GRAVITY * push * np.exp(-_away(cells.geometry, x, y, radius))}
 
 
 def sink(cells: Cells, loss: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """f = -a U exp(-(s / r)^2): momentum is lost in proportion to speed, not to its square."""
-    held = -loss * np.exp(-_away(cells.ground, x, y, radius))
+    held = -loss * np.exp(-_away(cells.geometry, x, y, radius))
     return {"x": held * cells.u, "y": held * cells.v}
 
 
 def fallen_tree(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """k -> k + c exp(-(p / 0.3 r)^2 - (q / 2 r)^4), q along a stem at 45 degrees to the channel and p across it."""
-    along = ((cells.ground.x - x) + (cells.ground.y - y)) / np.sqrt(2.0)
-    across = ((cells.ground.x - x) - (cells.ground.y - y)) / np.sqrt(2.0)
+    along = ((cells.geometry.x - x) + (cells.geometry.y - y)) / np.sqrt(2.0)
+    across = ((cells.geometry.x - x) - (cells.geometry.y - y)) / np.sqrt(2.0)
     shape = np.exp(-((across / (0.3 * radius + 0.2)) ** 2) - (along / (2.0 * radius)) ** 4)
     return {"rate": cells.rate + drag * shape}
 
 
-def scour_hole(ground: ChannelGeometry, depth: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
+def scour_hole(geometry: ChannelGeometry, depth: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
     """z_b -> z_b - d exp(-(s / r)^2)."""
-    return {"bed": -depth * np.exp(-_away(ground, x, y, radius))}
+    return {"bed": -depth * np.exp(-_away(geometry, x, y, radius))}
 
 
 PLACE = (
