@@ -10,7 +10,6 @@ import pytest
 from diagnoses import NOTHING, a_diagnosis, a_suspect
 from drawings import off_the_sheet, points, texts
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
 from matplotlib.transforms import Bbox
@@ -117,8 +116,7 @@ def test_places_mark_what_was_found() -> None:
 
 @pytest.mark.parametrize("places", [1, 2])
 def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
-    found = a_diagnosis()
-    drag = found.drag_map
+    drag = a_diagnosis().drag_map
     part = drag.x[:places], drag.y[:places], drag.score[:places]
     (axes,) = draw_places(*part, None, [], np.array([[31.0, 0.5]])).axes
     assert points(axes, ".") == [(31.0, 0.5)]
@@ -127,18 +125,16 @@ def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
 
 
 def test_places_draw_contours_patches_and_stations() -> None:
-    found = a_diagnosis()
+    drag = a_diagnosis().drag_map
     corners = np.array([[30.0, 0.0], [34.0, 0.0], [34.0, 0.5], [30.0, 0.5]])
     spots = np.array([[31.0, 0.5], [35.0, -0.5]])
-    figure = draw_places(
-        found.drag_map.x, found.drag_map.y, 9.0 * found.drag_map.score, None, [Outline("p1", corners)], spots
-    )
+    figure = draw_places(drag.x, drag.y, 9.0 * drag.score, None, [Outline("p1", corners)], spots)
     (axes,) = figure.axes
     assert len(axes.collections) == 4, "more and less drag, faces and lines"
     assert points(axes, ".") == [tuple(spot) for spot in spots]
     assert np.array_equal(axes.patches[0].get_xy()[:4], corners)
     assert points(axes, "*") == []
-    assert f"largest {9.0 * np.abs(found.drag_map.score).max():.1f}" in " ".join(texts(axes))
+    assert f"largest {9.0 * np.abs(drag.score).max():.1f}" in " ".join(texts(axes))
     assert off_the_sheet(figure) == []
 
 
@@ -220,29 +216,47 @@ def crowded() -> Diagnosis:
 
 
 SCREENS = {
-    "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()), "crowded": crowded(),
+    "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()),
     "no location": a_diagnosis(steps=(), verdict={"location": None}),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("diagnosis", SCREENS.values(), ids=SCREENS)
 def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
-    """The whole sentence is on it, nothing is cut off at its edge, and no panel covers another or the sentence."""
     figure = draw_diagnosis(diagnosis, [])
-    FigureCanvasAgg(figure).draw()
-    verdict = diagnosis.verdict
-    assert figure.get_suptitle().split() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}".split()
+    assert off_the_sheet(figure) == []
+    verdict, zones, drag = diagnosis.verdict, diagnosis.misfit.zones, diagnosis.drag_map
+    assert figure.get_suptitle() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
+    scores, visible, alike, *rest = figure.axes
+    assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
+        one.name for one in diagnosis.suspects
+    }
+    shown = sorted(bar.get_width() for bar in visible.patches)
+    assert shown == sorted(one.detectability.visibility for one in diagnosis.suspects)
+    assert {label.get_text() for label in alike.get_yticklabels()} == set(diagnosis.first_screening.compared)
+    assert len(rest) == bool(len(zones)) + bool(drag.x.size)
+    if len(zones):
+        assert len(texts(rest[0])) == 2 * len(zones)
+    if drag.x.size:
+        station = diagnosis.predictions.station
+        assert len(points(rest[-1], "*")) == (verdict.location is not None)
+        assert set(points(rest[-1], ".")) == set(zip(station["x"], station["y"], strict=True))
+
+
+def test_a_sentence_too_long_for_the_screen_is_broken() -> None:
+    told = "A sentence of many words that goes on " * 12
+    figure = draw_diagnosis(a_diagnosis(verdict={"sentence": told}), [])
+    assert "\n" in figure.get_suptitle()
+    assert off_the_sheet(figure) == []
+
+
+@pytest.mark.parametrize("diagnosis", [a_diagnosis(), crowded()], ids=["usual", "crowded"])
+def test_no_panel_of_a_screen_covers_another_or_the_sentence(diagnosis: Diagnosis) -> None:
+    figure = draw_diagnosis(diagnosis, [])
+    assert off_the_sheet(figure) == []
     title = next(text for text in figure.texts if text.get_text() == figure.get_suptitle())
-    panels = {"sentence": title.get_window_extent()}
-    panels |= {f"panel {number}": axes.get_tightbbox() for number, axes in enumerate(figure.findobj(Axes))}
-    screen = figure.bbox.padded(1.0)
-    assert [name for name, box in panels.items() if not within(box, screen)] == []
-    pairs = combinations(panels, 2)
-    assert [pair for pair in pairs if overlap(*(panels[name] for name in pair)) > 1.0] == []
-
-
-def within(box: Bbox, outer: Bbox) -> bool:
-    return box.x0 >= outer.x0 and box.y0 >= outer.y0 and box.x1 <= outer.x1 and box.y1 <= outer.y1
+    panels = [title.get_window_extent(), *(axes.get_tightbbox() for axes in figure.findobj(Axes))]
+    assert [pair for pair in combinations(range(len(panels)), 2) if overlap(*(panels[k] for k in pair)) > 1.0] == []
 
 
 def overlap(one: Bbox, other: Bbox) -> float:

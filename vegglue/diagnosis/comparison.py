@@ -27,8 +27,8 @@ By = Literal["sections", "experiments"]
 
 @dataclass(frozen=True)
 class InSample:
-    """Errors at what the calibration has seen: root mean square by kind [m/s or m], chi2 of independent errors [-] over
-    so many stations, and the root mean square error of measuring a velocity [m/s].
+    """Errors at what the calibration has seen: root mean square by kind [its unit], NaN for what was not measured; chi2
+    of independent errors [-] over so many stations, and the root mean square error of measuring a velocity [m/s].
     """
 
     rmse: dict[str, float]
@@ -40,8 +40,8 @@ class InSample:
 @dataclass(frozen=True)
 class HeldOut:
     """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
-    nothing could be left out. velocity: which are velocities [m/s], the others are levels [m]; clusters: the
-    experiment and the section of each.
+    nothing could be left out. velocity: which are velocities along x [m/s]; clusters: the experiment and the section
+    of each.
     """
 
     sections: Array
@@ -113,8 +113,7 @@ def rung_json(rung: Rung) -> dict[str, Any]:
         "title": rung.title,
         "effects": rung.effects,
         "parameters": len(rung.values),
-        **asdict(rung.in_sample),
-        "rmse": _known_numbers(rung.in_sample.rmse),
+        **asdict(rung.in_sample) | {"rmse": _known_numbers(rung.in_sample.rmse)},
         **asdict(rung.predictive),
         "values": rung.values,
         "homogeneity": rung.homogeneity,
@@ -123,13 +122,6 @@ def rung_json(rung: Rung) -> dict[str, Any]:
         "held_out_experiments": held_out_rmse(rung, "experiments"),
     }
     return _known_numbers(tree)
-
-
-def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """null instead of NaN, which JSON does not know."""
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
-    }
 
 
 def improvement(before: Rung, after: Rung, by: By = "sections") -> tuple[float, float]:
@@ -161,6 +153,13 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     value, error = (np.array(part) for part in zip(*told, strict=True))
     chances = {name: alike(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
     return {name: p for name, p in chances.items() if np.isfinite(p)}
+
+
+def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """null instead of NaN, which JSON does not know."""
+    return {
+        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
+    }
 
 
 def _of_velocities(rung: Rung, by: By) -> Array:

@@ -25,8 +25,8 @@ from vegglue.site.polygons import corners_of
 
 # Effects drawn at once, and sections side by side.
 SECTIONS_DRAWN, PANELS_ACROSS = 16, 4
-# Letters in a line above the screen: with 150, lines of wide letters were cut off at its right edge.
-SENTENCE = 140
+# Letters of the verdict in a line; with more than these it may run off the screen.
+LINE = 135
 
 
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
@@ -49,7 +49,7 @@ def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str,
 def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
     figure = Figure(figsize=(14, 8.6), layout="constrained")
-    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", SENTENCE)
+    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", LINE)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
