@@ -74,9 +74,9 @@ def test_patches_zones_and_boundaries_hold_the_same_cells(tmp_path: Path) -> Non
     cells = [6, 7]
     assert np.flatnonzero(site.patch[0] == 0).tolist() == cells
     assert np.flatnonzero(site.friction_class[0] == 1).tolist() == cells
-    assert np.flatnonzero(problem.outlet).tolist() == cells
+    assert np.flatnonzero(problem.boundaries.outlet).tolist() == cells
     assert inflow_cells(case.inflows["upstream"], site.grid).tolist() == cells
-    assert (problem.inflows[0].start, problem.inflows[0].stop) == (6, 8)
+    assert (problem.boundaries.inflows[0].start, problem.boundaries.inflows[0].stop) == (6, 8)
 
 
 @pytest.mark.parametrize(("changes", "key"), EMPTY)
