@@ -8,7 +8,7 @@ from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
 from vegglue.case.parts import Interval, Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import Inflow, Stand, StandOverride
+from vegglue.case.site_schema import COEFFICIENT_OF, Inflow, Stand, StandOverride
 from vegglue.effects.definition import Amplitude, Shape
 from vegglue.effects.library import library
 
@@ -27,7 +27,7 @@ def disagreement(case: Case) -> Refusal | None:
 def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
     """Every number that may be a parameter: where it stands, what stands there, and whether it must be positive."""
     for name, friction_class in case.friction.classes.items():
-        for key in ("n", "k_s", "c"):
+        for key in COEFFICIENT_OF.values():
             yield ("friction", "classes", name, key), getattr(friction_class, key), True
     owners: list[tuple[KeyPath, Mapping[str, Stand | StandOverride]]] = [(("plants",), case.plants.stands)]
     owners += [(("experiments", name), experiment.stands) for name, experiment in case.experiments.items()]

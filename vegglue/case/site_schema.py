@@ -49,6 +49,10 @@ class BedLayer(Part):
         return self
 
 
+# The key of a friction class that holds the coefficient of each law of the bed; the laws are those of resistance/bed_laws.
+COEFFICIENT_OF = {"manning": "n", "keulegan": "k_s", "chezy": "c"}
+
+
 class FrictionClass(Part):
     law: Literal["manning", "keulegan", "chezy"] = Field(description="C = h^(1/6)/n, 18 log10(12 h/k_s), or given")
     n: Value | None = Field(default=None, description="Manning coefficient [s m^-1/3]")
@@ -57,8 +61,14 @@ class FrictionClass(Part):
 
     @model_validator(mode="after")
     def _coefficient_of_the_law(self) -> Self:
-        exactly(self, self.law, {"manning": ("n",), "keulegan": ("k_s",), "chezy": ("c",)})
+        exactly(self, self.law, {law: (key,) for law, key in COEFFICIENT_OF.items()})
         return self
+
+    @property
+    def coefficient(self) -> Value:
+        """The coefficient of its law, a number or the name of a parameter."""
+        value: Value = getattr(self, COEFFICIENT_OF[self.law])
+        return value
 
 
 class Zone(Part):

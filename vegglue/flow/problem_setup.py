@@ -15,8 +15,6 @@ from vegglue.site.channel_geometry import channel_geometry, patches_present
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
-BED_LAWS = {"manning": (bed_laws.MANNING, "n"), "keulegan": (bed_laws.KEULEGAN, "k_s"), "chezy": (bed_laws.CHEZY, "c")}
-
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
     """The problem of one experiment for all members of theta, {parameter: (members,)}.
@@ -50,8 +48,8 @@ def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFric
     classes = [case.friction.classes[name] for name in site.class_names]
     return BedFriction(
         friction_class=site.friction_class,
-        law=np.array([BED_LAWS[item.law][0] for item in classes], dtype=np.int64),
-        coefficient=np.array([value_of(getattr(item, BED_LAWS[item.law][1]), theta, members) for item in classes]),
+        law=np.array([bed_laws.BED_LAWS.index(item.law) for item in classes], dtype=np.int64),
+        coefficient=np.array([value_of(item.coefficient, theta, members) for item in classes]),
         log_argument_minimum=case.numerics.bank_argument_minimum,
     )
 

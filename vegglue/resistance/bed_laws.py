@@ -9,6 +9,8 @@ from vegglue.resistance.elementary import cube_root, logarithm
 from vegglue.resistance.physical_constants import FILM_ON_LAND, GRAVITY
 
 # The laws by number, as a loop can tell them.
+# Laws of the bed by the names a config gives them; compiled loops know each by its place here.
+BED_LAWS = ("manning", "keulegan", "chezy")
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
 # 18 log10 x = LOG_SLOPE ln x [m^1/2/s].
 LOG_SLOPE = 18.0 / math.log(10.0)
