@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from vegglue.errors import InputError
 from vegglue.parallel import at_most, in_threads
 
 
@@ -38,6 +39,11 @@ def test_what_is_found_stands_in_the_order_of_the_tasks() -> None:
 
     with at_most(3):
         assert in_threads(late, [(number,) for number in range(5)]) == list(range(5))
+
+
+def test_no_jobs_at_all_are_refused() -> None:
+    with pytest.raises(InputError, match="got 0"), at_most(0):
+        pass
 
 
 def test_what_a_task_raises_is_raised() -> None:

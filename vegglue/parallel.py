@@ -18,6 +18,8 @@ from typing import Any
 from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import threadpool_limits
 
+from vegglue.errors import InputError
+
 # Threads that may be begun beside those at work, in what is done within `at_most`.
 _SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
 
@@ -34,7 +36,9 @@ def in_order(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: i
 
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
-    """So many threads at once in all that is done within; -1 for one on every core."""
+    """So many threads at once in all that is done within; -1 for one on every core. Errors: InputError for 0."""
+    if jobs == 0:
+        raise InputError("jobs: expected the number of cores to use, or -1 for all of them, got 0.")
     token = _SPARE.set(Semaphore((cpu_count() if jobs < 0 else jobs) - 1))
     try:
         yield

@@ -77,9 +77,9 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
         found = flagging(model, *flagged)
         (runs / case.name).mkdir(parents=True, exist_ok=True)
         write_diagnosis(runs / case.name / "diagnosis.h5", found, "", case_hash(case))
-        compare_command([CONFIG, child.source], runs)
+        compare_command([CONFIG, child.source], runs=runs)
         assert ("left out of every model" in capsys.readouterr().out) == bool(flagged)
-        compare_command([CONFIG, child.source], runs, as_object=True)
+        compare_command([CONFIG, child.source], runs=runs, as_object=True)
         told = json.loads(capsys.readouterr().out)
         assert [rung["stations"] for rung in told["rungs"]] == [stations - said] * 2
         assert len(told["left_out"]) == said

@@ -80,13 +80,14 @@ def extend_command(
 
 def compare_command(
     configs: Annotated[list[Path], typer.Argument(help="Cases, the baseline first.", show_default=False)],
+    jobs: Jobs = -1,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     trust: Trust = False,
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
     cases = [load_case(config, trust) for config in configs]
-    found = compare(cases, runs=runs, say=say_on(as_object))
+    found = compare(cases, runs=runs, jobs=jobs, say=say_on(as_object))
     if as_object:
         told = {"rungs": [rung_json(one) for one in found.rungs], "left_out": found.left_out.to_dict("records")}
         print(json.dumps(told, ensure_ascii=False))

@@ -11,7 +11,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.figures.error_ladder import save_ladder_figure
-from vegglue.parallel import one_thread
+from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
@@ -28,7 +28,7 @@ class Comparison:
 
 
 @one_thread()
-def compare(cases: Sequence[Case], *, runs: Path | str = "runs", say: Say = silent) -> Comparison:
+def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one.
 
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when a model finds
@@ -36,9 +36,10 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", say: Say = sile
     """
     aside = left_out(cases, runs)
     rungs = []
-    for case in cases:
-        say(f"calibrating {case.name}")
-        rungs.append(rung_of(case, runs, aside))
+    with at_most(jobs):
+        for case in cases:
+            say(f"calibrating {case.name}")
+            rungs.append(rung_of(case, runs, aside))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
     return found

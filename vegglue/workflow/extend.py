@@ -15,7 +15,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.refits import NEEDED
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
-from vegglue.parallel import one_thread
+from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_of
@@ -54,6 +54,12 @@ def extend_stepwise(case: Case, *, runs: Path | str = "runs", jobs: int = -1, sa
     misfit with all others.
     """
     found = diagnose(case, runs=runs, jobs=jobs, say=say)
+    with at_most(jobs):
+        return _extended(case, found, runs, say)
+
+
+def _extended(case: Case, found: Diagnosis, runs: Path | str, say: Say) -> StepwiseExtension:
+    """Child after child, each compared with the one before."""
     aside = excluded_by(found)
     cases, rungs = [case], [rung_of(case, runs, aside)]
     added: list[Addition] = []

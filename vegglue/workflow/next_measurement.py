@@ -10,7 +10,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.errors import InputError
-from vegglue.parallel import one_thread
+from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.workflow.diagnose import diagnose
@@ -45,8 +45,9 @@ def next_measurement(
     asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
     if not asked:
         return []
-    base = calibrated(case, folder_of(runs, case), excluded_by(found))
-    worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals for _, rivals in asked])
+    with at_most(jobs):
+        base = calibrated(case, folder_of(runs, case), excluded_by(found))
+        worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals for _, rivals in asked])
     return [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
 
 
