@@ -37,7 +37,7 @@ def make_problem(
         dy=cell[1],
         bed=np.ascontiguousarray(bed),
         friction=BedFriction(
-            np.zeros(bed.shape, np.int64), np.array([friction[0]]), np.array([[friction[1]]]), log_argument_minimum=1.3
+            np.zeros(bed.shape, np.int64), np.array([friction[0]]), np.array([[friction[1]]]), bank_argument_minimum=1.3
         ),
         plants=planted((0, 0), 0.0, 0.0, 0.0),
         viscosity=np.zeros(1),

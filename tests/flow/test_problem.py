@@ -11,7 +11,7 @@ from vegglue.flow.problem import BedFriction, Problem
 
 def test_choices_of_the_solver_have_their_defaults_in_the_schema() -> None:
     default = {item.name: item.default for kind in (Problem, BedFriction) for item in fields(kind)}
-    assert default["film"] is default["log_argument_minimum"] is MISSING
+    assert default["film"] is default["bank_argument_minimum"] is MISSING
     assert (Numerics().film_depth, Numerics().bank_argument_minimum) == (0.01, 1.3)
 
 

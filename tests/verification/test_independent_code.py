@@ -125,7 +125,7 @@ def papers_channel(case, switched):
         }
     changes |= {"friction_class": classes, "viscosity": np.array([0.01]), "film": 0.002}
     if switched:
-        changes |= {"smallest_shear_depth": True, "log_argument_minimum": 1.0129}
+        changes |= {"smallest_shear_depth": True, "bank_argument_minimum": 1.0129}
     return make_problem(bed, CELL, 2.66, 1.1 - 0.171, **changes)
 
 

@@ -48,7 +48,7 @@ LAWS = {
     "keulegan-other-clip": (
         0.3,
         18.0 * np.log10(1.0129),
-        classes(bed_laws.KEULEGAN, 4.0) | {"log_argument_minimum": 1.0129},
+        classes(bed_laws.KEULEGAN, 4.0) | {"bank_argument_minimum": 1.0129},
     ),
     "chezy": (0.8, 35.0, classes(bed_laws.CHEZY, 35.0)),
     "baptist-emergent": (0.5, baptist(0.5, 2.0, 0.8, 60.0), plants(2.0, 0.8)),

@@ -63,7 +63,7 @@ def bed_drag(problem: Problem, depth: Array, columns: slice = slice(None)) -> Ar
         bed.friction_class[columns],
         bed.law,
         bed.coefficient,
-        bed.log_argument_minimum,
+        bed.bank_argument_minimum,
         problem.film,
     )
 

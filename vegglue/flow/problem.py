@@ -31,13 +31,13 @@ class BedFriction:
     """Friction of the bed: class of each cell (nx, ny), law of each class (an index, see `bed_laws`), and its
     coefficient for each member (class, m) [s m^(-1/3), m or m^1/2/s].
 
-    log_argument_minimum: what 12 h/k_s is not let below [-].
+    bank_argument_minimum: the floor of the bank law, below which 12 h/k_s is not let fall [-].
     """
 
     friction_class: NDArray[np.int64]
     law: NDArray[np.int64]
     coefficient: Array
-    log_argument_minimum: float
+    bank_argument_minimum: float
 
 
 @dataclass(frozen=True)

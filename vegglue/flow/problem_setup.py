@@ -50,7 +50,7 @@ def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFric
         friction_class=site.friction_class,
         law=np.array([bed_laws.BED_LAWS.index(item.law) for item in classes], dtype=np.int64),
         coefficient=np.array([value_of(item.coefficient, theta, members) for item in classes]),
-        log_argument_minimum=case.numerics.bank_argument_minimum,
+        bank_argument_minimum=case.numerics.bank_argument_minimum,
     )
 
 

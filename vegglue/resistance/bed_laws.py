@@ -8,7 +8,6 @@ from vegglue.compilation import compiled
 from vegglue.resistance.elementary import cube_root, logarithm
 from vegglue.resistance.physical_constants import FILM_ON_LAND, GRAVITY
 
-# The laws by number, as a loop can tell them.
 # Laws of the bed by the names a config gives them; compiled loops know each by its place here.
 BED_LAWS = ("manning", "keulegan", "chezy")
 MANNING, KEULEGAN, CHEZY = 0, 1, 2
@@ -30,30 +29,31 @@ def _wet_depths(out, depth, half_range, dry):
 
 
 @compiled
-def _chezys(out, wet, half_range, law, coefficient, floor):
+def _chezys(out, wet, half_range, law, coefficient, bank_argument_minimum):
     """C [m^1/2/s] of the wet part of one cell for all members, of mean depth h: between h - w and h + w, or 0 and 2 h.
 
-    h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, floor))
-    (Keulegan 1938), whose floor would stop Newton where all of a cell met it at once.
+    h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, a))
+    (Keulegan 1938) with a the floor of the bank law, `bank_argument_minimum`, which would stop Newton where all of a
+    cell met it at once.
     """
     if law == MANNING:
         for k in range(wet.size):
             out[k] = math.sqrt(cube_root(wet[k])) / coefficient[k]
     elif law == KEULEGAN:
-        log_floor = math.log(floor)
+        lowest = math.log(bank_argument_minimum)
         for k in range(wet.size):
             per, half = 12.0 / coefficient[k], min(wet[k], half_range)
             high, low = per * (wet[k] + half), per * (wet[k] - half)
-            up, down = max(high, floor), max(low, floor)
-            above = up * (logarithm(up) - 1.0 - log_floor) - down * (logarithm(down) - 1.0 - log_floor)
-            out[k] = LOG_SLOPE * (log_floor + above / (high - low))
+            up, down = max(high, bank_argument_minimum), max(low, bank_argument_minimum)
+            above = up * (logarithm(up) - 1.0 - lowest) - down * (logarithm(down) - 1.0 - lowest)
+            out[k] = LOG_SLOPE * (lowest + above / (high - low))
     else:
         for k in range(wet.size):
             out[k] = coefficient[k]
 
 
 @compiled
-def class_drag(depth, half_range, friction_class, law, coefficient, log_argument_minimum, film):
+def class_drag(depth, half_range, friction_class, law, coefficient, bank_argument_minimum, film):
     """k = g h^2 / (s K(h_w) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
 
     depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; half_range: half the range of the bed across the
@@ -64,13 +64,13 @@ def class_drag(depth, half_range, friction_class, law, coefficient, log_argument
     (nx, ny, m), dry = depth.shape, FILM_ON_LAND * film
     drag, wet, on_film = np.empty(depth.shape), np.full(m, dry), np.empty((law.size, m))
     for c in range(law.size):
-        _chezys(on_film[c], wet, dry, law[c], coefficient[c], log_argument_minimum)
+        _chezys(on_film[c], wet, dry, law[c], coefficient[c], bank_argument_minimum)
     on_film *= dry * math.sqrt(dry)
     for i in range(nx):
         for j in range(ny):
             c, out = friction_class[i, j], drag[i, j]
             _wet_depths(wet, depth[i, j], half_range[i, j], dry)
-            _chezys(out, wet, half_range[i, j], law[c], coefficient[c], log_argument_minimum)
+            _chezys(out, wet, half_range[i, j], law[c], coefficient[c], bank_argument_minimum)
             for k in range(m):
                 share = max(depth[i, j, k] - dry, 1e-12) / (wet[k] - dry)
                 carried = share * out[k] * wet[k] * math.sqrt(wet[k]) + (1.0 - share) * on_film[c, k]
