@@ -79,7 +79,7 @@ def mixture_around(fits: tuple[Fitted, ...]) -> Mixture:
 
 
 def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior:
-    """What follows from the draws, but for what `_refinement` and `transfer` say."""
+    """What follows from the draws alone; `refine` adds `refinement` and `transfer`."""
     case, station, noise = base.model.case, base.model.station, base.noise
     error = noise.among_all(np.sqrt(np.diag(covariance_of(noise))), len(station))
     sigma = {kind: root_mean_square(error[rows]) for kind, rows in stations_by_kind(station).items()}

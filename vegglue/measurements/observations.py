@@ -42,7 +42,7 @@ class Observations:
     bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
     profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
     and linear_error (the rule `paper`), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
-    scatter (see profile.ProfileFit; NaN without a fit), used, reason.
+    scatter (see vertical_profile.ProfileFit; NaN without a fit), used, reason.
     discharge: by (experiment, section), then by rule, `paper` and `profile`.
     neighbour_error: by (experiment, section), the error of one vertical as its neighbours tell it [m/s]. Larger than
     the error of its own points, it holds what these do not show (position, stems); part of standard_error in table.

@@ -61,7 +61,7 @@ class RigidCylinder:
 
 
 def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
-    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV, by quantity; one row for each of QUANTITIES.
+    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV, by quantity; one row for each of SURVEYED.
 
     Raises InputError naming the file and row for what is missing, unknown, repeated, or not positive.
     """
