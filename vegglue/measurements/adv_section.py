@@ -43,7 +43,7 @@ DURATION = 60.0  # s
 
 @dataclass(frozen=True)
 class Section:
-    """One measured section: `points`, `profiles`, and the rest for this one section as in observations.Observations."""
+    """One measured section: its part of every value in observations.Observations of the same name."""
 
     points: pd.DataFrame
     profiles: pd.DataFrame
@@ -53,7 +53,10 @@ class Section:
 
 
 def read_section(case: Case, observation: Observation) -> Section:
-    """Everything one `kind: adv` entry yields; InputError names file and row of what cannot be used as given."""
+    """What one observation of `kind: adv` says about its section: points, verticals, discharge, canopy height.
+
+    Errors: InputError, naming file and row, for what cannot be used as given.
+    """
     points = _read_points(observation)
     section = _cross_section(case, observation, points["x"].iloc[0])
     points = _without_dead_probes(_with_errors(_placed(case, observation, points)), section)
@@ -67,12 +70,12 @@ def read_section(case: Case, observation: Observation) -> Section:
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
-    """Depth average and standard error (rows,) [m/s] by a rule.
+    """Depth average of each vertical and its standard error (rows,) [m/s], by a rule.
 
+    profiles: rows as in Observations.profiles.
     paper: as in Berends et al. (2020), linear between points, zero at the bed and constant above the highest point;
-    profile: of the fitted profile. The error of `paper` has a part for the straight line it draws to the bed and the
-    constant it draws to the surface: the difference d between both rules taken as the bound of a uniform distribution,
-    d / sqrt(3).
+    profile: the mean of the fitted profile. The error of `paper` includes that of its shape below the lowest point and
+    above the highest one: d / sqrt(3), the difference d of both rules being the bound of a uniform distribution.
     """
     if rule == "profile":
         return profiles["fitted"], profiles["fitted_error"]

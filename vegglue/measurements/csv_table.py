@@ -13,10 +13,12 @@ from vegglue.errors import InputError
 def read_table(
     path: Path, names: Sequence[str], numbers: Sequence[str], optional: Sequence[str] = (), labels: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """Columns of a CSV: `names` as text, `numbers` as float64; where present, `optional` numbers and `labels` as text.
+    """A CSV as a table, its index the number of each row in the file, whose heading is row 1.
 
-    Other columns are left out. The index is the row in the file, whose heading is row 1. Raises InputError naming file
-    and row for a file that cannot be read, a missing column, and a missing, non-numeric or infinite value.
+    names: columns that must be there, as text; numbers: columns that must be there, as float64; optional and labels:
+    numbers and text that are read where there is such a column. Other columns are left out.
+    Errors: InputError, naming file and row, when the file cannot be read, has no rows or lacks a column, and for a name
+    that is empty or a number that is missing, infinite or none.
     """
     try:
         raw = pd.read_csv(path, dtype=str, keep_default_na=False, skip_blank_lines=False, index_col=False)
@@ -49,13 +51,13 @@ def shown_name(path: Path) -> str:
 
 
 def refuse_rows(path: Path, wrong: pd.Series, complaint: str) -> None:
-    """Raise InputError naming the file and the first row where `wrong` (rows,) is true."""
+    """Errors: InputError with the complaint, naming the file and the first row where `wrong` (rows,) is true."""
     if wrong.any():
         raise InputError(f"{shown_name(path)}, row {wrong.idxmax()}: {complaint}.")
 
 
 def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
-    """Raise InputError when two rows agree in all these columns."""
+    """Errors: InputError naming file and rows when two rows agree in all these columns."""
     repeated = table.duplicated(list(columns))
     if repeated.any():
         row = repeated.idxmax()

@@ -5,10 +5,11 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 
-STILL = 0.05  # m/s, no point of a dead probe is above this
-SHARE = 0.1  # a dead probe stays below this share of the velocity between its neighbours at all heights ...
-CALM = 0.25  # ... and its velocity fluctuates by less than this share of theirs
-FEWEST = 3  # points; with fewer a slow vertical at the water's edge cannot be told from a dead probe
+# A probe is dead when all four hold. Chosen wide apart from what slow water shows, which still fluctuates.
+LARGEST_DEAD_SPEED = 0.05  # m/s, no point of a dead probe is above this
+SHARE_OF_SPEED = 0.1  # [-], at all heights it reads less than this share of the velocity between its neighbours
+SHARE_OF_TURBULENCE = 0.25  # [-], and its velocity fluctuates by less than this share of theirs
+FEWEST_HEIGHTS = 3  # with fewer points a slow vertical at the water's edge cannot be told from a dead probe
 
 
 def dead_probes(
@@ -20,22 +21,24 @@ def dead_probes(
     deviation: Array,
     plants: NDArray[np.bool_],
 ) -> list[str]:
-    """'' or the reason, for each vertical: near zero at every height where its neighbours are not, and no turbulence.
+    """Why the probe of each vertical (n,) is taken for dead, or ''.
 
-    edges and position (n,): y of the water's edges, where velocity and turbulence are zero, and of the verticals [m];
-    points: how many; largest and mean: of |u| and u over the points [m/s]; deviation: median of u_std [m/s], NaN when
-    unknown, and then a vertical inside plants (bool) gets the benefit of the doubt, since slow water is natural there.
+    A dead probe reads near zero at every height, without turbulence, where its neighbours do not. In slow water a
+    working probe still sees fluctuations and a rise with height.
 
-    A probe in slow water still sees it fluctuate and speed up with height, and so is not taken for dead.
+    edges: y of the water's edges, where velocity and turbulence are zero [m]; position (n,): y of the verticals [m];
+    points (n,): how many each has; largest and mean (n,): largest |u| and mean u over its points [m/s]; deviation (n,):
+    median of u_std [m/s], NaN when unknown; plants (n,): whether it stands in plants, where slow water is natural, so
+    that without u_std its probe is not taken for dead.
     """
-    suspect = (largest < STILL) & (points >= FEWEST)
+    suspect = (largest < LARGEST_DEAD_SPEED) & (points >= FEWEST_HEIGHTS)
     if suspect.all():
         return ["" for _ in position]
     expected_mean = _between_neighbours(position, edges, mean, ~suspect)
     expected_deviation = _between_neighbours(position, edges, deviation, ~suspect)
     unknown = np.isnan(deviation) | np.isnan(expected_deviation)
-    calm = np.where(unknown, ~plants, deviation < CALM * expected_deviation)
-    dead = suspect & calm & (largest < SHARE * expected_mean)
+    calm = np.where(unknown, ~plants, deviation < SHARE_OF_TURBULENCE * expected_deviation)
+    dead = suspect & calm & (largest < SHARE_OF_SPEED * expected_mean)
     return [
         f"near zero at all {points[i]} heights (at most {largest[i]:.3f} m/s, where its neighbours give "
         f"{expected_mean[i]:.2f} m/s{_turbulence(deviation[i], expected_deviation[i])}): the probe is taken for dead"

@@ -18,11 +18,12 @@ from vegglue.errors import InputError
 class Kind:
     """One kind of observation.
 
-    name: as in a case and in tables of stations; words: the same in prose; unit: of a value and of its error;
-    column: of the value in a CSV file; file: what a file of them is called in a folder of measurements;
-    instrument: `probe`, a velocity at a point of a named section; `gauge`, a level at a point; `section`, through a
-    whole cross-section, so that y means nothing; correlated: whether errors of neighbours along a section are;
-    usual_error: standard error of a measurement to come, where none of this kind is at hand.
+    name: as in a case and in tables of stations; words: the same in prose; unit: of a value and of its standard error;
+    column: of the values in a CSV file; file: name of such a file in a folder of measurements;
+    instrument: `probe` measures a velocity at a point of a named section, `gauge` a level at a point, `section` what
+    passes a whole cross-section, so that y means nothing;
+    correlated: whether the errors of neighbours along a section are correlated;
+    usual_error: standard error of a measurement still to be made, where none of this kind is at hand [unit].
     """
 
     name: str
@@ -36,23 +37,24 @@ class Kind:
 
     @property
     def error_column(self) -> str:
-        """Of the standard error in a CSV file."""
+        """Column of the standard errors in a CSV file."""
         return f"{self.column}_se"
 
     @property
     def at_point(self) -> bool:
-        """Whether y says where it was measured."""
+        """Whether it was measured at a point (x, y), not through a section at x."""
         return self.instrument != "section"
 
     @property
     def velocity(self) -> bool:
+        """Whether it is a velocity, in whatever direction."""
         return self.instrument == "probe"
 
 
-# What velocities along x and levels are called: the two that errors in m/s and in m are told of.
+# Names of the two kinds whose errors are told in m/s and in m: velocities along x, and levels.
 STREAMWISE, WATER_LEVEL = "velocity", "level"
-# Usual errors: 0.015 m/s is that of a vertical of ADV points, 3 mm that of a gauge read by eye; the mean of a velocity
-# across a slender stream has that of the one along it; 5 % of 2 m3/s is what a gauging by verticals reaches.
+# Usual errors: 0.015 m/s for the mean of a vertical of ADV points, in any direction; 3 mm for a gauge read by eye;
+# 0.1 m3/s, 5 % of 2 m3/s, for a gauging by verticals.
 KINDS = {
     kind.name: kind
     for kind in (
@@ -66,7 +68,7 @@ KINDS = {
 
 
 def kind_of(name: str, where: str = "observations") -> Kind:
-    """The kind of that name. Errors: InputError naming those known; where: how its sentence begins."""
+    """The kind of that name. Errors: InputError, which begins with `where` and lists the kinds known."""
     if name not in KINDS:
         raise InputError(f"{where}: expected a kind among {', '.join(KINDS)}, got {name!r}; correct it.")
     return KINDS[name]

@@ -28,24 +28,25 @@ STATION_COLUMNS = (
     "depth",
     "device",
 )
-Key = tuple[str, str]  # experiment, section
+Key = tuple[str, str]  # names of experiment and section
 
 
 @dataclass(frozen=True)
 class Observations:
     """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
 
-    table: one row per station, columns STATION_COLUMNS; `value` and standard_error in the unit of their `kind`, see
-    kinds.py; y of a discharge is where it is drawn; standard_error and depth are NaN when unknown. Rows with used =
-    False say why in `reason` (their value may be NaN).
+    table: one row for each station, columns STATION_COLUMNS; value and standard_error in the unit of their kind (see
+    kinds.py), standard_error and depth NaN when unknown; a discharge has no y of its own, and is drawn at the one
+    given; a station with used = False is not calibrated to, says why in `reason`, and may have the value NaN.
     points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the
     bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
     profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
     and linear_error (the rule `paper`), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
     scatter (see vertical_profile.ProfileFit; NaN without a fit), used, reason.
     discharge: by (experiment, section), then by rule, `paper` and `profile`.
-    neighbour_error: by (experiment, section), the error of one vertical as its neighbours tell it [m/s]. Larger than
-    the error of its own points, it holds what these do not show (position, stems); part of standard_error in table.
+    neighbour_error: by (experiment, section), the error of one vertical estimated from its neighbours [m/s]. Where it
+    is larger than the error from the points of the vertical, it contains what these do not show (position, stems). It
+    is part of standard_error in table.
     canopy_height: by (experiment, section), where verticals stand inside plants.
     """
 
@@ -58,10 +59,11 @@ class Observations:
 
 
 def read_observations(case: Case) -> Observations:
-    """Read every file the case names, judge the quality, average over the depth.
+    """Read every file of measurements that the case names, judge their quality, and average verticals over the depth.
 
-    Raises InputError, naming file and row, for what cannot be read, is missing, repeated, or no number, and for a kind
-    that nothing knows; a vertical or point that can be read but not trusted stays, with used = False and the reason.
+    A point or vertical that cannot be trusted stays, with used = False and the reason.
+    Errors: InputError, naming file and row, for what cannot be read, is missing, repeated or no number, and for an
+    unknown kind, experiment, section or device.
     """
     sections: dict[Key, Section] = {}
     stations = []
@@ -78,7 +80,7 @@ def read_observations(case: Case) -> Observations:
         else:
             stations.append(_read_stations(case, observation, _kind_in(case, observation)))
     table = _joined(stations)
-    _refuse_unknown_places(case, table)
+    _refuse_unknown_limits(case, table)
     return Observations(
         table=table,
         points=_joined([section.points for section in sections.values()]),
@@ -89,10 +91,10 @@ def read_observations(case: Case) -> Observations:
     )
 
 
-def _refuse_unknown_places(case: Case, table: pd.DataFrame) -> None:
-    """Refuse sections and devices that an effect is limited to and nobody measured at."""
-    for name, working in case.effects.items():
-        for column, words in (("section", working.sections), ("device", working.devices)):
+def _refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
+    """Errors: InputError for a section or device that an effect is limited to, but no measurement comes from."""
+    for name, entry in case.effects.items():
+        for column, words in (("section", entry.sections), ("device", entry.devices)):
             known = [str(word) for word in table[column].unique() if word]
             for word in words:
                 if word not in known:
@@ -116,8 +118,8 @@ def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
 def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
     """Stations from the verticals of a section, by the rule the case has chosen.
 
-    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0) with s the error told by the neighbours: points cannot show
-    that their vertical stands beside a stem, or a hand's breadth off. An error given in the case replaces this.
+    standard_error^2 = own^2 + max(s^2 - mean(own^2), 0), own from the points of the vertical, s the `neighbour_error`:
+    points cannot show that their vertical stands beside a stem, or 0.1 m off. An error given in the case replaces this.
     """
     profiles = section.profiles
     value, own = average_of(profiles, str(observation.average))
@@ -139,10 +141,11 @@ def _kind_in(case: Case, observation: Observation) -> Kind:
 
 
 def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataFrame:
-    """Values as they were measured: x, y, the column of the kind, maybe its standard error; an error of 0 is unknown.
+    """Stations from a file of x, y, the column of the kind and, if there is one, that of its standard errors.
 
-    A discharge needs no y: it is drawn in the middle of the grid. An `experiment` or `section` in the case chooses the
-    rows with that name, or names all rows of a file without it; only velocities need a section.
+    A standard error of 0 means unknown. A discharge needs no y: it is drawn in the middle of the grid. `experiment` and
+    `section` of the observation choose rows where the file has such a column, and else name all rows; only velocities
+    need a section.
     """
     path = observation.file
     given = {"experiment": observation.experiment, "section": observation.section}

@@ -1,4 +1,4 @@
-"""The plant survey to the rigid-cylinder estimate of phi, with its uncertainty by Monte Carlo."""
+"""The plant survey, and the phi of rigid cylinders that it amounts to, with its uncertainty by Monte Carlo."""
 
 import math
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ SURVEYED = (
     "stems",
     "branches_per_stem",
 )
+DRAWS = 20000  # their mean is known to 0.7 % of their spread
 DRAG_COEFFICIENT = 1.0  # [-] of submerged plants: Berends et al. (2020), after Wunder et al. (2011)
 
 
@@ -36,9 +37,10 @@ class SurveyedQuantity:
 
 @dataclass(frozen=True)
 class RigidCylinder:
-    """phi [-] of a stand of rigid cylinders: its draws and what they amount to.
+    """phi [-] of a stand of rigid cylinders.
 
-    `parts` are the means of stems, branches and undergrowth [-]; `assumption` says what was not surveyed.
+    draws (draws,): of phi; parts: mean contribution of stems, branches and undergrowth to phi [-]; assumption: what was
+    not surveyed, in a sentence.
     """
 
     draws: Array
@@ -84,7 +86,7 @@ def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
 
 
 def rigid_cylinder(
-    survey: dict[str, SurveyedQuantity], choice: Survey, draws: int = 20000, seed: int = 1
+    survey: dict[str, SurveyedQuantity], choice: Survey, draws: int = DRAWS, seed: int = 1
 ) -> RigidCylinder:
     """phi = C_d m (D_s h_s + b D_b (h_p - h_s)) min(h_d / h_p, 1) + C_d m_u D_u min(h_u, h_d).
 
@@ -94,10 +96,10 @@ def rigid_cylinder(
     upright [m]; C_d = 1. No foliage.
 
     Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
-    positive. `choice.spread` says what is uncertain: `plants` lets one random plant stand for all (what the +- of
-    Berends et al. 2020 must be), `mean` uses the error of the mean over the sampled plants. The density m_u was not
-    surveyed: it is log-uniform between `choice.undergrowth_density` [1/m2], an assumption of the user; without it, no
-    undergrowth.
+    positive. `choice.spread` says which spread is taken: `plants` that between plants, as the +- of Berends et al.
+    (2020) must be, `mean` the error of the mean over the sampled plants. The density m_u was not surveyed: it is
+    log-uniform between the two values of `choice.undergrowth_density` [1/m2], assumed by the user; without them there
+    is no undergrowth.
 
     Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
     bending after Verschoren et al. (2016).

@@ -35,9 +35,9 @@ class CrossSection:
 class Discharge:
     """Discharge and its standard error [m3/s], and what the error is made of.
 
-    sampling: of the verticals, from their own standard errors; spacing: from how badly each is told by its neighbours
-    (this contains the sampling error); rule: of the profile assumed where nothing was measured.
     standard_error^2 = max(sampling, spacing)^2 + rule^2.
+    sampling: from the standard errors of the verticals; spacing: from how far each vertical lies from what its
+    neighbours predict, which contains the sampling error; rule: from the profile assumed where nothing was measured.
     """
 
     value: float
@@ -48,9 +48,10 @@ class Discharge:
 
 
 def grid_weights(section: CrossSection, position: Array, columns: Sequence[Column], step: float) -> list[Array]:
-    """w, per vertical (points,), with Q = sum(w u): the rule `paper` [m2].
+    """w, for each vertical (points,) [m2], with Q = sum(w u) [m3/s]: the rule `paper`.
 
-    Points are interpolated linearly on a regular (y, z) grid of cells at most `step` [m] high: upward in each vertical
+    position (columns,): y of the verticals [m]; columns: their points; step: largest height of a grid cell [m].
+    Points are interpolated linearly on a regular (y, z) grid of cells at most `step` high: upward in each vertical
     (zero at the bed, constant from the highest point to the surface), then across at each level between verticals,
     to zero where that level meets the bed or the bank. Q = sum of velocity x cell area.
     Source: Berends et al. (2020), section 3.1, which does not say what was assumed at the surface and at the banks.
@@ -60,14 +61,14 @@ def grid_weights(section: CrossSection, position: Array, columns: Sequence[Colum
     height = (section.surface - lowest) / count
     levels = lowest + height * (np.arange(count) + 0.5)
     bed = section.surface - np.array([column.depth for column in columns])
-    reach = np.array([_reach(section, position, bed < level, level) for level in levels])
+    widths = np.array([_width_of_each(section, position, bed < level, level) for level in levels])
     return [
-        height * reach[:, index] @ (linear_weights(column.height, levels - bed[index]))
+        height * widths[:, index] @ (linear_weights(column.height, levels - bed[index]))
         for index, column in enumerate(columns)
     ]
 
 
-def _reach(section: CrossSection, position: Array, wet: Array, level: float) -> Array:
+def _width_of_each(section: CrossSection, position: Array, wet: Array, level: float) -> Array:
     """Width [m] over which each vertical (columns,) counts at this level: the area under its hat function."""
     dry = section.y[section.bed >= level]
     nodes = np.concatenate([position[wet], dry])
@@ -81,9 +82,10 @@ def _reach(section: CrossSection, position: Array, wet: Array, level: float) -> 
 
 
 def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> Array:
-    """w (columns,) with Q = sum(w U) [m2]: U / sqrt(h) is linear across, constant beyond the outermost verticals.
+    """w (columns,) [m2] with Q = sum(w U) [m3/s]: U / sqrt(h) is linear across, constant beyond the outermost ones.
 
-    That is a constant Froude number between vertical and bank, so the velocity goes to zero with the depth.
+    position and depth (columns,): y and water depth h of the verticals [m]. Between the outermost vertical and the bank
+    that is a constant Froude number, so that the velocity goes to zero with the depth.
     Source: Le Coz et al. (2012), doi 10.1016/j.flowmeasinst.2012.05.001.
     """
     flow = section.width * section.depth**1.5
@@ -92,21 +94,22 @@ def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> 
 
 
 def neighbour_error(position: Array, average: Array) -> float:
-    """s^2 = mean((U_i - sum_j w_j U_j)^2 / (1 + sum_j w_j^2)): the error of one vertical, told by its neighbours [m/s].
+    """s with s^2 = mean((U_i - sum_j w_j U_j)^2 / (1 + sum_j w_j^2)): the error of one vertical [m/s].
 
-    w are the weights of the cubic through the two nearest verticals on either side at position_i (of the straight line
-    through the nearest ones when there are fewer than five), so that smooth curvature across the channel does not count
-    as error; jumps, as at the edge of plants, do. NaN below three verticals.
+    position (columns,): y of the verticals [m]; average U (columns,) [m/s]. The weights w predict U_i from its
+    neighbours by the cubic through two on either side, or by the straight line through one on either side when there
+    are fewer than five verticals. Smooth curvature across the channel then does not count as error; jumps, as at the
+    edge of plants, do. NaN below three verticals.
     Source: the interpolated variance estimator of Cohn, Kiang and Mason (2013), doi
     10.1061/(ASCE)HY.1943-7900.0000695, which takes the straight line.
     """
     count = len(position)
-    reach = 2 if count >= 5 else 1
+    each_side = 2 if count >= 5 else 1
     if count < 3:
         return float("nan")
     squares = []
-    for index in range(reach, count - reach):
-        others = np.r_[index - reach : index, index + 1 : index + reach + 1]
+    for index in range(each_side, count - each_side):
+        others = np.r_[index - each_side : index, index + 1 : index + each_side + 1]
         weights = _lagrange(position[others], position[index])
         squares.append((average[index] - weights @ average[others]) ** 2 / (1.0 + weights @ weights))
     return float(np.sqrt(np.mean(squares)))

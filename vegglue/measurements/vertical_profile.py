@@ -1,6 +1,7 @@
 """One vertical: from point velocities to a depth average, its standard error, and the height of the canopy.
 
-Heights count from the bed [m]; arrays have shape (points,), sorted upwards. Everything here is a pure function.
+Heights count from the bed [m]; arrays have shape (points,), sorted upwards. The rule `paper` (linear between points)
+stands in `linear_average`, the rule `profile` in `fit_log_law` and `fit_two_layers`.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +12,13 @@ import numpy as np
 from vegglue.arrays import Array
 
 FEWEST_POINTS = 4  # two or three numbers are fitted: below this nothing is left to tell how well
-CLEAR = 3.0  # a rise of the velocity with height counts from this many standard errors
+# Standard errors by which the velocity must rise with height to count as a rise: by chance one vertical in 700 does.
+SIGNIFICANT_RISE = 3.0
+# z_0 and canopy heights tried in a fit: steps of 2 % of z_0, of some millimetres in a canopy, finer than points tell.
+HEIGHTS_TRIED = 600
+SMOOTHEST_BED = 1e-6  # z_0 over the depth: a micrometre in a metre of water, smoother than any bed
+CANOPY_STEP = 0.001  # m, between canopy heights tried for all verticals of a stand, finer than ADV points stand apart
+TINY = 1e-300  # keeps 0 / 0 from points that all lie below the top; their slope is then 0
 
 
 @dataclass(frozen=True)
@@ -26,11 +33,12 @@ class Column:
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """u(z) = within + slope ln(max(z / top, 1)); within and slope [m/s], top [m].
+    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa; within and slope [m/s], top [m].
 
-    Without plants within = 0, top is the roughness height z_0; inside plants top is the canopy height.
-    `covariance` (3, 3) is of (within, slope, top), already scaled by `scatter`: the root of the reduced chi-square
-    where that is above 1, that is, how much more the points scatter about the profile than sampling explains.
+    within: the uniform velocity below the top; slope: of the logarithmic part above it. Inside plants top is the canopy
+    height; without plants it is the roughness height z_0, and within is 0.
+    scatter: how many times more the points scatter about the profile than their sampling errors explain, the root of
+    the reduced chi-square, at least 1 [-]. covariance (3, 3): of (within, slope, top), times scatter^2.
     """
 
     within: float
@@ -44,9 +52,9 @@ class ProfileFit:
         return self.within + self.slope * np.log(np.maximum(height / self.top, 1.0))
 
     def average(self, depth: float) -> tuple[float, float]:
-        """U = within + slope (ln(h / top) - 1 + top / h), the integral of u(z) from the bed to the surface over h.
+        """U = (1/h) integral of u(z) from 0 to h = within + slope (ln(h / top) - 1 + top / h).
 
-        depth h [m] -> U and its standard error [m/s]; the slope drops out where the top is above the water.
+        depth h [m] -> U and its standard error [m/s]. Where the top is above the water, U = within.
         """
         ratio = max(depth / self.top, 1.0)
         share = np.log(ratio) - 1.0 + 1.0 / ratio
@@ -56,7 +64,10 @@ class ProfileFit:
 
 @dataclass(frozen=True)
 class CanopyHeight:
-    """Deflected canopy height above the bed and its standard error [m]; both NaN, with a reason, when none shows."""
+    """Deflected canopy height above the bed and its standard error [m], from how many verticals (columns).
+
+    Both are NaN when the verticals show no canopy top; `reason` then says why, else it is empty.
+    """
 
     value: float
     standard_error: float
@@ -74,13 +85,19 @@ def sampling_error(deviation: Array, duration: Array, time_scale: Array | float)
 
 
 def linear_weights(height: Array, levels: Array) -> Array:
-    """w (levels, points) with u(levels) = w u: linear between points, zero at the bed, constant above the highest."""
+    """w (levels, points) [-] with u(levels) = w u: linear between points, zero at the bed, constant above the highest.
+
+    height (points,) and levels (levels,) above the bed [m].
+    """
     nodes = np.concatenate([[0.0], height])
     return np.column_stack([np.interp(levels, nodes, np.concatenate([[0.0], unit])) for unit in np.eye(len(height))])
 
 
 def average_weights(height: Array, depth: float) -> Array:
-    """w (points,) with U = w u: the profile of `linear_weights` integrated from bed to surface over the depth [-]."""
+    """w (points,) [-] with U = sum(w u): the profile of `linear_weights`, averaged from the bed to the surface.
+
+    height (points,) and depth [m]. Where the highest point is above the depth, the average ends at that point.
+    """
     half = np.diff(np.concatenate([[0.0], height, [max(depth, height[-1])]])) / 2.0
     weights = half[:-1] + half[1:]
     weights[-1] += half[-1]  # above the highest point there is no second point to share with
@@ -88,51 +105,58 @@ def average_weights(height: Array, depth: float) -> Array:
 
 
 def linear_average(column: Column, scatter: float = 1.0) -> tuple[float, float]:
-    """U = sum(w u) and se = scatter sqrt(sum((w se)^2)) with the weights of `average_weights` [m/s]."""
+    """U = sum(w u) and its standard error scatter sqrt(sum((w se)^2)) [m/s], w the `average_weights`.
+
+    scatter: factor on the standard errors of the points [-], see ProfileFit.
+    """
     weights = average_weights(column.height, column.depth)
     return float(weights @ column.velocity), float(scatter * np.linalg.norm(weights * column.standard_error))
 
 
 def fit_log_law(column: Column) -> ProfileFit | None:
-    """u = (u* / kappa) ln(z / z_0) above z_0, zero below: water without plants; None when the points show no such rise.
+    """u = (u* / kappa) ln(z / z_0) above z_0, zero below: the profile of water without plants.
 
-    Weighted least squares; z_0 on a grid of 600 values, the slope exactly.
+    Weighted least squares: z_0 is the best of HEIGHTS_TRIED values, the slope of each is exact. None when there are
+    fewer than FEWEST_POINTS points, or the velocity does not rise with height.
     """
-    tops = np.geomspace(1e-6 * column.depth, 0.9 * column.height[-1], 600)
+    tops = np.geomspace(SMOOTHEST_BED * column.depth, 0.9 * column.height[-1], HEIGHTS_TRIED)
     return _fit(column, tops, _through_zero, within_free=False)
 
 
 def fit_two_layers(column: Column) -> ProfileFit | None:
-    """u = u_v below the canopy height k, u_v + (u* / kappa) ln(z / k) above; None when the points show no canopy top.
+    """u = u_v below the canopy height k, u_v + (u* / kappa) ln(z / k) above it: the profile inside plants.
 
-    The velocity profile behind the resistance formula of Baptist et al. (2007), doi 10.1080/00221686.2007.9521778.
+    Weighted least squares: k is the best of HEIGHTS_TRIED values, u_v and the slope of each are exact. None when there
+    are fewer than FEWEST_POINTS points, or the velocity does not rise above a canopy.
+    Source: the profile behind the resistance formula of Baptist et al. (2007), doi 10.1080/00221686.2007.9521778.
     """
     if len(column.height) < FEWEST_POINTS:
         return None
-    return _fit(column, np.linspace(column.height[1], column.height[-2], 600), _with_offset, within_free=True)
+    return _fit(column, np.linspace(column.height[1], column.height[-2], HEIGHTS_TRIED), _with_offset, within_free=True)
 
 
 def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
-    """k = argmin of the summed chi2(k): the one canopy height [m] shared by all verticals inside a stand.
+    """k = argmin of sum(chi2(k)) over the verticals: the one canopy height [m] shared by all verticals of a stand.
 
-    u_v and u* are free in every vertical. Standard error: half the width of chi2(k) <= chi2_min + s^2, where s^2 is the
-    reduced chi-square (at least 1), so that scatter between stems and verticals counts.
+    Each vertical has the profile of `fit_two_layers`, with u_v and u* of its own. Standard error: half the width of the
+    range where chi2(k) <= chi2_min + s^2, with s^2 the reduced chi-square, at least 1, so that scatter between stems
+    and verticals counts. NaN with a reason when the fit is no better than a uniform velocity in each vertical.
     """
     columns = [column for column in columns if len(column.height) >= FEWEST_POINTS]
     if not columns:
         return CanopyHeight(np.nan, np.nan, 0, "no vertical inside the plants has enough points")
     lowest = max(column.height[1] for column in columns)
     highest = min(column.height[-2] for column in columns)
-    tops = np.arange(lowest, highest, 0.001)
+    tops = np.arange(lowest, highest, CANOPY_STEP)
     misfit = np.sum([_with_offset(column, tops)[2] for column in columns], axis=0)
     uniform = sum(_with_offset(column, np.array([np.inf]))[2][0] for column in columns)
     best = int(np.argmin(misfit))
     freedom = sum(len(column.height) for column in columns) - 2 * len(columns) - 1
     unit = max(misfit[best] / freedom, 1.0)
-    if uniform - misfit[best] < CLEAR**2 * unit * len(columns):
+    if uniform - misfit[best] < SIGNIFICANT_RISE**2 * unit * len(columns):
         return CanopyHeight(np.nan, np.nan, len(columns), "the verticals show no canopy top: not or just submerged")
     inside = tops[misfit <= misfit[best] + unit]
-    return CanopyHeight(float(tops[best]), float(inside[-1] - inside[0]) / 2.0 + 0.0005, len(columns), "")
+    return CanopyHeight(float(tops[best]), float(inside[-1] - inside[0]) / 2.0 + 0.5 * CANOPY_STEP, len(columns), "")
 
 
 LeastSquares = tuple[Array, Array, Array]  # within, slope, chi-square for each given top, each (tops,)
@@ -144,7 +168,7 @@ def _rise(column: Column, tops: Array) -> Array:
 
 def _through_zero(column: Column, tops: Array) -> LeastSquares:
     rise, weight = _rise(column, tops), column.standard_error**-2
-    slope = (rise * weight) @ column.velocity / np.maximum((rise**2) @ weight, 1e-300)
+    slope = (rise * weight) @ column.velocity / np.maximum((rise**2) @ weight, TINY)
     misfit = ((column.velocity - slope[:, None] * rise) ** 2) @ weight
     return np.zeros(len(tops)), slope, misfit
 
@@ -154,7 +178,7 @@ def _with_offset(column: Column, tops: Array) -> LeastSquares:
     share = weight / weight.sum()
     mean_rise, mean_velocity = rise @ share, column.velocity @ share
     rise_off, velocity_off = rise - mean_rise[:, None], column.velocity - mean_velocity
-    slope = (rise_off * weight) @ velocity_off / np.maximum((rise_off**2) @ weight, 1e-300)
+    slope = (rise_off * weight) @ velocity_off / np.maximum((rise_off**2) @ weight, TINY)
     misfit = ((velocity_off - slope[:, None] * rise_off) ** 2) @ weight
     return mean_velocity - slope * mean_rise, slope, misfit
 
@@ -174,6 +198,6 @@ def _fit(
     jacobian = jacobian / column.standard_error[:, None]
     covariance = np.zeros((3, 3))
     covariance[np.ix_(free, free)] = np.linalg.pinv(jacobian.T @ jacobian) * scatter**2
-    if slope < CLEAR * np.sqrt(covariance[1, 1]):
+    if slope < SIGNIFICANT_RISE * np.sqrt(covariance[1, 1]):
         return None
     return ProfileFit(within, slope, top, covariance, scatter)
