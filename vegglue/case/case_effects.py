@@ -15,43 +15,43 @@ Theta = Mapping[str, Array]
 
 
 def value_of(value: Value, theta: Theta, members: int) -> Array:
-    """A number for all members, or the parameter of that name, (members,)."""
+    """The number for all members, or the values of the parameter of that name, (members,)."""
     if isinstance(value, str):
         return np.array(theta[value], dtype=np.float64)
     return np.full(members, float(value))
 
 
 def effect_of(case: Case, name: str) -> Effect:
-    """The effect that an entry of `effects` puts to work."""
+    """The effect, from the library, that an entry of `effects` stands for."""
     return library(case.effect_file)[case.effects[name].effect or name]
 
 
 def amplitude_of(case: Case, name: str) -> str | None:
-    """The parameter that is the amplitude of an entry of `effects`; None when it is a number."""
+    """Name of the parameter that is the amplitude of an entry of `effects`; None when the amplitude is a number."""
     value = case.effects[name].values.get(effect_of(case, name).amplitude.name)
     return value if isinstance(value, str) else None
 
 
 def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> tuple[ActiveEffect, ...]:
-    """Effects at work in one experiment, in the order of the library."""
+    """Effects that act in one experiment, in the order of the library, with values (members,) of their parameters."""
     order = list(library(case.effect_file))
     here = [
-        (effect_of(case, name), working)
-        for name, working in case.effects.items()
-        if working.experiments is None or experiment in working.experiments
+        (effect_of(case, name), entry)
+        for name, entry in case.effects.items()
+        if entry.experiments is None or experiment in entry.experiments
     ]
     here.sort(key=lambda pair: order.index(pair[0].name))
     return tuple(
         ActiveEffect(
             effect,
             {
-                parameter.name: value_of(working.values.get(parameter.name, _default(parameter)), theta, members)
+                parameter.name: value_of(entry.values.get(parameter.name, _default(parameter)), theta, members)
                 for parameter in effect.parameters
             },
-            working.sections,
-            working.devices,
+            entry.sections,
+            entry.devices,
         )
-        for effect, working in here
+        for effect, entry in here
     )
 
 

@@ -21,9 +21,10 @@ DECLARING = ("law", "distribution")
 
 
 def load_case(path: Path | str, trust: bool = False) -> Case:
-    """The case in a YAML file, with all it extends; an InputError says what is wrong, where, and what to do.
+    """The case in a YAML file, with all it extends.
 
-    trust: whether a Python file that the case names may be run.
+    trust: whether a Python file that the case names may be run. Errors: InputError, which says what is wrong, where,
+    and what to do.
     """
     path = Path(path)
     layers = _layers(path, ())
@@ -163,4 +164,5 @@ def _depth(tree: Any, place: KeyPath) -> int:
 
 
 def shown_path(path: Path) -> str:
+    """The path as sentences name it: relative to where the user stands."""
     return os.path.relpath(path)

@@ -14,12 +14,12 @@ from vegglue.effects.library import library
 
 # Names that dimensions of the result files have, and a variable in them must not.
 DIMENSIONS = ("chain", "draw", "member", "station", "experiment", "section")
-# A quantity that must be positive may fall to 0 at no more than this share of its prior [-].
+# Share of its prior [-] at which a quantity that must be positive may be 0 or less: no ensemble is that large.
 LEAST_PROBABILITY = 1e-6
 
 
 def disagreement(case: Case) -> Refusal | None:
-    """The first thing in a case that does not agree with the rest of it."""
+    """The first thing in a case that does not agree with the rest of it; None when all agrees."""
     checks = (_names, _files, _effects, _values, _parameters, _sides, _likelihood)
     return next((refusal for check in checks for refusal in check(case)), None)
 
@@ -40,8 +40,8 @@ def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
             yield ("experiments", name, "discharge", inflow), discharge, True
         yield ("experiments", name, "level"), experiment.level, False
     yield ("eddy_viscosity",), case.eddy_viscosity, True
-    for name, working in case.effects.items():
-        for key, value in working.values.items():
+    for name, entry in case.effects.items():
+        for key, value in entry.values.items():
             yield ("effects", name, "values", key), value, False
 
 
@@ -75,8 +75,8 @@ def _names(case: Case) -> Iterator[Refusal]:
         place = ("observations", i, "experiment")
         if observation.experiment is not None:
             yield from _unknown(place, observation.experiment, case.experiments, "experiment")
-    for name, working in case.effects.items():
-        for word in working.experiments or ():
+    for name, entry in case.effects.items():
+        for word in entry.experiments or ():
             yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
     if case.canopy_correction is not None:
         yield from _unknown(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
@@ -96,19 +96,19 @@ def _values(case: Case) -> Iterator[Refusal]:
 def _effects(case: Case) -> Iterator[Refusal]:
     """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
     known = library(case.effect_file)
-    for key, working in case.effects.items():
+    for key, entry in case.effects.items():
         place: KeyPath = ("effects", key)
-        name = working.effect or key
-        yield from _unknown(place if working.effect is None else (*place, "effect"), name, known, "effect")
+        name = entry.effect or key
+        yield from _unknown(place if entry.effect is None else (*place, "effect"), name, known, "effect")
         effect = known[name]
         parameters = {parameter.name: parameter for parameter in effect.parameters}
-        for word, value in working.values.items():
+        for word, value in entry.values.items():
             yield from _unknown_word((*place, "values", word), word, parameters)
             yield from _in_support(case, (*place, "values", word), value, parameters[word])
-        if effect.amplitude.name not in working.values:
+        if effect.amplitude.name not in entry.values:
             complaint = f"says nothing about `{effect.amplitude.name}`, without which {name} is off: add it"
             yield Refusal((*place, "values"), complaint)
-        if effect.stage != "sensor" and (working.sections or working.devices):
+        if effect.stage != "sensor" and (entry.sections or entry.devices):
             yield Refusal(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
 
 

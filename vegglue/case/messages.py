@@ -1,4 +1,4 @@
-"""What the schema has against a file, as one sentence: where, what was expected, what came, what to do."""
+"""Why the schema refuses a file, as one sentence: where, what was expected, what came, what to do."""
 
 import difflib
 import textwrap
@@ -14,7 +14,7 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Refusal:
-    """Keys that lead to the refused value, and the rest of the sentence."""
+    """place: keys that lead to the refused value; complaint: the rest of the sentence about it."""
 
     place: KeyPath
     complaint: str
@@ -39,7 +39,7 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """What to write instead of an unknown word."""
+    """The end of a sentence about an unknown word: the known word most like it, else all known ones."""
     known = list(known)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean `{near[0]}`?" if near else f"known here are {', '.join(known) or 'none'}"

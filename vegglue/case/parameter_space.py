@@ -1,5 +1,7 @@
-"""Three ways to write a member: theta in units, s = F(theta) in the unit cube, z = Phi^-1(s), of which every prior is
-standard normal."""
+"""Three coordinates of a member: its parameters theta in their units, s = F(theta) in the unit cube, and
+z = Phi^-1(s), in which every prior is standard normal. F is the distribution function of the prior, Phi that of the
+standard normal distribution.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,23 +15,23 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
 
-# Places further than this from the middle of the prior are not told apart from its bounds.
+# Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.
 FURTHEST = 6.0
 
 
 def theta_at(case: Case, z: Array) -> dict[str, Array]:
-    """theta_j = F_j^-1(Phi(z_j)), one array (m,) a parameter; z (m, p)."""
+    """theta_j = F_j^-1(Phi(z_j)), an array (m,) for each parameter [its unit]; z (m, p) or (p,) [-]."""
     return parameters_at(case, ndtr(np.clip(np.atleast_2d(z), -FURTHEST, FURTHEST)))
 
 
 def z_at(case: Case, theta: dict[str, Array]) -> Array:
-    """The inverse of `theta_at`, (m, p)."""
+    """z_j = Phi^-1(F_j(theta_j)) (m, p) [-], the inverse of `theta_at`, at most FURTHEST from 0."""
     columns = [_normal(prior, theta[name]) for name, prior in case.parameters.items()]
     return np.column_stack(columns)
 
 
 def z_of(prior: Parameter, value: float) -> float:
-    """z of one value of one parameter."""
+    """z = Phi^-1(F(value)) of one value of one parameter [-]."""
     return float(_normal(prior, np.array([value]))[0])
 
 
@@ -39,39 +41,41 @@ def _normal(prior: Parameter, values: Array) -> Array:
 
 @dataclass(frozen=True)
 class PriorSample:
-    """Members both ways: points s (m, p) of the unit cube, and theta, {parameter: (m,)}, made of them once. What is
-    stored, solved and compared is this theta: made again of some of the points, its last digits may differ.
+    """Members as points s (m, p) of the unit cube [-] and as theta, {parameter: (m,)} [its unit], made of them once.
+
+    Stored, solved and compared is this theta: made again of some of the points, its last digits may differ.
     """
 
     points: Array
     theta: dict[str, Array]
 
     def take(self, members: NDArray[np.int64]) -> "PriorSample":
-        """Some of the members, theta as it is."""
+        """Some of the members, by index (n,); their theta is copied and not computed again."""
         return PriorSample(self.points[members], {name: values[members] for name, values in self.theta.items()})
 
 
 def sobol_sample(case: Case) -> PriorSample:
-    """The members of a case, s_ij of the scrambled Sobol' sequence and theta_ij = F_j^-1(s_ij)."""
+    """The members of a case: s_ij of the scrambled Sobol' sequence, theta_ij = F_j^-1(s_ij)."""
     return sample_at(case, sobol_points(len(case.parameters), case.simulate.members, case.simulate.seed))
 
 
 def sample_at(case: Case, points: Array) -> PriorSample:
-    """Members at points (m, p)."""
+    """Members at points s (m, p) of the unit cube."""
     return PriorSample(points, parameters_at(case, points))
 
 
 def sample_of(case: Case, theta: Mapping[str, Array]) -> PriorSample:
-    """Members with these parameters, s_j = F_j(theta_j)."""
+    """Members with these parameters, {parameter: (m,)}; s_j = F_j(theta_j)."""
     values = {name: np.asarray(theta[name], dtype=np.float64) for name in case.parameters}
     columns = [probability(prior, values[name]) for name, prior in case.parameters.items()]
     return PriorSample(np.column_stack(columns), values)
 
 
 def parameters_at(case: Case, points: Array) -> dict[str, Array]:
-    """theta_j = F_j^-1(s_j), one array (m,) a parameter; s (m, p)."""
+    """theta_j = F_j^-1(s_j), an array (m,) for each parameter [its unit]; points s (m, p) [-]."""
     return {name: quantile(prior, points[:, j]) for j, (name, prior) in enumerate(case.parameters.items())}
 
 
 def middle_value(case: Case, value: Value) -> float:
+    """The number, or the median of the prior of the parameter of that name [its unit]."""
     return float(quantile(case.parameters[value], 0.5)) if isinstance(value, str) else value

@@ -17,6 +17,7 @@ def _number_or_name(value: Any) -> Any:
 
 
 def rising(interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval as it is. Errors: ValueError, of which the schema makes a sentence, if its ends are not in order."""
     if not interval[0] < interval[1]:
         raise ValueError("two numbers, the lower one first")
     return interval
@@ -36,7 +37,10 @@ class Part(BaseModel):
 
 
 def exactly(part: Part, chosen: str, wanted: Mapping[str, tuple[str, ...]], allowed: tuple[str, ...] = ()) -> None:
-    """Refuse a part that lacks a key of the kind it says it is, or has one of another kind."""
+    """Check that a part has the keys of its kind and none of another. Errors: ValueError naming the key.
+
+    chosen: the kind; wanted: the keys of each kind; allowed: keys that any kind may have.
+    """
     others = {key for keys in wanted.values() for key in keys} - set(wanted[chosen]) - set(allowed)
     for key in wanted[chosen]:
         if getattr(part, key) is None:

@@ -17,7 +17,7 @@ SMALLEST_PROBABILITY = 2.0**-31
 
 
 def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
-    """x with P(X <= x) = probability; at 0 and 1 the bounds of the prior, maybe infinite [unit of the prior]."""
+    """x = F^-1(probability), F(x) = P(X <= x) [unit of the prior]; at 0 and 1 its bounds, which may be infinite."""
     number, share = _numbers(prior), np.asarray(probability, dtype=np.float64)
     if prior.distribution == "uniform":
         return np.asarray(number["low"] + share * (number["high"] - number["low"]))
@@ -31,7 +31,10 @@ def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
 def _truncated_normal(
     mean: float, sd: float, low: float | None, high: float | None, share: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """mean + s sd Phi^-1(A + q (B - A)), from the tail (s = -1: the upper one) in which A and B keep their digits."""
+    """x = mean + sd Phi^-1(A + q (B - A)), with A and B = Phi of the bounds and q the share.
+
+    Where both bounds lie above the mean, the distribution is mirrored: A and B close to 1 would lose their digits.
+    """
     a, b = -math.inf if low is None else (low - mean) / sd, math.inf if high is None else (high - mean) / sd
     if a > 0.0:
         mirrored = _truncated_normal(-mean, sd, None if high is None else -high, -low, 1.0 - share)  # type: ignore[operator]
@@ -41,12 +44,12 @@ def _truncated_normal(
 
 
 def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
-    """F(x) = P(X <= x), the inverse of `quantile` [-]."""
+    """F(x) = P(X <= x) [-], the inverse of `quantile`; x in the unit of the prior."""
     return np.asarray(_distribution(prior).cdf(value), dtype=np.float64)
 
 
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
-    """x_ij = F_j^-1(s_ij) with s the `sobol_points`; one array (members,) per parameter [unit of the prior]."""
+    """x_ij = F_j^-1(s_ij) with s the `sobol_points`; an array (members,) for each parameter [unit of its prior]."""
     if not parameters:
         return {}
     points = sobol_points(len(parameters), members, seed)
@@ -57,7 +60,7 @@ def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64
     """s_ij, the first points of the scrambled Sobol' sequence in the unit cube, (members, parameters) [-].
 
     The first points of a longer sequence are the same, because it is drawn up to the next power of two.
-    Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
+    Source: Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
     """
     sequence = scipy.stats.qmc.Sobol(parameters, scramble=True, seed=seed)
     points = sequence.random_base2(math.ceil(math.log2(members)))[:members]
@@ -65,7 +68,10 @@ def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64
 
 
 def log_prior(parameters: Mapping[str, Parameter], theta: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-    """log p(theta) = sum_j log p_j(theta_j), shape (members,); -inf outside a bound. Priors are independent."""
+    """log p(theta) = sum_j log p_j(theta_j) (members,), as priors are independent; -inf outside a bound.
+
+    theta: values (members,) of each parameter [unit of its prior].
+    """
     terms = [np.asarray(_distribution(prior).logpdf(theta[name])) for name, prior in parameters.items()]
     return np.sum(terms, axis=0, dtype=np.float64)
 

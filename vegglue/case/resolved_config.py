@@ -11,7 +11,7 @@ import yaml
 
 from vegglue.case.schema import Case
 
-# What a finished ensemble does not depend on.
+# Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
     ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction"), True
 ) | {"simulate": {"field_budget"}, "observations": {"__all__": {"synthetic"}}}
@@ -41,10 +41,12 @@ def simulation_hash(case: Case) -> str:
 
 
 def dumped(case: Case, without: Mapping[str, Any] | None = None) -> Tree:
+    """Keys and values of a case, aliases as in a config, without what is None and without the keys given."""
     return case.model_dump(by_alias=True, exclude_none=True, exclude=without)
 
 
 def plain_tree(tree: Any, of_file: Callable[[Path], Any]) -> Any:
+    """The tree in dicts and lists, with of_file(path) for each path in it."""
     if isinstance(tree, dict):
         return {key: plain_tree(value, of_file) for key, value in tree.items()}
     if isinstance(tree, list | tuple):

@@ -1,4 +1,4 @@
-"""Text files written whole or not at all, and names of cases from other names."""
+"""Text files written whole or not at all, and names of cases made of any words."""
 
 import os
 import re
@@ -8,7 +8,7 @@ from vegglue.errors import StorageError
 
 
 def write_text(path: Path, text: str, advice: str) -> None:
-    """Write a file, and the folders above it. Errors: StorageError, which ends with the advice."""
+    """Write a file, and the folders above it, whole or not at all. Errors: StorageError, which ends with the advice."""
     new = path.with_name(path.name + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -19,5 +19,8 @@ def write_text(path: Path, text: str, advice: str) -> None:
 
 
 def case_name(words: str, otherwise: str = "case") -> str:
-    """The words as the schema wants the name of a case."""
+    """The words in lower case, with hyphens for what the schema does not allow in the name of a case.
+
+    otherwise: the name when nothing is left.
+    """
     return re.sub(r"[^a-z0-9_-]+", "-", words.lower()).strip("-")[:100] or otherwise

@@ -11,7 +11,10 @@ from vegglue.site.terrain import levels_at, read_raster, survey_levels
 
 
 def bed_levels(case: Case, grid: Grid) -> Array:
-    """Bed level of the case (nx, ny) at the points of any grid [m]; InputError where there is none."""
+    """Bed level z_b of the case (nx, ny) [m] at the centres of any grid; of each cell the last layer that has data.
+
+    Errors: InputError where no layer has data, or a file cannot be read.
+    """
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     for layer in case.bed:
         level = _layer_levels(layer, grid, case.grid.x[0])

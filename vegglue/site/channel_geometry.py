@@ -1,4 +1,4 @@
-"""The lie of the land as effects see it: the channel axis and floor, the banks, and how far patches are."""
+"""The channel as effects see it: its axis, floor and banks, and the distance of each cell from patches of plants."""
 
 from functools import lru_cache
 
@@ -12,19 +12,19 @@ from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import beyond
 
-# Steeper across than this [-], a cell is no longer floor.
-BREAK = 0.2
-# Sites and sets of patches whose fields are kept: those of a model and of its coarser ones.
-KEPT = 8
+# Slope across the channel [-] above which a cell is bank: one in five, steeper than a floor, flatter than a built bank.
+STEEPEST_FLOOR = 0.2
+# Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
+GEOMETRIES_KEPT = 8
 
 
 def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
-    """Static fields (nx, ny, 1) of one experiment: its patches are those present in it."""
+    """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
     return _geometry(site, patches_present(case, experiment))
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
-    """Which patches stand in an experiment."""
+    """Indices of the patches of the case that stand in an experiment."""
     plants = case.experiments[experiment].plants
     return tuple(
         index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
@@ -37,15 +37,15 @@ def half_width(site: Site) -> float:
 
 
 def cells_across(site: Site) -> float:
-    """How many cells lie across the floor."""
+    """Width of the floor over that of a cell, 2 `half_width` / dy [-]."""
     return 2.0 * half_width(site) / site.grid.dy
 
 
-@lru_cache(KEPT)  # every problem of every member asks for the same
+@lru_cache(GEOMETRIES_KEPT)  # every problem of every member asks for the same
 def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
-    floor = ~beyond(side_slope > BREAK, bed)
+    floor = ~beyond(side_slope > STEEPEST_FLOOR, bed)
     axis, half_width = _extent(floor, grid.y, grid.dy)
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
@@ -68,12 +68,12 @@ def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
 
 
 def rows_of(geometry: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
-    """Rows south..north-1 of it."""
+    """The geometry of rows south to north - 1."""
     return part_of(geometry, slice(None), slice(south, north))
 
 
 def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGeometry:
-    """Some columns and rows of it."""
+    """The geometry of some columns and rows."""
     cut = {
         name: getattr(geometry, name)[columns, rows]
         for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
@@ -89,7 +89,7 @@ def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array
 
 
 def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: float) -> tuple[Array, Array, Array]:
-    """Distances [m] from the front of a patch, from the nearest side of one, and downstream of one."""
+    """Front, edge and wake of ChannelGeometry, (nx, ny) [m]."""
     front, edge, wake = (np.full(patch.shape, np.inf) for _ in range(3))
     for index in np.unique(patch[patch >= 0]):
         column, row = np.nonzero(patch == index)
@@ -108,8 +108,8 @@ def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: floa
 def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
     """h = max(z_out, z_floor(x) + z_out - z_floor(L)) - z_b, shape (nx, ny) [m]; negative where dry.
 
-    A water surface parallel to the floor, but nowhere below the outlet: a guess good enough to see what is odd, usually
-    too low where plants hold the water up.
+    A water surface parallel to the floor, but nowhere below the level at the outlet: good enough to see what is odd,
+    usually too low where plants hold the water up.
     """
     outlet = middle_value(case, experiment.level)
     floor = site.bed.min(axis=1)

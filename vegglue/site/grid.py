@@ -19,7 +19,7 @@ class Grid:
 
 
 def build_grid(case: Case) -> Grid:
-    """Cell centres x_i = x_0 + (i + 1/2) dx, and y alike [m]."""
+    """Cell centres x_i = x_0 + (i + 1/2) dx and y_j = y_0 + (j + 1/2) dy of a case [m]."""
     (west, east), (south, north), (dx, dy) = case.grid.x, case.grid.y, case.grid.cell
     nx, ny = round((east - west) / dx), round((north - south) / dy)
     return Grid(centres(west, dx, nx), centres(south, dy, ny), dx, dy)

@@ -14,9 +14,10 @@ from vegglue.site.zones import cells_of_patch, friction_classes
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """Arrays (nx, ny): bed level [m], index into class_names, index into the patches of the case (-1: no plants).
+    """A site on its grid. bed: level of the bed (nx, ny) [m]; friction_class: index into class_names (nx, ny); patch:
+    index into the patches of the case (nx, ny), -1 without plants.
 
-    Two sites are the same only if they are one, so that what follows from a site can be kept with it.
+    Compared by identity, so that what is computed of a site can be cached.
     """
 
     grid: Grid
@@ -27,7 +28,10 @@ class Site:
 
 
 def build_site(case: Case) -> Site:
-    """The site of a case; InputError when a cell has no bed level or a file cannot be read."""
+    """The site of a case, read off at cell centres; where patches overlap, the later one counts.
+
+    Errors: InputError when a cell has no bed level or a file cannot be read.
+    """
     grid = build_grid(case)
     bed = bed_levels(case, grid)
     patch = np.full(bed.shape, -1, dtype=np.int64)

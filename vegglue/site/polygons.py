@@ -9,7 +9,7 @@ from vegglue.site.grid import Grid
 
 
 def corners_of(patch: Patch) -> Array:
-    """Corners of a patch in order, shape (corners, 2) [m]."""
+    """Corners (x, y) of a patch in order around it, (corners, 2) [m]."""
     if patch.polygon is not None:
         return np.array(patch.polygon)
     (west, east), (south, north) = patch.x or (0.0, 0.0), patch.y or (0.0, 0.0)
@@ -17,7 +17,10 @@ def corners_of(patch: Patch) -> Array:
 
 
 def distance_to_outline(outline: Array, x: float, y: float) -> float:
-    """d = min over sides of |p - (a + t (b - a))| with t in [0, 1] closest to p [m]."""
+    """d = min |p - (a + t (b - a))| over all sides a, b and t in [0, 1], the distance of p = (x, y) [m].
+
+    outline: corners (corners, 2) [m].
+    """
     start, side = outline, np.roll(outline, -1, axis=0) - outline
     from_start = np.array([x, y]) - start
     along = np.clip((from_start * side).sum(axis=1) / (side**2).sum(axis=1), 0.0, 1.0)
@@ -25,7 +28,7 @@ def distance_to_outline(outline: Array, x: float, y: float) -> float:
 
 
 def in_polygon(corners: Polygon, grid: Grid) -> Mask:
-    """Even-odd rule: a ray from each cell centre crosses the outline an odd number of times."""
+    """Cells (nx, ny) whose centre lies within the polygon: a ray from it crosses the outline an odd number of times."""
     inside = np.full((grid.x.size, grid.y.size), False)
     y = grid.y[None, :]
     for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
@@ -37,6 +40,6 @@ def in_polygon(corners: Polygon, grid: Grid) -> Mask:
 
 
 def area_of(outline: Array) -> float:
-    """A = |sum of x_i y_i+1 - x_i+1 y_i| / 2 [m2]."""
+    """A = |sum(x_i y_(i+1) - x_(i+1) y_i)| / 2 [m2]; outline: corners (corners, 2) [m]."""
     x, y = outline.T
     return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

@@ -14,6 +14,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.site.grid import centres
 
+# Keys of the header of an ESRI ASCII grid, in lower case.
 HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
 
 
@@ -28,13 +29,16 @@ class Raster:
 
 
 def read_raster(path: Path) -> Raster:
-    """An ESRI ASCII grid: six header lines, then rows from north (largest y) to south."""
+    """The raster in an ESRI ASCII grid: a header, then rows of values from north (largest y) to south.
+
+    Errors: InputError, naming file and line, when the header or the values are incomplete or no numbers.
+    """
     lines = _text(path).splitlines()
     header, first = _header(path, lines)
     columns, rows, size = (
-        int(_need(path, header, "ncols")),
-        int(_need(path, header, "nrows")),
-        _need(path, header, "cellsize"),
+        int(_positive(path, header, "ncols")),
+        int(_positive(path, header, "nrows")),
+        _positive(path, header, "cellsize"),
     )
     values = _numbers(path, lines[first:], first, rows * columns).reshape(rows, columns)[::-1].T
     values = np.where(values == header.get("nodata_value", -9999.0), np.nan, values)
@@ -44,7 +48,10 @@ def read_raster(path: Path) -> Raster:
 
 
 def levels_at(raster: Raster, x: Array, y: Array) -> Array:
-    """Bilinear between raster centres, constant in the outer half cell; NaN outside and next to missing data."""
+    """Levels (nx, ny) [m] at x (nx,) and y (ny,): bilinear between the centres of the raster.
+
+    Constant in its outer half cell; NaN outside and next to missing data.
+    """
     i, weight_x = _between(raster.x, x)
     j, weight_y = _between(raster.y, y)
     level, share = np.zeros((x.size, y.size)), np.zeros((x.size, y.size))
@@ -59,14 +66,17 @@ def levels_at(raster: Raster, x: Array, y: Array) -> Array:
 
 
 def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
-    """The value of the raster cell each point lies in; NaN outside."""
+    """Values (nx, ny) of the raster cells in which x (nx,) and y (ny,) lie; NaN outside."""
     i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
     j = np.clip(np.rint((y - raster.y[0]) / raster.size).astype(int), 0, raster.y.size - 1)
     return np.where(_covered(raster, x, y), raster.values[np.ix_(i, j)], np.nan)
 
 
 def survey_levels(path: Path, x: Array, y: Array) -> Array:
-    """Linear on the Delaunay triangles of surveyed points x,y,z [m]; shape (nx, ny), NaN outside their hull."""
+    """Levels (nx, ny) [m], linear on the Delaunay triangles of surveyed points x, y, z; NaN outside their hull.
+
+    Errors: InputError when the file cannot be read, or all points lie on one line.
+    """
     points = read_points(path)
     try:
         surface = LinearNDInterpolator(points[:, :2], points[:, 2])
@@ -78,7 +88,7 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
 
 
 def read_points(path: Path) -> Array:
-    """The columns x, y, z of a CSV file, shape (points, 3) [m]."""
+    """The columns x, y, z of a CSV file, (points, 3) [m]. Errors: InputError for a missing column or number."""
     rows = csv.DictReader(line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
     missing = [name for name in "xyz" if name not in (rows.fieldnames or ())]
     if missing:
@@ -117,7 +127,7 @@ def _header(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
     return header, len(lines)
 
 
-def _need(path: Path, header: dict[str, float], key: str) -> float:
+def _positive(path: Path, header: dict[str, float], key: str) -> float:
     if header.get(key, 0.0) <= 0:
         raise InputError(
             f"{path}: expected an ESRI ASCII grid whose header has a `{key}` above 0, got {header or 'no header'}."

@@ -18,7 +18,7 @@ from vegglue.site.terrain import nearest_at, read_raster
 
 
 def cells_of_patch(patch: Patch, grid: Grid) -> Mask:
-    """Cells (nx, ny) whose centre lies in a patch."""
+    """Cells (nx, ny) whose centre lies in the patch."""
     if patch.polygon is not None:
         return in_polygon(patch.polygon, grid)
     return _in_range(patch.x, patch.y, grid)
@@ -31,6 +31,10 @@ def slope(bed: Array, grid: Grid) -> Array:
 
 
 def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
+    """Index of the friction class of each cell (nx, ny): that of the last zone it lies in, else the default.
+
+    bed: levels (nx, ny) [m]. Errors: InputError for a raster that cannot be read or holds a number without a class.
+    """
     names = list(case.friction.classes)
     index = np.full(bed.shape, names.index(case.friction.default), dtype=np.int64)
     for zone in case.friction.zones:
@@ -63,9 +67,10 @@ def _zone_cells(zone: Zone, grid: Grid, bed: Array) -> Mask:
 
 
 def beyond(steep: Mask, bed: Array) -> Mask:
-    """From the lowest cell of each cross-section towards both sides: the first steep cell and all behind it.
+    """Cells (nx, ny) from the first steep one outward, on both sides of the lowest cell of each cross-section.
 
-    The lowest cell that is not steep: of an even floor, the first one may be at the toe of a bank.
+    steep (nx, ny); bed: levels (nx, ny) [m]. The lowest cell is sought among those that are not steep: of an even
+    floor, the first one may be at the toe of a bank.
     """
     even = np.where(steep & ~steep.all(axis=1, keepdims=True), np.inf, bed)
     columns, rows = np.arange(bed.shape[1])[None, :], even.argmin(axis=1)[:, None]
@@ -79,7 +84,7 @@ def _in_range(x: Interval | None, y: Interval | None, grid: Grid) -> Mask:
 
 
 def centres_within(interval: Interval | None, centres: Array) -> Mask:
-    """low <= c < high, for cell centres c (n,) [m]; all of them without an interval."""
+    """Whether low <= c < high for cell centres c (n,) [m]; all of them do without an interval."""
     # Half-open, so that a cell centre on a shared edge belongs to one of two neighbours.
     if interval is None:
         return np.ones(centres.size, dtype=bool)
@@ -92,7 +97,7 @@ def inflow_cells(inflow: Inflow, grid: Grid) -> NDArray[np.int64]:
 
 
 def ranges_without_cells(case: Case, grid: Grid) -> Iterator[str]:
-    """Keys of the ranges of inflows and outlet that hold no cell centre of a grid."""
+    """Keys of those ranges of inflows and outlet in which no cell centre of the grid lies."""
     for name, inflow in case.inflows.items():
         if not inflow_cells(inflow, grid).size:
             yield f"inflows.{name}.range"
@@ -101,7 +106,7 @@ def ranges_without_cells(case: Case, grid: Grid) -> Iterator[str]:
 
 
 def refuse_ranges_without_cells(case: Case, grid: Grid) -> None:
-    """Errors: InputError when an inflow or the outlet holds no cell centre."""
+    """Errors: InputError when no cell centre lies in the range of an inflow or of the outlet."""
     for key in ranges_without_cells(case, grid):
         raise InputError(
             f"{shown_path(case.source)}: `{key}` expected a range with the centre of a cell in it, got one between "
