@@ -25,14 +25,16 @@ class ActiveEffect:
 
     @property
     def on(self) -> NDArray[np.bool_]:
+        """Members (m,) in which the amplitude is not at its off value."""
         return np.asarray(self.values[self.effect.amplitude.name] != self.effect.amplitude.off)
 
 
 def applied(
     effects: tuple[ActiveEffect, ...], stage: Stage, surroundings: Any, neutral: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """What a stage hands on after all effects that act there, in the order of the case.
+    """What a stage hands on, by name, after all effects that act there, in the order given.
 
+    surroundings: what the effects of this stage see (`surroundings`); neutral: what is handed on without any effect.
     Where the amplitude of a member is at its off value, nothing of the effect reaches it, not even a rounding.
     """
     added = ADDED.get(stage, ())

@@ -1,4 +1,7 @@
-"""Effects on what enters and leaves the reach."""
+"""Effects on what enters and leaves: discharge Q, its spread q over an inflow, the outlet level, water along the reach.
+
+Shapes and units as in BoundaryValues. Parameters are (m,); unit and meaning of each stand in EFFECTS.
+"""
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect
@@ -21,7 +24,7 @@ def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
 
 
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
-    """q_lateral + r Q."""
+    """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s]."""
     return {"lateral": boundary.lateral + share * boundary.discharge.sum(axis=0)}
 
 

@@ -36,10 +36,10 @@ REPLACED = {
 
 @dataclass(frozen=True)
 class Amplitude:
-    """The one parameter that switches an effect: nothing happens at `off`.
+    """The one parameter that switches an effect on: nothing happens at `off`.
 
-    scale: a plausible size, the standard deviation of its prior around `off`; low, high: where it must lie. power: the
-    predictions answer to (amplitude - off)^power, to first order.
+    scale: a plausible size, the standard deviation of its prior around `off`; low, high: its support, within which it
+    must lie; power: to first order, predictions change in proportion to (amplitude - off)^power, the gain.
     """
 
     name: str
@@ -52,31 +52,31 @@ class Amplitude:
     power: int = 1
 
     def gain(self, value: float) -> float:
-        """What predictions answer to: (value - off)^power, of the sign of the difference."""
+        """g = |value - off|^power with the sign of value - off, to which predictions change in proportion."""
         return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)
 
     def size(self, gain: float) -> float:
-        """How far from off the value of that gain lies."""
+        """value - off = |g|^(1/power) with the sign of the gain g."""
         return float(np.sign(gain) * np.abs(gain) ** (1.0 / self.power))
 
     def at(self, gain: float) -> float:
-        """The value of that gain, kept within the support."""
+        """The value that has this gain, or the nearest one in the support."""
         return float(np.clip(self.off + self.size(gain), self.low, self.high))
 
     def may_be(self, gain: float, most: float) -> bool:
-        """Whether the value of a gain lies within the support, and within `most` times scale of off."""
+        """Whether the value that has this gain lies in the support, and within `most` times the scale of off."""
         value = self.off + self.size(gain)
         return self.low <= value <= self.high and abs(value - self.off) <= most * self.scale
 
     @property
     def small(self) -> float:
-        """A step from off into the support, small but large against rounding in its power."""
+        """A step from off into the support for differences: small, and its power still large against rounding."""
         step = (0.02 if self.power == 1 else 0.2) * self.scale
         return step if self.off + step <= self.high else -step
 
     @property
     def plausible(self) -> float:
-        """Gain of a plausible size."""
+        """scale^power, the gain of a plausible size."""
         return self.scale**self.power
 
 
@@ -120,4 +120,5 @@ class Effect:
 
     @property
     def parameters(self) -> tuple[Amplitude | Shape, ...]:
+        """The amplitude first, then the shapes; `act` takes them by name."""
         return (self.amplitude, *self.shapes)

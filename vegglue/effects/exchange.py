@@ -1,4 +1,7 @@
-"""Effects on lateral exchange of momentum: viscosity [m2/s] and momentum fluxes h T [m3/s2]."""
+"""Effects on lateral exchange of momentum: viscosity [m2/s] and momentum fluxes h T [m3/s2], (nx, ny, m), added.
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -6,6 +9,15 @@ from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
 from vegglue.resistance.physical_constants import KARMAN
+
+# Smallest depth over the mean one [-]: towards the waterline their ratio would grow without end.
+LEAST_RELATIVE_DEPTH = 0.2
+# Secondary currents fade out from here, in half widths from the axis: on the banks they have no room to turn.
+CURRENTS_END = 1.5
+# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water says nothing of a bend.
+STILL_SQUARED = 0.0025
+# a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
+LARGEST_ROUGHNESS = 0.5
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
@@ -30,28 +42,29 @@ def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
 
 
 def edge_mixing(cells: Cells, coefficient: Array, width: Array) -> dict[str, Array]:
-    """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch: d |du/dy| is the difference
-    of speed across the layer.
+    """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch [m].
+
+    d |du/dy| is the difference of speed across the layer of width d.
     """
     band = np.exp(-((cells.geometry.edge / width) ** 2))
     return {"viscosity": coefficient * width**2 * band * np.abs(cells.u_y)}
 
 
 def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_depth: Array) -> dict[str, Array]:
-    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5."""
-    shallow = mean_depth / np.maximum(cells.depth, 0.2 * mean_depth)
+    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5, h_m the depth between the deep and the shallow part."""
+    shallow = mean_depth / np.maximum(cells.depth, LEAST_RELATIVE_DEPTH * mean_depth)
     return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
 
 
 def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
-    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end."""
+    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m]."""
     return {"viscosity": coefficient * np.exp(-cells.geometry.wake / length) * cells.speed}
 
 
 def secondary_current(cells: Cells, strength: Array) -> dict[str, Array]:
     """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width."""
     eta = cells.geometry.offset
-    return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / 1.5) ** 4))) * cells.depth * cells.u**2}
+    return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / CURRENTS_END) ** 4))) * cells.depth * cells.u**2}
 
 
 def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
@@ -61,20 +74,23 @@ def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
 
 
 def curvature(cells: Cells) -> Array:
-    """h / R = h (u^2 v_x - v^2 u_y + u v (v_y - u_x)) / |U|^3 [-], positive towards larger y; |U| at least 0.05 m/s,
-    and never above 1/2 (h / R / (1 + (2 h / R)^2)^(1/2)).
+    """r = h (u^2 v_x - v^2 u_y + u v (v_y - u_x)) / |U|^3, depth over radius of the bend, as r / (1 + 4 r^2)^(1/2) [-].
+
+    Positive where the flow turns towards larger y, and never above 1/2: no bend is narrower than it is deep.
+    |U|^2 is u^2 + v^2 + (0.05 m/s)^2, so that water at rest has no bend. Shape (nx, ny, m).
     """
     u, v = cells.u, cells.v
     turn = u**2 * cells.v_x - v**2 * cells.u_y + u * v * (cells.v_y - cells.u_x)
-    bend = cells.depth * turn / (u**2 + v**2 + 0.0025) ** 1.5
+    bend = cells.depth * turn / (u**2 + v**2 + STILL_SQUARED) ** 1.5
     return bend / np.sqrt(1.0 + 4.0 * bend**2)
 
 
 def helical_flow(cells: Cells, share: Array) -> dict[str, Array]:
-    """h T_sn = -s b h (h / R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2) / kappa at most 1/2: fast water
-    is carried to the outside of the bend.
+    """h T_sn = -s b h (h / R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2) / kappa at most 1/2.
+
+    It carries fast water to the outside of the bend; s is along the flow, n across it.
     """
-    a = np.minimum(np.sqrt(cells.bed_rate * cells.depth) / KARMAN, 0.5)
+    a = np.minimum(np.sqrt(cells.bed_rate * cells.depth) / KARMAN, LARGEST_ROUGHNESS)
     carried = share * (5.0 * a - 15.6 * a**2 + 37.5 * a**3) * cells.depth * curvature(cells)
     along = 2.0 * carried * cells.u * cells.v
     return {"xx": along, "xy": -carried * (cells.u**2 - cells.v**2), "yy": -along}

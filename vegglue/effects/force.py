@@ -1,4 +1,7 @@
-"""Forces on the water [m/s2]."""
+"""Effects that push the water: forces along x and y [m/s2] (nx, ny, m), which are added.
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -7,11 +10,14 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
 from vegglue.resistance.physical_constants import AIR_OVER_WATER, GRAVITY
 
+WIND_DRAG = 1.3e-3  # C_w [-], of winds of some 8 m/s by Garratt (1977)
+LEAST_WINDY_DEPTH = 0.05  # m; a stress on less water would be a force without end
+
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
-    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3."""
-    stress = 1.3e-3 * AIR_OVER_WATER * np.abs(speed) * speed
-    return {"x": stress / np.maximum(cells.depth, 0.05)}
+    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 m."""
+    stress = WIND_DRAG * AIR_OVER_WATER * np.abs(speed) * speed
+    return {"x": stress / np.maximum(cells.depth, LEAST_WINDY_DEPTH)}
 
 
 def panel_current(cells: Cells, strength: Array, slope: Array, bank_ratio: Array) -> dict[str, Array]:

@@ -38,7 +38,7 @@ def library(own: Path | None = None) -> Mapping[str, Effect]:
 
 
 def effects_of(path: Path) -> tuple[Effect, ...]:
-    """The effects of a user's file, which is run; InputError when it cannot be, or has no EFFECTS."""
+    """The effects of a user's file, which is run. Errors: InputError when it cannot be, or has no EFFECTS."""
     shown = _shown(path)
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:

@@ -1,4 +1,7 @@
-"""Effects on what stands in the water: plant drag phi [-] and canopy height h_d [m] of each vegetated cell."""
+"""Effects on plants: drag phi [-] and canopy height h_d [m] of each vegetated cell, both (cell, m).
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -7,10 +10,17 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import PlantCells
 from vegglue.resistance.physical_constants import WATER_VISCOSITY
 
+# Speed [m/s] below which plants do not yield further: a negative exponent would give infinite drag at rest.
+LEAST_YIELDING_SPEED = 0.02
+# Cauchy number [-] that stands for still water: far below 1, where nothing bends, and its powers stay finite.
+LEAST_CAUCHY = 1e-3
+# Reynolds number [-] below which C_D stays as it is, 2 mm/s at a stem of 1 cm: it grows without end towards rest.
+LEAST_REYNOLDS = 20.0
+
 
 def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
     """phi -> phi (|U| / U_0)^chi, |U| at least 0.02 m/s."""
-    return {"phi": plants.phi * (np.maximum(plants.speed, 0.02) / reference_speed) ** vogel_exponent}
+    return {"phi": plants.phi * (np.maximum(plants.speed, LEAST_YIELDING_SPEED) / reference_speed) ** vogel_exponent}
 
 
 def canopy_height_error(plants: PlantCells, relative_error: Array) -> dict[str, Array]:
@@ -24,14 +34,13 @@ def canopy_deflection(plants: PlantCells, rate: Array) -> dict[str, Array]:
 
 
 def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
-    """Effective length l_e / l and height h / l of a flexible blade, both at most 1, none below Ca = 1.
+    """l_e/l = 1 - (1 - 0.9 Ca^(-1/3)) / (1 + Ca^(-3/2) (8 + B^(3/2))), the effective length of a flexible blade, and
+    h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2)), its height; both at most 1 [-].
 
-    l_e/l = 1 - (1 - 0.9 Ca^(-1/3)) / (1 + Ca^(-3/2) (8 + B^(3/2)))
-    h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2))
-
-    Luhar and Nepf (2011), doi:10.4319/lo.2011.56.6.2003; from memory, not read again.
+    Cauchy number Ca and buoyancy number B [-]; a blade does not bend where Ca is below 1.
+    Source: Luhar and Nepf (2011), doi 10.4319/lo.2011.56.6.2003; from memory, not read again.
     """
-    ca = np.maximum(cauchy, 1e-3)
+    ca = np.maximum(cauchy, LEAST_CAUCHY)
     length = 1.0 - (1.0 - 0.9 * ca ** (-1 / 3)) / (1.0 + ca**-1.5 * (8.0 + buoyancy**1.5))
     height = 1.0 - (1.0 - ca**-0.25) / (1.0 + ca**-0.6 * (4.0 + buoyancy**0.6) + ca**-2.0 * (8.0 + buoyancy**2))
     return np.minimum(length, 1.0), np.minimum(height, 1.0)
@@ -49,13 +58,13 @@ def canopy_bending(
 
 
 def undergrowth(plants: PlantCells, drag: Array, height: Array) -> dict[str, Array]:
-    """phi + phi_u min(h / h_u, 1)."""
+    """phi -> phi + phi_u min(h / h_u, 1)."""
     return {"phi": plants.phi + drag * np.minimum(plants.depth / height, 1.0)}
 
 
 def foliage(plants: PlantCells, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
-    """phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.02 m/s."""
-    bent = (np.maximum(plants.speed, 0.02) / reference_speed) ** vogel_exponent
+    """phi -> phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.02 m/s."""
+    bent = (np.maximum(plants.speed, LEAST_YIELDING_SPEED) / reference_speed) ** vogel_exponent
     return {"phi": plants.phi + drag * bent * np.minimum(plants.depth / plants.canopy_height, 1.0)}
 
 
@@ -66,7 +75,7 @@ def emergent_part(plants: PlantCells, share: Array) -> dict[str, Array]:
 
 def slow_stems(plants: PlantCells, share: Array, diameter: Array) -> dict[str, Array]:
     """phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D / nu at least 20."""
-    reynolds = np.maximum(plants.speed * diameter / WATER_VISCOSITY, 20.0)
+    reynolds = np.maximum(plants.speed * diameter / WATER_VISCOSITY, LEAST_REYNOLDS)
     return {"phi": plants.phi * (1.0 + share * 10.0 * reynolds ** (-2 / 3))}
 
 

@@ -1,4 +1,7 @@
-"""Effects on the friction rate k = g / (C^2 h) [1/m] beyond the laws of the classes."""
+"""Effects on the friction rate k = g / (C^2 h) [1/m] (nx, ny, m), beyond the laws of the friction classes.
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -6,17 +9,21 @@ from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
 
+# Depth [m] below which a law that depends on it stays as it is, twice the default film: its power would be infinite
+# where there is no water.
+LEAST_DEPTH_OF_POWER = 0.02
+
 
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the banks."""
-    depth = cells.depth.clip(0.02)
+    """k -> k (h / h_0)^e on the banks, h at least 0.02 m."""
+    depth = cells.depth.clip(LEAST_DEPTH_OF_POWER)
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.bank)}
 
 
 def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the floor where no plants stand."""
+    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 m."""
     open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
-    return {"rate": cells.rate * (cells.depth.clip(0.02) / reference_depth) ** (exponent * open_floor)}
+    return {"rate": cells.rate * (cells.depth.clip(LEAST_DEPTH_OF_POWER) / reference_depth) ** (exponent * open_floor)}
 
 
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
@@ -31,7 +38,7 @@ def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
 
 
 def bank_vegetation(cells: Cells, drag: Array, height: Array) -> dict[str, Array]:
-    """k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
+    """k -> k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
     standing = np.minimum(1.0 / height, 1.0 / cells.depth)
     return {"rate": cells.rate + 0.5 * drag * standing * cells.geometry.bank}
 

@@ -1,4 +1,7 @@
-"""Effects between the flow and the number in the file."""
+"""Effects on instruments: what they show, (station, m) [m/s, m or m3/s], where the flow is something else.
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -14,12 +17,12 @@ def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:
 
 
 def zero_offset(reading: Reading, offset: Array) -> dict[str, Array]:
-    """u -> u + c."""
+    """u -> u + c, u what a probe measures [m/s]."""
     return {"value": reading.value + offset * reading.velocity}
 
 
 def station_shift(reading: Reading, shift: Array) -> dict[str, Array]:
-    """u -> u + d du/dy."""
+    """u -> u + d du/dy, u what a probe measures [m/s]: to first order, what stands d further towards larger y."""
     return {"value": reading.value + shift * reading.component_y * reading.velocity}
 
 
@@ -40,12 +43,12 @@ def among_plants(reading: Reading, gain: Array) -> dict[str, Array]:
 
 
 def gauge_datum(reading: Reading, shift: Array) -> dict[str, Array]:
-    """z_s -> z_s + d."""
+    """z_s -> z_s + d, z_s the level that a gauge shows [m]."""
     return {"value": reading.value + shift * reading.level}
 
 
 def gauge_head(reading: Reading, share: Array) -> dict[str, Array]:
-    """z_s -> z_s + a u^2 / (2 g)."""
+    """z_s -> z_s + a u^2 / (2 g), z_s the level that a gauge shows [m]."""
     return {"value": reading.value + share * reading.u**2 / (2.0 * GRAVITY) * reading.level}
 
 

@@ -1,4 +1,7 @@
-"""Effects on the bed level [m]: what a survey may have missed, or the flow has changed since."""
+"""Effects on the bed level z_b [m] (nx, ny, m): what a survey may have missed, or the flow has changed since.
+
+Parameters are (m,); unit and meaning of each stand in EFFECTS, with the source of the formula.
+"""
 
 import numpy as np
 
@@ -8,38 +11,39 @@ from vegglue.effects.surroundings import ChannelGeometry
 
 
 def floor_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b + dz on the floor."""
+    """z_b -> z_b + dz on the floor."""
     return {"bed": rise * (1.0 - geometry.bank)}
 
 
 def bank_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b + dz on the banks."""
+    """z_b -> z_b + dz on the banks."""
     return {"bed": rise * geometry.bank}
 
 
 def bed_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
-    """z_b + s (x_end - x): the bed at the outlet stays."""
+    """z_b -> z_b + s (x_end - x): the bed at the outlet stays."""
     return {"bed": slope * (geometry.x[-1] - geometry.x) * np.ones_like(geometry.bed)}
 
 
 def cross_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
-    """z_b + s (y - y_axis)."""
+    """z_b -> z_b + s (y - y_axis), y_axis that of the channel axis."""
     return {"bed": slope * geometry.offset * geometry.half_width}
 
 
 def flank_scour(geometry: ChannelGeometry, depth: Array, width: Array) -> dict[str, Array]:
-    """z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them."""
+    """z_b -> z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them [m]."""
+    # Columns without a patch count as inside one, where nothing is dug.
     beside = np.where(np.isfinite(geometry.edge), geometry.edge, -1e3)
     return {"bed": np.where(beside > 0.0, -depth * np.exp(-(((beside - width) / width) ** 2)), 0.0)}
 
 
 def patch_deposit(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b + dz where plants stand."""
+    """z_b -> z_b + dz where plants stand."""
     return {"bed": rise * geometry.planted}
 
 
 def wake_deposit(geometry: ChannelGeometry, rise: Array, length: Array) -> dict[str, Array]:
-    """z_b + dz exp(-s / L) behind a patch, s the distance from its end."""
+    """z_b -> z_b + dz exp(-s / L) behind a patch, s the distance from its end [m]."""
     return {"bed": rise * np.exp(-geometry.wake / length)}
 
 

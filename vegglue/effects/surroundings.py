@@ -63,20 +63,24 @@ class Cells:
 
     @property
     def u_x(self) -> Array:
+        """du/dx (nx, ny, m) [1/s]."""
         return along(self.u, self.geometry.dx)
 
     @property
     def u_y(self) -> Array:
+        """du/dy (nx, ny, m) [1/s], weighed by the shear depth where there is one."""
         if self.shear_depth.size:
             return weighted_across(self.u, self.shear_depth, self.geometry.dy)
         return across(self.u, self.geometry.dy)
 
     @property
     def v_x(self) -> Array:
+        """dv/dx (nx, ny, m) [1/s]."""
         return along(self.v, self.geometry.dx)
 
     @property
     def v_y(self) -> Array:
+        """dv/dy (nx, ny, m) [1/s]."""
         return across(self.v, self.geometry.dy)
 
 
@@ -133,19 +137,22 @@ class Reading:
 
 
 def along(values: Array, dx: float) -> Array:
-    """d/dx by central differences, one-sided at the ends."""
+    """d/dx by central differences, one-sided at the ends; values (nx, ny, m), the same shape comes back [unit/m]."""
     return _slope(values, dx) if values.shape[0] > 1 else np.zeros_like(values)
 
 
 def across(values: Array, dy: float) -> Array:
-    """d/dy by central differences, one-sided at the ends."""
+    """d/dy by central differences, one-sided at the ends; values (nx, ny, m), the same shape comes back [unit/m]."""
     if values.shape[1] < 2:
         return np.zeros_like(values)
     return _slope(values.swapaxes(0, 1), dy).swapaxes(0, 1)
 
 
 def weighted_across(values: Array, weight: Array, dy: float) -> Array:
-    """d/dy, the mean of what is on either side by its weight (nx, ny - 1, m): beside land what is on the wet one."""
+    """d/dy, the mean of the differences on either side by their weight (nx, ny - 1, m) [unit/m].
+
+    Land has no weight, so that beside it the difference on the wet side counts alone.
+    """
     step, whole = np.zeros_like(values), np.zeros_like(values)
     weighted = weight * np.diff(values, axis=1)
     for total, side in ((step, weighted), (whole, weight)):

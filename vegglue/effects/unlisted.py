@@ -1,4 +1,4 @@
-"""What the search for "none of these" probes with: an object at a place, of no named kind."""
+"""An object of no named kind at a place: what a diagnosis tries where no effect of the library fits."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from vegglue.effects.surroundings import Cells
 
 
 def unlisted_object(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
-    """k -> k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2), no less than 0."""
+    """k -> max(k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2), 0) [1/m], for an object of radius r at x_0, y_0 [m]."""
     away = ((cells.geometry.x - x) ** 2 + (cells.geometry.y - y) ** 2) / radius**2
     return {"rate": np.maximum(cells.rate + drag * np.exp(-away), 0.0)}
 
