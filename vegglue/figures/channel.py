@@ -19,7 +19,7 @@ from vegglue.site.gridded_site import Site
 from vegglue.site.polygons import corners_of
 
 CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
-# Drawn upstream and downstream of patches and stations [m]: about the depth times ten, where plants still act.
+# Drawn upstream and downstream of patches and stations [m]: room to see the bed around them.
 REACH_OF_INTEREST_MARGIN = 12.0
 
 

@@ -147,6 +147,7 @@ def draw_zones(zones: pd.DataFrame) -> Figure:
 
 
 def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
+    """Paint draw_zones on given axes."""
     experiments = list(dict.fromkeys(zones["experiment"]))
     rows = list(dict.fromkeys(zip(zones["experiment"], zones["section"], strict=True)))
     rows.sort(key=lambda row: experiments.index(row[0]))
@@ -198,6 +199,7 @@ def paint_places(
     patches: Sequence[Outline],
     stations: Array,
 ) -> None:
+    """Paint draw_places on given axes; found: x, y [m] of the spot that is marked."""
     along, across, field = _raster(x, y, score)
     largest = float(np.nanmax(np.abs(field), initial=0.0)) or 1.0
     if min(field.shape) > 1:

@@ -15,7 +15,7 @@ from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, s
 from vegglue.figures.typography import short, symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
-# Points of a drawn density; its axis is about as many pixels wide.
+# Points of a drawn density: its curve looks smooth at the width of a column.
 DENSITY_POINTS = 240
 # Members drawn for the prior, at most: the start of a Sobol' sequence is as even as the whole.
 PRIOR_MEMBERS = 1024

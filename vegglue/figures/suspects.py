@@ -51,6 +51,7 @@ def draw_suspects(suspects: pd.DataFrame, threshold: float) -> Figure:
 
 
 def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshold: float) -> None:
+    """Paint draw_suspects on two axes that share their rows: scores on the first, visibility on the second."""
     rows = np.arange(len(suspects))
     first, left = np.abs(suspects["first"].to_numpy(float)), np.abs(suspects["left"].to_numpy(float))
     scores.hlines(rows, 0, first, color=COLOUR["rule"], linewidth=1)
@@ -106,6 +107,7 @@ def draw_alike(names: Sequence[str], cosine: Array) -> Figure:
 
 
 def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
+    """Paint draw_alike on given axes; cosine: (effect, effect), in the order of names."""
     families = alike_groups(names, cosine)
     order = [list(names).index(name) for family in families for name in family]
     turned = cosine[np.ix_(order, order)]

@@ -81,7 +81,7 @@ def findings(run: Run) -> list[Finding]:
     return sorted(found, key=lambda finding: not finding.doubt)
 
 
-def html_of(sentences: Iterable[str]) -> str:
+def _html(sentences: Iterable[str]) -> str:
     """Plain sentences as one piece of HTML, commands in `backticks` set as code."""
     return _code(html.escape(" ".join(sentences)))
 
@@ -113,13 +113,13 @@ def _plants(case: Case, posterior: Posterior, cylinder: RigidCylinder | None) ->
     inferred = posterior.marginals.median[name] if posterior.canopy is None else posterior.canopy.median
     median = cylinder.quantile(0.5)
     if not posterior.marginals.identified[name]:
-        said = "the flow at these stations cannot tell whether that is so"
+        comparison = "the flow at these stations cannot tell whether that is so"
     else:
-        said = f"the flow asks for {short(inferred / median, 2)} times as much"
+        comparison = f"the flow asks for {short(inferred / median, 2)} times as much"
     yield Finding(
         "plants",
         f"Rigid cylinders of the surveyed size would have {symbol(case, name)} = "
-        f"{plus_minus(cylinder.mean, cylinder.standard_deviation)} (median {short(median, 2)}); {said}. "
+        f"{plus_minus(cylinder.mean, cylinder.standard_deviation)} (median {short(median, 2)}); {comparison}. "
         f"{html.escape(cylinder.assumption)}",
     )
 
@@ -169,17 +169,17 @@ def _refinement(posterior: Posterior) -> Iterator[Finding]:
         return
     estimated = refined.error_model.errors == "estimated"
     search, *errors = search_in_words(posterior, refined)
-    yield Finding("errors", html_of(errors), doubt=estimated)
-    yield Finding("draws", html_of([search]))
+    yield Finding("errors", _html(errors), doubt=estimated)
+    yield Finding("draws", _html([search]))
     missing = not estimated and refined.misfit.p_misfit < UNBELIEVED
     doubt = missing or bool(refined.misfit.outlier.any())
-    yield Finding("validation", html_of(validation_in_words(posterior, refined)), doubt)
+    yield Finding("validation", _html(validation_in_words(posterior, refined)), doubt)
 
 
 def _homogeneity(case: Case, posterior: Posterior) -> Iterator[Finding]:
     if posterior.transfer is not None:
         sentences = homogeneity_in_words(posterior, posterior.transfer, case.reference.table if case.reference else {})
-        yield Finding("homogeneity", html_of(sentences), doubt=homogeneity_rejected(posterior.transfer))
+        yield Finding("homogeneity", _html(sentences), doubt=homogeneity_rejected(posterior.transfer))
 
 
 def _flagged(observations: Observations) -> Iterator[Finding]:
