@@ -7,7 +7,7 @@ import pytest
 from drawings import off_the_sheet, points, texts
 
 from vegglue.case.config import load_case
-from vegglue.figures.channel import MARGIN_OF_BED, draw_channel
+from vegglue.figures.channel import REACH_OF_INTEREST_MARGIN, draw_channel
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 from vegglue.site.polygons import corners_of
@@ -31,7 +31,10 @@ def test_the_channel_shows_patches_stations_and_boundaries_where_they_are(name: 
     assert {"upstream", "outlet"} <= set(texts(whole))
     assert (whole.get_xlim(), whole.get_ylim()) == (case.grid.x, case.grid.y)
     along = [*table["x"], *np.concatenate(corners)[:, 0]]
-    expected = max(case.grid.x[0], min(along) - MARGIN_OF_BED), min(case.grid.x[1], max(along) + MARGIN_OF_BED)
+    expected = (
+        max(case.grid.x[0], min(along) - REACH_OF_INTEREST_MARGIN),
+        min(case.grid.x[1], max(along) + REACH_OF_INTEREST_MARGIN),
+    )
     assert reach.get_xlim() == pytest.approx(expected)
     middle = int(np.abs(site.grid.x - 0.5 * sum(expected)).argmin())
     assert np.array_equal(across.lines[0].get_ydata(), site.bed[middle])

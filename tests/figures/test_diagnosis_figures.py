@@ -22,7 +22,7 @@ from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
 from vegglue.report_page.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report_page.diagnosis_words import diagnosis_in_words, error_of, ranked, standing_of
+from vegglue.report_page.diagnosis_words import diagnosis_section, ranked_suspects, rms_residual, suspect_status
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
 from vegglue.site.polygons import corners_of
 
@@ -39,11 +39,11 @@ def stations(**columns: object) -> pd.DataFrame:
 
 def test_standings_follow_the_verdict() -> None:
     found = a_diagnosis()
-    said = {one.name: standing_of(found, one) for one in found.suspects}
+    said = {one.name: suspect_status(found, one) for one in found.suspects}
     assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
-    assert [one.name for one in ranked(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
+    assert [one.name for one in ranked_suspects(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
     louder = a_diagnosis(first_screening={"scores": found.first_screening.scores | {"turning": -9.0}})
-    assert standing_of(louder, found.suspects[3]) == "less likely"
+    assert suspect_status(louder, found.suspects[3]) == "less likely"
 
 
 def test_errors_leave_out_what_does_not_count() -> None:
@@ -51,19 +51,19 @@ def test_errors_leave_out_what_does_not_count() -> None:
     station = found.predictions.station
     value = station["value"].to_numpy(float)
     off = np.array([0.03, 9.0, 9.0, 0.04, 0.0, 9.0])  # row 1 is flagged, 2 and 5 are levels
-    assert error_of(found, value - off) == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 3))
-    assert error_of(found, value - off, "level") == pytest.approx(9.0)
-    assert np.isnan(error_of(a_diagnosis(predictions={"station": station.assign(used=False)}), value))
+    assert rms_residual(found, value - off) == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 3))
+    assert rms_residual(found, value - off, "level") == pytest.approx(9.0)
+    assert np.isnan(rms_residual(a_diagnosis(predictions={"station": station.assign(used=False)}), value))
 
 
 def test_words_tell_scores_before_and_after() -> None:
-    rows = {row.name: row for row in diagnosis_in_words(a_diagnosis()).suspects}
+    rows = {row.name: row for row in diagnosis_section(a_diagnosis()).suspects}
     assert rows["turning"].score == "−1.0 → −1.0"
     assert rows["eddies"].score == "45.2"  # refitted, not looked at again
     assert rows["eddies"].p_family.startswith("&lt;")
     assert rows["eddies"].chance.startswith("70")
     assert rows["wind"].chance == ""
-    assert diagnosis_in_words(a_diagnosis()).flagged[0].measured == "0.500"
+    assert diagnosis_section(a_diagnosis()).flagged[0].measured == "0.500"
 
 
 def test_what_a_later_step_accepts_has_its_chance() -> None:

@@ -13,9 +13,9 @@ from matplotlib.colors import to_hex
 from vegglue.figures.measured import Bands, Vertical, draw_quantiles, draw_section, draw_verticals
 from vegglue.figures.plan_view import draw_reach, stream_function, wet_window
 from vegglue.figures.posterior import (
-    DISCS,
+    POSTERIOR_MEMBERS,
+    DrawnParameter,
     ReferenceValue,
-    Unknown,
     density,
     draw_cylinder,
     draw_joint,
@@ -58,8 +58,8 @@ def uniform_flow(u: float = 0.5, v: float = 0.0) -> FlowFields:
     return FlowFields(x, y, bed, depth, bed + depth, u + 0 * depth, v + 0 * depth)
 
 
-def unknown(values: np.ndarray, low: float, high: float, logarithmic: bool = False) -> Unknown:
-    return Unknown(values, values, low, high, logarithmic, "k_s", "m")
+def unknown(values: np.ndarray, low: float, high: float, logarithmic: bool = False) -> DrawnParameter:
+    return DrawnParameter(values, values, low, high, logarithmic, "k_s", "m")
 
 
 def test_density_keeps_its_mass_at_a_bound() -> None:
@@ -183,8 +183,8 @@ def test_marginal_keeps_the_longest_label_on_the_sheet() -> None:
 def test_marginal_draws_the_prior_from_its_own_values_or_not_at_all() -> None:
     values = np.linspace(0.4, 0.6, 500)
     before = np.linspace(0.0, 1.0, 500)
-    spread = Unknown(values, before, 0.0, 1.0, False, "k_s", "m")
-    for drawn, height in ((spread, 1.0), (replace(spread, before=np.zeros(0)), 0.0)):
+    spread = DrawnParameter(values, before, 0.0, 1.0, False, "k_s", "m")
+    for drawn, height in ((spread, 1.0), (replace(spread, prior=np.zeros(0)), 0.0)):
         outline = draw_marginal(drawn, np.ones(500), []).axes[0].collections[0].get_paths()[0].vertices
         inside = (outline[:, 0] > 0.2) & (outline[:, 0] < 0.8)
         assert outline[inside, 1].max() == pytest.approx(height, abs=0.05)
@@ -203,7 +203,7 @@ def test_joint_of_many_draws_shows_some_of_them() -> None:
     values = np.linspace(1.0, 4.0, 3000)
     figure = draw_joint(unknown(values, 0, 5), unknown(values, 0, 5), np.ones(3000), [])
     drawn = np.asarray(figure.axes[0].collections[0].get_offsets())[:, 0]
-    assert 200 < len(drawn) <= DISCS
+    assert 200 < len(drawn) <= POSTERIOR_MEMBERS
     assert (drawn.min(), drawn.max()) == pytest.approx((1.0, 4.0), abs=0.02)
 
 

@@ -22,7 +22,7 @@ from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import key_numbers, verdict_of
 from vegglue.report_page.page import write_report
-from vegglue.report_page.run import Run, is_synthetic, zones
+from vegglue.report_page.run import Run, is_synthetic, station_zones
 from vegglue.report_page.tables import parameter_rows
 from vegglue.results.ensemble import Ensemble
 from vegglue.site.gridded_site import Site, build_site
@@ -256,13 +256,15 @@ def test_table_compares_with_the_study_and_with_known_values(d3a: tuple[Run, str
     posterior = run.posterior
     row = parameter_rows(run)[0]
     off, sd = posterior.marginals.median["n_b"] - 0.098, posterior.marginals.sd["n_b"]
-    assert row.beside.study.replace("\u00a0", " ") == "0.098 ± 0.008"
-    assert row.beside.from_study == f"{off / np.hypot(sd, 0.008):.1f} sd".replace("-", "−").replace("−0.0", "0.0")
-    assert row.beside.from_known.startswith(f"{off / sd:.1f} sd".replace("-", "−").replace("−0.0", "0.0"))
+    assert row.reference.study.replace("\u00a0", " ") == "0.098 ± 0.008"
+    assert row.reference.study_difference == f"{off / np.hypot(sd, 0.008):.1f} sd".replace("-", "−").replace(
+        "−0.0", "0.0"
+    )
+    assert row.reference.made_with_difference.startswith(f"{off / sd:.1f} sd".replace("-", "−").replace("−0.0", "0.0"))
     power = parameter_rows(run)[2]
     off = posterior.marginals.log10_median["phi"] - np.log10(39.81)
-    assert power.beside.study.replace("\u00a0", " ") == "10<sup>1.6 ± 0.2</sup>"
-    assert power.beside.from_known.startswith(
+    assert power.reference.study.replace("\u00a0", " ") == "10<sup>1.6 ± 0.2</sup>"
+    assert power.reference.made_with_difference.startswith(
         f"{off / posterior.marginals.log10_sd['phi']:.1f} sd".replace("-", "−").replace("−0.0", "0.0")
     )
 
@@ -270,15 +272,15 @@ def test_table_compares_with_the_study_and_with_known_values(d3a: tuple[Run, str
 def test_a_corrected_phi_is_the_one_compared(tmp_path: Path) -> None:
     run = kict(tmp_path, "d3b_paper")
     rows = parameter_rows(run)
-    assert [row.beside.study for row in rows[2:]] == ["–", "10<sup>0.19\u00a0±\u00a00.12</sup>"]
+    assert [row.reference.study for row in rows[2:]] == ["–", "10<sup>0.19\u00a0±\u00a00.12</sup>"]
     assert run.posterior.canopy is not None
     assert rows[3].posterior.startswith(f"10<sup>{run.posterior.canopy.log10_median:.3f}".replace("-", "−"))
-    assert any("Corrected from a canopy of 0.8 m to one of 1.36 m" in finding.text for finding in findings(run))
+    assert any("For a canopy of 1.36 m instead of 0.8 m" in finding.text for finding in findings(run))
 
 
 def test_zones_follow_the_plants_present(toy: tuple[Run, str]) -> None:
     run, _ = toy
-    table = run.observations.table.assign(zone=zones(run))
+    table = run.observations.table.assign(zone=station_zones(run))
     here = table[(table["x"] == 12.0) & (table["y"] == 4.5)].set_index("experiment")["zone"]
     assert dict(here) == {"with": "plants", "without": "bed"}
     assert set(table.loc[table["y"] == 3.0, "zone"]) == {"bank"}
@@ -341,7 +343,8 @@ def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
     run, _ = d3a
     known = {"n_b": True, "k_s": True, "phi": False}
     text, doubt = said(run, "parameter", identified=known, width_ratio={"n_b": 0.1, "k_s": 0.1, "phi": 0.96})
-    assert "It is not identified: the 95 % range is still 96 % as wide as before the measurements" in text
+    assert "is not identified: its 95 % range" in text
+    assert "is still 96 % of the prior's (identified means below 50 %)" in text
     assert doubt
     sentence = re.sub(
         "<[^>]*>", "", verdict_of(run.case, changed(run.posterior, identified=known, effective_size=500.0))
@@ -360,8 +363,8 @@ def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
     hit = run.posterior.marginals.bound_hit | {"phi": np.array([False, True])}
     mass = run.posterior.marginals.bound_mass | {"phi": np.array([0.0, 0.14])}
     text, doubt = said(run, "parameter", bound_hit=hit, bound_mass=mass)
-    assert "presses against the upper bound of its prior (14 % of the weight is near it)" in text
-    assert "the data bound it from below only" in text
+    assert "presses against the upper bound of its prior, 100: 0.14 of the posterior lies within 2 %" in text
+    assert "The data bound it from below only" in text
     assert doubt
 
 
@@ -369,13 +372,13 @@ def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
 def test_says_when_few_members_carry_the_weight(d3a: tuple[Run, str], size: float, provisional: bool) -> None:
     run, _ = d3a
     text, doubt = said(run, "weights", effective_size=size, pareto_k=0.2)
-    assert ("simulate more members" in text) == doubt == provisional
+    assert ("no posterior is claimed" in text) == doubt == provisional
     posterior = changed(run.posterior, effective_size=size)
     sentence = verdict_of(run.case, posterior)
     assert sentence.startswith("A first look only") == provisional
     assert ("too few to say what is identified" in sentence) == provisional
     assert key_numbers(run.case, posterior)[0].remark.startswith("too few members to tell") == provisional
-    assert parameter_rows(replace(run, posterior=posterior))[0].known.startswith("too few members") == provisional
+    assert parameter_rows(replace(run, posterior=posterior))[0].identified.startswith("too few members") == provisional
 
 
 @pytest.mark.parametrize(("error", "hides"), [(0.001, True), (0.5, False)])

@@ -13,7 +13,7 @@ from vegglue.cli.options import Json, Runs, console
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.report_page.effect_page import by_stage, effect_json, page, work_in_case
+from vegglue.report_page.effect_page import by_stage, effect_in_words, effect_json, work_in_case
 from vegglue.workflow.check import check_effects
 from vegglue.workflow.diagnose import draw_fingerprint_of
 
@@ -59,7 +59,7 @@ def _show(effect: Effect, case: Case | None, as_object: bool) -> None:
     if as_object:
         print(json.dumps(effect_json(effect) | ({"case": doing} if case is not None else {}), ensure_ascii=False))
         return
-    for line in (*page(effect), *doing):
+    for line in (*effect_in_words(effect), *doing):
         console.print(line)
 
 

@@ -19,8 +19,8 @@ from vegglue.site.gridded_site import Site
 from vegglue.site.polygons import corners_of
 
 CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
-# Free room drawn around patches and stations [m].
-MARGIN_OF_BED = 12.0
+# Drawn upstream and downstream of patches and stations [m]: room to see the bed around them.
+REACH_OF_INTEREST_MARGIN = 12.0
 
 
 def save_channel_figure(case: Case, site: Site, observations: Observations, path: Path) -> None:
@@ -62,7 +62,9 @@ def _reach_of_interest(case: Case, observations: Observations) -> tuple[float, f
     x = [corner for patch in case.plants.patches for corner in corners_of(patch)[:, 0]] + list(observations.table["x"])
     if not x:
         return case.grid.x
-    return max(case.grid.x[0], min(x) - MARGIN_OF_BED), min(case.grid.x[1], max(x) + MARGIN_OF_BED)
+    return max(case.grid.x[0], min(x) - REACH_OF_INTEREST_MARGIN), min(
+        case.grid.x[1], max(x) + REACH_OF_INTEREST_MARGIN
+    )
 
 
 def _draw_classes(axes: Axes, site: Site) -> None:

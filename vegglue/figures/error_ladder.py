@@ -15,14 +15,15 @@ from vegglue.figures.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.figures.typography import fixed, short
 from vegglue.measurements.kinds import STREAMWISE
 
-# Chance that a parameter is the same in all experiments, below which it is drawn as one that has to move.
-MOVES = 0.05
-# Panels of parameters side by side, and ratio of largest to smallest above which their axis is logarithmic.
-LADDER_COLUMNS, DECADES = 5, 30.0
+# p-value [-] of one value in all experiments, below which a parameter is drawn as one that moves: 1 in 20.
+MOVES_BELOW = 0.05
+# Panels of parameters side by side; ratio [-] of largest to smallest value, 1.5 decades, from which an axis is
+# logarithmic: on a linear one the smallest could not be read.
+LADDER_COLUMNS, LOGARITHMIC_FROM = 5, 30.0
 # The axis of errors reaches up to this at least [m/s]: where no velocity along x was measured, there is none to show.
-SMALLEST_TOP = 1e-3
-# Letters of a parameter's name in a line.
-TITLE = 26
+LEAST_AXIS_END = 1e-3
+# Letters of a parameter's name in a line above its panel.
+TITLE_LETTERS = 26
 
 
 def save_ladder_figure(rungs: Sequence[Rung], path: Path) -> None:
@@ -72,7 +73,7 @@ def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
         "not seen by any fit": (unseen, "measured"), "in sample": (inside, "muted"),
         "error of measuring": (floor, "ink"),
     })  # fmt: skip
-    top = np.nanmax([*held, *alone, *inside, *unseen, *floor, SMALLEST_TOP])
+    top = np.nanmax([*held, *alone, *inside, *unseen, *floor, LEAST_AXIS_END])
     axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(rungs) + 0.9), ylabel="velocity error, root mean square [m/s]")
     axes.set_xticks(place, [_step_name(rungs, k) for k in range(len(rungs))])
     axes.tick_params(axis="x", length=0)
@@ -107,17 +108,17 @@ def _paint_parameter(axes: Axes, rungs: Sequence[Rung], name: str) -> None:
     known = [(k + 1, rung) for k, rung in enumerate(rungs) if name in rung.values]
     for place, rung in known:
         middle, low, high = rung.values[name]
-        moves = rung.homogeneity.get(name, 1.0) < MOVES
+        moves = rung.homogeneity.get(name, 1.0) < MOVES_BELOW
         axes.vlines(place, low, high, color=COLOUR["model"], linewidth=1.1)
         face = COLOUR["paper" if moves else "model"]
         axes.plot(place, middle, "o", markersize=5, color=COLOUR["model"], markerfacecolor=face, zorder=4)
     values = np.array([rung.values[name] for _, rung in known])
-    if (values > 0).all() and values.max() > DECADES * values.min():
+    if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():
         axes.set_yscale("log")
     moving = [rung.homogeneity[name] for _, rung in known if name in rung.homogeneity]
-    told = f"\nsame everywhere: p = {fixed(moving[-1], 2)}" if moving else ""
-    broken = "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), TITLE))
-    axes.set_title(f"{broken}{told}", fontsize=SMALL + 0.5, fontweight="normal")
+    homogeneity = f"\nsame everywhere: p = {fixed(moving[-1], 2)}" if moving else ""
+    broken = "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), TITLE_LETTERS))
+    axes.set_title(f"{broken}{homogeneity}", fontsize=SMALL + 0.5, fontweight="normal")
     axes.set(xlim=(0.5, len(rungs) + 0.5))
     axes.set_xticks(range(1, len(rungs) + 1))
     axes.tick_params(labelsize=7.5)

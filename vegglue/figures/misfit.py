@@ -21,13 +21,13 @@ from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, s
 from vegglue.figures.typography import fixed
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 
-# Standard errors beyond which a residual is drawn as one that errors alone seldom make.
-USUAL = 2.0
-# Root mean square misfit in standard errors that is set in bold; errors alone make 1.
-UNUSUAL = 2.0
-# Score that a map has at least in full colour, lest the ripples of errors alone look like a find.
-FULL = 6.0
-# Strength of a colour from one quarter of the largest score of a map to the next, the first left blank.
+# Standard errors [-] beyond which a residual is one that errors alone leave 1 time in 20.
+LIKELY_RESIDUAL = 2.0
+# Root mean square misfit [standard errors] from which it is set in bold: twice what errors alone make.
+BOLD_MISFIT = 2.0
+# Least score [standard errors] in full colour, so that a map of errors alone (scores of 2 to 3) stays pale.
+FULL_COLOUR_SCORE = 6.0
+# Opacity [-] of the colour in each quarter of the largest score of a map; the first quarter stays blank.
 SHADES = (0.22, 0.5, 0.85)
 BEFORE: dict[str, Any] = {"color": COLOUR["muted"], "linewidth": 1.2, "dashes": (3, 2)}
 AFTER: dict[str, Any] = {"color": COLOUR["model"], "linewidth": 1.5}
@@ -53,7 +53,7 @@ def draw_profiles(stations: pd.DataFrame, added: str, flagged: Sequence[int] = (
         for column, section in enumerate(sections):
             part = velocity[(velocity["experiment"] == experiment) & (velocity["section"] == section)]
             _paint_profile(panels[2 * row, column], part.sort_values("y"), added, flagged)
-            _paint_left(panels[2 * row + 1, column], part.sort_values("y"), "y", added)
+            _paint_residuals(panels[2 * row + 1, column], part.sort_values("y"), "y", added)
         panels[2 * row, 0].set_ylabel(f"{experiment}\nu [m/s]")
         panels[2 * row + 1, 0].set_ylabel("left [sd]")
     for column, section in enumerate(sections):
@@ -97,9 +97,9 @@ def _paint_profile(axes: Axes, part: pd.DataFrame, added: str, flagged: Sequence
     axes.yaxis.set_major_locator(MaxNLocator(4))
 
 
-def _paint_left(axes: Axes, part: pd.DataFrame, along: str, added: str) -> None:
+def _paint_residuals(axes: Axes, part: pd.DataFrame, along: str, added: str) -> None:
     """(measured - predicted) / error against a coordinate: before hollow, after full, the usual range shaded."""
-    axes.axhspan(-USUAL, USUAL, color=COLOUR["rule"], linewidth=0, alpha=0.6, zorder=0)
+    axes.axhspan(-LIKELY_RESIDUAL, LIKELY_RESIDUAL, color=COLOUR["rule"], linewidth=0, alpha=0.6, zorder=0)
     axes.axhline(0, color=COLOUR["muted"], linewidth=0.6, zorder=1)
     place = part[along].to_numpy(float)
     before, after = (
@@ -147,20 +147,21 @@ def draw_zones(zones: pd.DataFrame) -> Figure:
 
 
 def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
+    """Paint draw_zones on given axes."""
     experiments = list(dict.fromkeys(zones["experiment"]))
     rows = list(dict.fromkeys(zip(zones["experiment"], zones["section"], strict=True)))
     rows.sort(key=lambda row: experiments.index(row[0]))
     columns = list(dict.fromkeys(zones["zone"]))
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
     mean = np.nan_to_num(zones["mean"] / zones["standard_error"])
-    largest = float(size.max(initial=2 * UNUSUAL))
+    largest = float(size.max(initial=2 * BOLD_MISFIT))
     for each, miss, row in zip(size, mean, zones.itertuples(), strict=True):
         across, down = columns.index(row.zone), rows.index((row.experiment, row.section))
         face = COLOUR["measured"] if miss > 0 else "none"
         axes.scatter(
             across - 0.34, down, 110 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
         )
-        weight = "bold" if each > UNUSUAL else "normal"
+        weight = "bold" if each > BOLD_MISFIT else "normal"
         axes.text(across + 0.06, down, fixed(float(each), 1), ha="right", va="center", fontsize=8, fontweight=weight)
         text = ("+" if miss > 0 else "") + fixed(float(miss), 1)
         axes.text(across + 0.42, down, text, ha="right", va="center", fontsize=7, color=COLOUR["muted"])
@@ -198,6 +199,7 @@ def paint_places(
     patches: Sequence[Outline],
     stations: Array,
 ) -> None:
+    """Paint draw_places on given axes; found: x, y [m] of the spot that is marked."""
     along, across, field = _raster(x, y, score)
     largest = float(np.nanmax(np.abs(field), initial=0.0)) or 1.0
     if min(field.shape) > 1:
@@ -220,7 +222,7 @@ def _raster(x: Array, y: Array, score: Array) -> tuple[Array, Array, Array]:
 
 
 def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest: float) -> None:
-    full = max(largest, FULL)
+    full = max(largest, FULL_COLOUR_SCORE)
     quarters = full * np.array([0.25, 0.5, 0.75, 1.0])
     shown = np.ma.masked_invalid(field.T)
     for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):

@@ -10,11 +10,12 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, OUTLINE, WIDTH, canvas, label, styled
+from vegglue.figures.style import COLOUR, EDGE_COLOUR, WIDTH, canvas, label, styled
 from vegglue.flow.sensor import FlowFields
 
 PlanWindow = tuple[float, float, float, float]
-STREAMLINES = 10  # parts of equal discharge between drawn streamlines
+# Parts of equal discharge [-] between drawn streamlines; captions say a tenth.
+STREAM_TUBES = 10
 MAP_WIDTH = 2 * WIDTH
 
 
@@ -104,15 +105,15 @@ def _draw_field(axes: Axes, flow: FlowFields, field: Array, window: PlanWindow, 
 
 def _draw_streamlines(axes: Axes, flow: FlowFields) -> None:
     psi = stream_function(flow)
-    levels = np.linspace(psi[len(flow.x) // 2].min(), psi[len(flow.x) // 2].max(), STREAMLINES + 1)[1:-1]
+    levels = np.linspace(psi[len(flow.x) // 2].min(), psi[len(flow.x) // 2].max(), STREAM_TUBES + 1)[1:-1]
     shown = np.ma.masked_where(~np.isfinite(flow.depth), psi)
     axes.contour(flow.x, flow.y, shown.T, levels=levels, colors="white", linewidths=1.1, alpha=0.45)
-    axes.contour(flow.x, flow.y, shown.T, levels=levels, colors=OUTLINE, linewidths=0.5)
+    axes.contour(flow.x, flow.y, shown.T, levels=levels, colors=EDGE_COLOUR, linewidths=0.5)
 
 
 def _draw_patches(axes: Axes, patches: Sequence[Outline]) -> None:
     for patch in patches:
-        edge = Polygon(patch.corners, closed=True, fill=False, edgecolor=OUTLINE, linewidth=0.9)
+        edge = Polygon(patch.corners, closed=True, fill=False, edgecolor=EDGE_COLOUR, linewidth=0.9)
         edge.set_path_effects([withStroke(linewidth=2, foreground="white", alpha=0.8)])
         axes.add_patch(edge)
 

@@ -15,21 +15,25 @@ from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, s
 from vegglue.figures.typography import short, symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
-GRID = 240  # points of a drawn density
-SHOWN_QUANTILES = 1024  # members drawn for the prior: the start of a Sobol' sequence is as even as the whole
-DISCS = 400  # members drawn for the posterior, at most
-NARROW_WIDTH = 3.4  # three to a row of the page [inch]
+# Points of a drawn density: its curve looks smooth at the width of a column.
+DENSITY_POINTS = 240
+# Members drawn for the prior, at most: the start of a Sobol' sequence is as even as the whole.
+PRIOR_MEMBERS = 1024
+# Members drawn for the posterior, at most: more discs cover each other, and the page grows.
+POSTERIOR_MEMBERS = 400
+# Three to a row of the page [inch].
+NARROW_WIDTH = 3.4
 
 
 @dataclass(frozen=True)
-class Unknown:
+class DrawnParameter:
     """One parameter as it is drawn: its values (member,) and bounds, on a logarithmic axis where `logarithmic`.
 
-    before: values drawn from the prior alone (n,), empty where the prior is not to be drawn.
+    prior: values drawn from the prior alone (n,), empty where the prior is not to be drawn.
     """
 
     values: Array
-    before: Array
+    prior: Array
     low: float
     high: float
     logarithmic: bool
@@ -59,50 +63,54 @@ def density(values: Array, weights: Array, low: float, high: float) -> tuple[Arr
     """p(x) = sum_k w_k [N(x; x_k, b) + N(x; 2 low - x_k, b) + N(x; 2 high - x_k, b)], b = 0.9 s n^(-1/5) (Silverman).
 
     Mirrored at the bounds, so that no mass leaks out; n is the effective number of members, s the lesser of standard
-    deviation and quartile distance / 1.34. Returns grid and density (GRID,).
+    deviation and quartile distance / 1.34. Returns grid and density (DENSITY_POINTS,).
     """
     share = weights / weights.sum()
     quartile = weighted_quantile(values, weights, [0.25, 0.75])
     sd = np.sqrt(share @ (values - share @ values) ** 2)
     spread = min(sd, float(np.ptp(quartile)) / 1.34) or sd
     width = max(0.9 * spread * effective_size(weights) ** -0.2, (high - low) / 200)
-    grid = np.linspace(low, high, GRID)
+    grid = np.linspace(low, high, DENSITY_POINTS)
     kept = share > 1e-8
-    total = np.zeros(GRID)
+    total = np.zeros(DENSITY_POINTS)
     for mirrored in (values[kept], 2 * low - values[kept], 2 * high - values[kept]):
         total += np.exp(-0.5 * ((grid[:, None] - mirrored) / width) ** 2) @ share[kept]
     return grid, total / (width * np.sqrt(2 * np.pi))
 
 
 @styled
-def draw_marginal(unknown: Unknown, weights: Array, references: Sequence[ReferenceValue]) -> Figure:
+def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequence[ReferenceValue]) -> Figure:
     """Prior (grey) and posterior (blue) density of one parameter, 50 and 95 % shaded, values of others marked."""
     figure, axes = canvas(NARROW_WIDTH, 2.7)
-    values, before = unknown.coordinate(unknown.values), unknown.coordinate(unknown.before)
-    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    values, prior_values = parameter.coordinate(parameter.values), parameter.coordinate(parameter.prior)
+    low, high = (float(parameter.coordinate(bound)) for bound in (parameter.low, parameter.high))
     grid, posterior = density(values, weights, low, high)
     quantiles = weighted_quantile(values, weights, [0.025, 0.25, 0.5, 0.75, 0.975])
-    prior = density(before, np.ones(len(before)), low, high)[1] if before.size else np.zeros(GRID)
+    prior = (
+        density(prior_values, np.ones(len(prior_values)), low, high)[1]
+        if prior_values.size
+        else np.zeros(DENSITY_POINTS)
+    )
     axes.fill_between(grid, prior, color=COLOUR["prior"], linewidth=0)
     for (left, right), colour in ((quantiles[[0, 4]], "wide"), (quantiles[[1, 3]], "narrow")):
-        inside = np.linspace(left, right, GRID)
+        inside = np.linspace(left, right, DENSITY_POINTS)
         axes.fill_between(inside, np.interp(inside, grid, posterior), color=COLOUR[colour], linewidth=0)
     axes.plot(grid, posterior, color=COLOUR["model"], linewidth=1.4)
     peak = float(posterior.max())
     axes.plot([quantiles[2]] * 2, [0, np.interp(quantiles[2], grid, posterior)], color=COLOUR["model"], linewidth=0.9)
     _name_densities(axes, grid, prior, posterior)
     for place, reference in enumerate(references):
-        _mark(axes, unknown, reference, peak * (1.10 + 0.13 * place))
-    axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), xlabel=unknown.title, yticks=[])
+        _mark(axes, parameter, reference, peak * (1.10 + 0.13 * place))
+    axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), xlabel=parameter.title, yticks=[])
     axes.spines["left"].set_visible(False)
-    if unknown.logarithmic:
+    if parameter.logarithmic:
         _powers(axes, "x")
     return figure
 
 
 def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> None:
     at = int(np.argmax(posterior))
-    right = at < GRID / 2
+    right = at < DENSITY_POINTS / 2
     side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
     label(axes, grid[at], posterior[at], "posterior", "model", **side)
     if not prior.any():
@@ -111,21 +119,21 @@ def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> 
     label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
 
 
-def _mark(axes: Axes, unknown: Unknown, reference: ReferenceValue, height: float) -> None:
-    value = float(unknown.coordinate(reference.value))
+def _mark(axes: Axes, parameter: DrawnParameter, reference: ReferenceValue, height: float) -> None:
+    value = float(parameter.coordinate(reference.value))
     error = None if np.isnan(reference.sd) else reference.sd
     axes.errorbar(value, height, xerr=error, fmt=reference.marker, markersize=5, color=COLOUR["ink"], elinewidth=1)
     axes.axvline(value, ymax=0.97, color=COLOUR["ink"], linewidth=0.5, dashes=(1, 2), zorder=0)
-    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    low, high = (float(parameter.coordinate(bound)) for bound in (parameter.low, parameter.high))
     left = value > 0.5 * (low + high)
     label(axes, value - (error or 0) if left else value + (error or 0), height, reference.name,
           ha="right" if left else "left", va="center", xytext=(-6 if left else 6, 0))  # fmt: skip
 
 
-def _window(unknown: Unknown, heavy: NDArray[np.int64], marked: Sequence[float]) -> tuple[float, float]:
+def _window(parameter: DrawnParameter, heavy: NDArray[np.int64], marked: Sequence[float]) -> tuple[float, float]:
     """The drawn range around the members that count and the marks, within the prior."""
-    shown = unknown.coordinate(np.concatenate([unknown.values[heavy], marked]))
-    low, high = (float(unknown.coordinate(bound)) for bound in (unknown.low, unknown.high))
+    shown = parameter.coordinate(np.concatenate([parameter.values[heavy], marked]))
+    low, high = (float(parameter.coordinate(bound)) for bound in (parameter.low, parameter.high))
     margin = 0.15 * float(np.ptp(shown)) + 0.05 * (high - low)
     return max(low, shown.min() - margin), min(high, shown.max() + margin)
 
@@ -145,7 +153,7 @@ def _powers(axes: Axes, which: str) -> None:
 
 @styled
 def draw_joint(
-    across: Unknown, upward: Unknown, weights: Array, marks: Sequence[tuple[str, float, float, str]]
+    across: DrawnParameter, upward: DrawnParameter, weights: Array, marks: Sequence[tuple[str, float, float, str]]
 ) -> Figure:
     """Members in the plane of two parameters: prior as dots, posterior as discs of area proportional to weight.
 
@@ -153,10 +161,10 @@ def draw_joint(
     """
     figure, axes = canvas(NARROW_WIDTH, 3.0)
     x, y = across.coordinate(across.values), upward.coordinate(upward.values)
-    before = across.coordinate(across.before)[:SHOWN_QUANTILES], upward.coordinate(upward.before)[:SHOWN_QUANTILES]
-    axes.plot(*before, ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
+    prior = across.coordinate(across.prior)[:PRIOR_MEMBERS], upward.coordinate(upward.prior)[:PRIOR_MEMBERS]
+    axes.plot(*prior, ".", markersize=2.2, markeredgewidth=0, color=COLOUR["prior"])
     heavy = np.flatnonzero(weights > 1e-3 * weights.max())
-    discs = heavy[:: -(-heavy.size // DISCS)]  # draws of about equal weight are many: each n-th of them
+    discs = heavy[:: -(-heavy.size // POSTERIOR_MEMBERS)]  # draws of about equal weight are many: each n-th of them
     axes.scatter(
         x[discs], y[discs], 55 * weights[discs] / weights.max(), color=COLOUR["model"], alpha=0.55, linewidth=0
     )
@@ -170,8 +178,8 @@ def draw_joint(
     axes.set(xlabel=across.title, ylabel=upward.title)
     axes.set_xlim(*_window(across, heavy, [value for _, value, _, _ in marks]))
     axes.set_ylim(*_window(upward, heavy, [value for _, _, value, _ in marks]))
-    for unknown, which in ((across, "x"), (upward, "y")):
-        if unknown.logarithmic:
+    for parameter, which in ((across, "x"), (upward, "y")):
+        if parameter.logarithmic:
             _powers(axes, which)
     return figure
 

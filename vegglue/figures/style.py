@@ -37,7 +37,7 @@ PALETTE = {
     "water": ("#e4f0f7", "#1c2d38"),
 }
 COLOUR = {name: light for name, (light, _) in PALETTE.items()}
-OUTLINE = "#101010"  # lines over a coloured field: the same on a light and on a dark page
+EDGE_COLOUR = "#101010"  # lines over a coloured field: the same on a light and on a dark page
 WIDTH, HEIGHT = 4.7, 3.1  # one column of the page [inch]
 SMALL = 7.5  # direct labels [pt]
 

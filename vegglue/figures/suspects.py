@@ -28,11 +28,12 @@ MARKS: dict[str, tuple[str, str, str]] = {
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
 }
-# Place across the panel of scores, right of which a mark would stand in the key.
-CROWDED = 0.45
-# Panels side by side.
-SIGNAL_AXIS = 5
-LINES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
+# Place across the panel of scores [-], 0 left to 1 right, from which a mark would stand under the key.
+KEY_FROM = 0.45
+# Panels side by side: with five, the ticks of each still have room.
+FINGERPRINT_COLUMNS = 5
+# One for each experiment, told apart without colour.
+LINE_STYLES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
 @styled
@@ -50,6 +51,7 @@ def draw_suspects(suspects: pd.DataFrame, threshold: float) -> Figure:
 
 
 def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshold: float) -> None:
+    """Paint draw_suspects on two axes that share their rows: scores on the first, visibility on the second."""
     rows = np.arange(len(suspects))
     first, left = np.abs(suspects["first"].to_numpy(float)), np.abs(suspects["left"].to_numpy(float))
     scores.hlines(rows, 0, first, color=COLOUR["rule"], linewidth=1)
@@ -64,14 +66,14 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
     scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, -0.9), xlabel="score [standard errors], root scale")
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
     label(scores, threshold, -0.9, "errors alone seldom reach this", xytext=(4, -8), va="center")
-    scores.set_yticks(rows, [_shown(name, word) for name, word in zip(suspects["name"], status, strict=True)])
+    scores.set_yticks(rows, [_effect_label(name, word) for name, word in zip(suspects["name"], status, strict=True)])
     again = [Line2D([], [], linestyle="", marker="o", markersize=3.4, markerfacecolor="none", color=COLOUR["model"],
                     label="when looked at last")] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
     if handles:
         scores.legend(handles=handles, loc="lower right", frameon=False, fontsize=SMALL)
         lowest = np.nan_to_num(first)[-len(handles) - 1 :]
-        if lowest.max() > CROWDED**2 * reach:  # rows of their own below the marks
+        if lowest.max() > KEY_FROM**2 * reach:  # rows of their own below the marks
             scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), -0.9)
     visible.barh(rows, suspects["visibility"], height=0.5, color=COLOUR["narrow"])
     visible.set(xlim=(0, 1), xlabel="visibility [–]", xticks=[0, 0.5, 1])
@@ -89,7 +91,7 @@ def _mark(status: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _shown(name: str, status: str) -> str:
+def _effect_label(name: str, status: str) -> str:
     return f"{name} (untestable)" if status == "untestable" else name
 
 
@@ -105,6 +107,7 @@ def draw_alike(names: Sequence[str], cosine: Array) -> Figure:
 
 
 def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
+    """Paint draw_alike on given axes; cosine: (effect, effect), in the order of names."""
     families = alike_groups(names, cosine)
     order = [list(names).index(name) for family in families for name in family]
     turned = cosine[np.ix_(order, order)]
@@ -144,12 +147,12 @@ def draw_fingerprint(trace: Array, station: pd.DataFrame, unit: str) -> Figure:
     table = station.assign(change=trace)
     parts = [part for kind in KINDS.values() for part in _parts_of(kind, table[table["kind"] == kind.name])]
     figure, grid = _panels(len(parts))
-    lines = dict(zip(dict.fromkeys(table["experiment"]), LINES * len(table), strict=False))
+    lines = dict(zip(dict.fromkeys(table["experiment"]), LINE_STYLES * len(table), strict=False))
     per = "" if unit in ("-", "") else f" per {unit}"
     for place, (axes, (part, title, kind)) in enumerate(zip(grid, parts, strict=False)):
         _paint_traces(axes, part, "y" if kind.velocity else "x", lines)
         axes.set_title(title, fontsize=8.5)
-        if place % SIGNAL_AXIS == 0 or kind != parts[place - 1][2]:
+        if place % FINGERPRINT_COLUMNS == 0 or kind != parts[place - 1][2]:
             axes.set_ylabel(f"change of {kind.column} [{unit_math(kind.unit)}{per}]")
         if kind.velocity:
             axes.set_ylim(*_range(table.loc[table["kind"] == kind.name, "change"]))
@@ -170,7 +173,7 @@ def _parts_of(kind: Kind, rows: pd.DataFrame) -> list[tuple[pd.DataFrame, str, K
 
 
 def _panels(number: int) -> tuple[Figure, list[Axes]]:
-    across, rows = min(max(number, 1), SIGNAL_AXIS), max(-(-number // SIGNAL_AXIS), 1)
+    across, rows = min(max(number, 1), FINGERPRINT_COLUMNS), max(-(-number // FINGERPRINT_COLUMNS), 1)
     figure, grid = canvas(max(WIDTH, 0.9 + 1.95 * across), 0.5 + 2.3 * rows, nrows=rows, ncols=across, squeeze=False)
     for axes in grid.flat[number:]:
         axes.set_visible(False)

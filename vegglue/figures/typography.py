@@ -1,8 +1,10 @@
-"""Numbers, symbols and units as they are set: for the page (HTML) and for figures (mathtext)."""
+"""How numbers, symbols and units are written: as plain text, on the page (HTML) and in figures (mathtext)."""
 
 import html
 import math
 import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 NARROW = "\u202f"  # between a number and its unit, never broken
 FIRM = "\u00a0"  # a space where a line must not break
@@ -99,3 +101,38 @@ def _digits(power: re.Match[str]) -> str:
 
 def _raised(power: int) -> str:
     return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How one sentence is written for a terminal (plain text) and for the page (HTML).
+
+    parameter: its name to what is written. number: a value to so many significant digits. unit: with the space before
+    it, '' for '-'. share: a part of one, in percent. power_of_ten: an exponent and its standard deviation.
+    """
+
+    parameter: Callable[[str], str]
+    number: Callable[[float, int], str]
+    unit: Callable[[str], str]
+    share: Callable[[float], str]
+    power_of_ten: Callable[[float, float], str]
+
+
+PLAIN_TEXT = Notation(
+    parameter=str,
+    number=lambda value, digits: f"{value:.{digits}g}",
+    unit=lambda unit: f" {unit}" if unit not in ("", "-") else "",
+    share=lambda share: f"{100 * share:.0f} %",
+    power_of_ten=lambda exponent, sd: f"10^({exponent:.2f} ± {sd:.2f})",
+)
+
+
+def html_notation(symbols: Mapping[str, str]) -> Notation:
+    """The notation of the page; symbols: how each parameter is written there (HTML), by name."""
+    return Notation(
+        parameter=symbols.__getitem__,
+        number=short,
+        unit=lambda unit: f"{NARROW}{unit_html(unit)}" if unit not in ("", "-") else "",
+        share=percent,
+        power_of_ten=lambda exponent, sd: f"10<sup>{plus_minus(exponent, sd)}</sup>",
+    )

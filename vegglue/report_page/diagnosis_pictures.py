@@ -17,16 +17,25 @@ from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
-from vegglue.report_page.diagnosis_words import added, error_of, first_score, last_score, ranked, standing_of
-from vegglue.report_page.run import Run, picture
+from vegglue.report_page.diagnosis_words import (
+    accepted_effects,
+    first_score,
+    last_score,
+    ranked_suspects,
+    rms_residual,
+    suspect_status,
+)
+from vegglue.report_page.run import Run, published_picture
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.score_test import alike_groups
 from vegglue.site.polygons import corners_of
 
-# Effects drawn at once, and sections side by side.
-SECTIONS_DRAWN, PANELS_ACROSS = 16, 4
-# Letters of the verdict in a line; with more than these it may run off the screen.
-LINE = 135
+# Effects drawn at once: as many rows as their names stay legible on one screen.
+SUSPECTS_DRAWN = 16
+# Sections side by side: with four, a panel is about as wide as the two columns of text allow.
+SECTIONS_ACROSS = 4
+# Letters of the verdict in a line: at 11.5 pt more of them run off a figure 14 inches wide.
+VERDICT_LINE_LETTERS = 135
 
 
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
@@ -49,18 +58,20 @@ def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str,
 def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
     figure = Figure(figsize=(14, 8.6), layout="constrained")
-    title = textwrap.fill(f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", LINE)
+    title = textwrap.fill(
+        f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", VERDICT_LINE_LETTERS
+    )
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
-    paint_suspects(scores, visible, _table(diagnosis), diagnosis.first_screening.threshold)
+    paint_suspects(scores, visible, _suspect_table(diagnosis), diagnosis.first_screening.threshold)
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
     if len(diagnosis.misfit.zones):
         paint_zones(zones.subplots(), diagnosis.misfit.zones)
     if diagnosis.drag_map.x.size:
         place = lower.subplots()
-        paint_places(place, *_map(diagnosis), patches, _stations(diagnosis))
+        paint_places(place, *_drag_map(diagnosis), patches, _stations(diagnosis))
     return figure
 
 
@@ -68,12 +79,12 @@ def _split(figure: FigureBase, rows: int, columns: int, **ratios: Any) -> list[S
     return list(np.ravel(np.array(figure.subfigures(rows, columns, **ratios), object)))
 
 
-def _table(diagnosis: Diagnosis) -> pd.DataFrame:
+def _suspect_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """The strongest suspects and every one that is accepted or a rival, the strongest first."""
-    order = sorted(ranked(diagnosis), key=lambda one: -abs(np.nan_to_num(first_score(diagnosis, one))))
-    drawn = [one for k, one in enumerate(order) if k < SECTIONS_DRAWN or one.name in diagnosis.set]
+    order = sorted(ranked_suspects(diagnosis), key=lambda one: -abs(np.nan_to_num(first_score(diagnosis, one))))
+    drawn = [one for k, one in enumerate(order) if k < SUSPECTS_DRAWN or one.name in diagnosis.set]
     rows = [
-        {"name": one.name, "status": standing_of(diagnosis, one), "first": first_score(diagnosis, one),
+        {"name": one.name, "status": suspect_status(diagnosis, one), "first": first_score(diagnosis, one),
          "left": last_score(diagnosis, one), "visibility": one.detectability.visibility}
         for one in drawn
     ]  # fmt: skip
@@ -84,7 +95,7 @@ def _stations(diagnosis: Diagnosis) -> np.ndarray:
     return diagnosis.predictions.station[["x", "y"]].drop_duplicates().to_numpy(float)
 
 
-def _map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
+def _drag_map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
     location, drag = diagnosis.verdict.location, diagnosis.drag_map
     found = None if location is None else (location.x, location.y)
     return drag.x, drag.y, drag.score, found
@@ -95,7 +106,7 @@ def _outlines(case: Case) -> list[Outline]:
 
 
 def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    table = _table(diagnosis)
+    table = _suspect_table(diagnosis)
     if table.empty:
         return
     threshold = diagnosis.first_screening.threshold
@@ -108,33 +119,39 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if diagnosis.steps:
         still = int(np.sum(np.abs(np.nan_to_num(left)) > threshold))
         after = f"{still} still {'does' if still == 1 else 'do'}" if still else "none does any more"
-        caption += f"; with {html.escape(added(diagnosis))} added, {after} (rings)"
+        caption += f"; with {html.escape(accepted_effects(diagnosis))} added, {after} (rings)"
     caption += ". Visibility: the share of its trace that no change of the calibrated parameters can mimic."
     alt = "Effects ranked by score: " + ", ".join(
         f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
     )
-    yield picture(run, draw_suspects(table, threshold), "missing-suspects", caption, alt)
+    yield published_picture(run, draw_suspects(table, threshold), "missing-suspects", caption, alt)
 
 
 def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     stations = diagnosis.predictions.table
     velocity = stations[stations["kind"] == STREAMWISE]
     sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
-    names = added(diagnosis)
-    before, after = (error_of(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last))
-    told = f"The model misses the velocities by {short(after, 2)} m/s (root mean square)"
+    names = accepted_effects(diagnosis)
+    before, after = (
+        rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
+    )
+    finding = f"The model misses the velocities by {short(after, 2)} m/s (root mean square)"
     if names:
-        told = f"With {html.escape(names)} the error falls from {short(before, 2)} to {short(after, 2)} m/s"
-    for start in range(0, len(sections), PANELS_ACROSS):
-        shown = stations[stations["section"].isin(sections[start : start + PANELS_ACROSS])]
-        part = f"sections {sections[start]} to {sections[min(start + PANELS_ACROSS, len(sections)) - 1]}"
+        finding = f"With {html.escape(names)} the error falls from {short(before, 2)} to {short(after, 2)} m/s"
+    for start in range(0, len(sections), SECTIONS_ACROSS):
+        shown = stations[stations["section"].isin(sections[start : start + SECTIONS_ACROSS])]
+        part = f"sections {sections[start]} to {sections[min(start + SECTIONS_ACROSS, len(sections)) - 1]}"
         caption = (
-            f"<b>Where it fails, {html.escape(part)}.</b> {told}. Below each section what is left, in standard errors; "
-            f"shaded: what errors alone seldom leave."
+            f"<b>Where it fails, {html.escape(part)}.</b> {finding}. Below each section what is left, in standard "
+            "errors; shaded: what errors alone seldom leave."
         )
         figure = draw_profiles(shown, names, diagnosis.errors.flagged)
-        yield picture(
-            run, figure, f"missing-profiles-{start // PANELS_ACROSS + 1}", caption, f"Velocities of {part}. {told}."
+        yield published_picture(
+            run,
+            figure,
+            f"missing-profiles-{start // SECTIONS_ACROSS + 1}",
+            caption,
+            f"Velocities of {part}. {finding}.",
         )
 
 
@@ -143,12 +160,12 @@ def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if not (stations["kind"] == WATER_LEVEL).any():
         return
     both = diagnosis.predictions.first, diagnosis.predictions.last
-    before, after = (1000 * error_of(diagnosis, each, WATER_LEVEL) for each in both)
-    told = f"{short(after, 2)} mm"
-    if diagnosis.steps:
-        told = f"{short(before, 2)} mm before (hollow) and {told} with {html.escape(added(diagnosis))} (full)"
-    caption = f"<b>Gauges.</b> The model misses the levels by {told} (root mean square)."
-    yield picture(run, draw_gauges(stations, added(diagnosis)), "missing-gauges", caption, f"Gauges: {told}.")
+    before, after = (1000 * rms_residual(diagnosis, each, WATER_LEVEL) for each in both)
+    finding, names = f"{short(after, 2)} mm", accepted_effects(diagnosis)
+    if names:
+        finding = f"{short(before, 2)} mm before (hollow) and {finding} with {html.escape(names)} (full)"
+    caption = f"<b>Gauges.</b> The model misses the levels by {finding} (root mean square)."
+    yield published_picture(run, draw_gauges(stations, names), "missing-gauges", caption, f"Gauges: {finding}.")
 
 
 def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
@@ -156,25 +173,25 @@ def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         return
     location = diagnosis.verdict.location
     if location is not None:
-        given = f"With {html.escape(added(diagnosis))} in the model, a" if diagnosis.steps else "A"
-        told = (
+        given = f"With {html.escape(accepted_effects(diagnosis))} in the model, a" if diagnosis.steps else "A"
+        finding = (
             f"{given} spot of drag at x = {fixed(location.x, 1)} m, y = {fixed(location.y, 1)} m would explain most "
             f"({fixed(abs(location.score), 1)} standard errors); {html.escape(', '.join(location.experiments))} point "
             "at it"
         )
     elif diagnosis.steps:
-        told = f"Before {html.escape(added(diagnosis))} is added; no place explains as much as that does"
+        finding = f"Before {html.escape(accepted_effects(diagnosis))} is added; no place explains as much as that does"
     else:
-        told = "No place stands out more than errors alone make it"
+        finding = "No place stands out more than errors alone make it"
     caption = (
-        f"<b>Where a spot of drag would help</b>, y stretched. {told}. Green: patches; dots: stations; full lines: "
+        f"<b>Where a spot of drag would help</b>, y stretched. {finding}. Green: patches; dots: stations; full lines: "
         "more drag would help, dashed: less."
     )
-    figure = draw_places(*_map(diagnosis), _outlines(run.case), _stations(diagnosis))
-    yield picture(run, figure, "missing-places", caption, f"Plan of the channel. {told}.")
+    figure = draw_places(*_drag_map(diagnosis), _outlines(run.case), _stations(diagnosis))
+    yield published_picture(run, figure, "missing-places", caption, f"Plan of the channel. {finding}.")
 
 
-def _listed(names: Sequence[str]) -> str:
+def _in_a_row(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
@@ -184,15 +201,15 @@ def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         return
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
     worst = zones.iloc[int(np.argmax(size))]
-    told = (
+    finding = (
         f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(float(size.max()), 1)} standard "
         "errors, where errors alone make 1"
     )
     caption = (
-        f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(told)}. Small: the mean in its "
-        "own standard errors; squares are full where more was measured than modelled, hollow where less."
+        f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(finding)}. Small: the mean in "
+        "its own standard errors; squares are full where more was measured than modelled, hollow where less."
     )
-    yield picture(run, draw_zones(zones), "missing-zones", caption, f"Misfit by section and zone. {told}.")
+    yield published_picture(run, draw_zones(zones), "missing-zones", caption, f"Misfit by section and zone. {finding}.")
 
 
 def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
@@ -200,10 +217,10 @@ def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if len(names) < 2:
         return
     families = [group for group in alike_groups(names, cosine) if len(group) > 1]
-    told = "No two of the strongest suspects leave the same trace"
+    finding = "No two of the strongest suspects leave the same trace"
     if families:
-        told = f"These data cannot tell apart {'; nor '.join(_listed(group) for group in families)}"
-    caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(told)}."
-    yield picture(
-        run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {told}."
+        finding = f"These data cannot tell apart {'; nor '.join(_in_a_row(group) for group in families)}"
+    caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(finding)}."
+    yield published_picture(
+        run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {finding}."
     )

@@ -1,4 +1,4 @@
-"""What the report says of a diagnosis: standing of each effect, tables, key numbers (HTML)."""
+"""What the report says of a diagnosis: status of each effect, tables, key numbers (HTML)."""
 
 import html
 from dataclasses import dataclass
@@ -12,10 +12,11 @@ from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report_page.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
-# Effects in the table that is open; the others stand below it, folded.
-SUSPECTS_SHOWN = 8
-# Cosine above which an effect is said to look like a change of a parameter.
-LOOKS_LIKE = 0.8
+# Effects in the open table, a screen of a laptop; the others stand below it, folded.
+SUSPECTS_LISTED = 8
+# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
+# its trace (cos² = 0.64).
+LOOKS_LIKE_FROM = 0.8
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class SuspectRow:
 
     name: str
     title: str
-    standing: str
+    status: str
     chance: str
     amplitude: str
     interval: str
@@ -49,28 +50,28 @@ class FlaggedRow:
 
 
 @dataclass(frozen=True)
-class Told:
-    """The part of a report that is about a diagnosis, but for its figures (sentences as text)."""
+class DiagnosisSection:
+    """The part of the page about a diagnosis, without its pictures; sentence and remarks are text, the rest is HTML."""
 
     sentence: str
     remarks: tuple[str, ...]
     numbers: list[KeyNumber]
     suspects: list[SuspectRow]
-    others: list[SuspectRow]
-    looked_again: bool
+    other_suspects: list[SuspectRow]
+    rescored: bool
     flagged: list[FlaggedRow]
 
 
-def diagnosis_in_words(diagnosis: Diagnosis) -> Told:
-    """Everything the report says of a diagnosis."""
+def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
+    """Everything the page writes about a diagnosis; its first suspects are those worth reading first."""
     first, others = _suspect_rows(diagnosis)
     flagged = [_flagged(diagnosis, row) for row in diagnosis.errors.flagged]
     verdict, numbers = diagnosis.verdict, _numbers(diagnosis)
-    return Told(verdict.sentence, verdict.remarks, numbers, first, others, bool(diagnosis.steps), flagged)
+    return DiagnosisSection(verdict.sentence, verdict.remarks, numbers, first, others, bool(diagnosis.steps), flagged)
 
 
-def standing_of(diagnosis: Diagnosis, suspect: Suspect) -> str:
-    """'accepted', 'rival' (may be it instead of an accepted one), 'less likely', 'no sign' or 'untestable'."""
+def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
+    """'accepted', 'rival' (may stand in place of an accepted one), 'less likely', 'no sign' or 'untestable'."""
     if suspect.name in [step.accepted for step in diagnosis.steps]:
         return "accepted"
     if suspect.name in diagnosis.set:
@@ -82,30 +83,30 @@ def standing_of(diagnosis: Diagnosis, suspect: Suspect) -> str:
 
 
 def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
-    """Its score before anything was added [standard errors]."""
+    """The score of an effect before any was accepted [standard errors]."""
     return diagnosis.first_screening.scores.get(suspect.name, suspect.test.score)
 
 
 def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
-    """Its score at the last look, NaN where that was the first or it was refitted instead."""
+    """The score of an effect after the last step [standard errors]; NaN without steps, or where refitted."""
     return float("nan") if suspect.amplitude.refitted or not diagnosis.steps else suspect.test.score
 
 
-def ranked(diagnosis: Diagnosis) -> list[Suspect]:
-    """Accepted, then rivals, then the others, each by its first score; those nobody could see last."""
+def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
+    """Accepted effects, rivals, less likely ones, those without a sign, untestable ones; within each by first score."""
     order = ("accepted", "rival", "less likely", "no sign", "untestable")
     return sorted(
         diagnosis.suspects,
-        key=lambda one: (order.index(standing_of(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
+        key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
     )
 
 
-def added(diagnosis: Diagnosis) -> str:
+def accepted_effects(diagnosis: Diagnosis) -> str:
     """The accepted effects in words, '' for none."""
     return " and ".join(step.accepted for step in diagnosis.steps)
 
 
-def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
+def rms_residual(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
     """Root mean square of measured minus predicted over the stations that count [unit of the kind], NaN without."""
     station = diagnosis.predictions.station
     counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
@@ -115,8 +116,8 @@ def error_of(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) ->
 
 def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:
     """The effects worth reading first, and all others."""
-    rows = [_row(diagnosis, suspect) for suspect in ranked(diagnosis)]
-    shown = max(SUSPECTS_SHOWN, len(diagnosis.set))
+    rows = [_row(diagnosis, suspect) for suspect in ranked_suspects(diagnosis)]
+    shown = max(SUSPECTS_LISTED, len(diagnosis.set))
     return rows[:shown], rows[shown:]
 
 
@@ -126,15 +127,15 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
     scores = first_score(diagnosis, suspect), last_score(diagnosis, suspect)
     parameter = detectability.confounder
-    alike = abs(detectability.cosine) > LOOKS_LIKE and parameter in diagnosis.parameters.first
+    alike = abs(detectability.cosine) > LOOKS_LIKE_FROM and parameter in diagnosis.parameters.first
     return SuspectRow(
         name=html.escape(suspect.name),
         title=html.escape(suspect.title),
-        standing=standing_of(diagnosis, suspect),
+        status=suspect_status(diagnosis, suspect),
         chance=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
         amplitude=short(estimate.value, 3) + unit,
         interval=interval(*estimate.interval95),
-        p_family=p_value(suspect.test.p_family),
+        p_family=p_value_html(suspect.test.p_family),
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(detectability.visibility, 2),
         detectable=short(detectability.smallest, 2) + unit,
@@ -142,8 +143,8 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     )
 
 
-def p_value(p: float) -> str:
-    """A p-value, never more precise than a bootstrap of some thousands is."""
+def p_value_html(p: float) -> str:
+    """A p-value (HTML), no more precise than a bootstrap of some thousands can make it."""
     return f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
 
 
@@ -165,7 +166,9 @@ def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
 def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     """How much the misfit fell, and what the errors were taken to be."""
     misfit, errors = diagnosis.misfit, diagnosis.errors
-    before, after = (error_of(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last))
+    before, after = (
+        rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
+    )
     fell = bool(diagnosis.steps)
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"

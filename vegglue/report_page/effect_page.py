@@ -32,8 +32,8 @@ def by_stage(effects: Iterable[Effect]) -> Iterator[tuple[str, tuple[Effect, ...
             yield f"{stage}: {ACTS_ON[stage]}", there
 
 
-def page(effect: Effect) -> Iterator[str]:
-    """One effect, line by line."""
+def effect_in_words(effect: Effect) -> Iterator[str]:
+    """An effect as `vegglue effects NAME` prints it: equation, parameters, stage, source and its lines of a config."""
     yield f"{effect.name}: {effect.title}"
     yield f"  {effect.equation}"
     yield ""
@@ -44,19 +44,19 @@ def page(effect: Effect) -> Iterator[str]:
     yield f"  Stage {effect.stage} ({ACTS_ON[effect.stage]}); {CAUSES[effect.each]}{turned}."
     if effect.tags:
         yield f"  {', '.join(effect.tags).capitalize()}."
-    yield f"  Source: {source(effect)}."
+    yield f"  Source: {effect_source(effect)}."
     yield ""
     yield "  In a config:"
-    yield from (f"    {line}" for line in snippet(effect))
+    yield from (f"    {line}" for line in config_snippet(effect))
 
 
-def source(effect: Effect) -> str:
+def effect_source(effect: Effect) -> str:
     """Where it comes from, and whether the formula was compared with it."""
     doi = f", doi:{effect.doi}" if effect.doi else ""
     return f"{effect.source}{doi}{'' if effect.checked else ' (formula not compared with it)'}"
 
 
-def snippet(effect: Effect) -> tuple[str, ...]:
+def config_snippet(effect: Effect) -> tuple[str, ...]:
     """YAML that puts an effect to work, its amplitude unknown around off."""
     a = effect.amplitude
     return (
@@ -105,11 +105,11 @@ def _numbers(parameter: Amplitude | Shape) -> str:
 
 
 def _values(case: Case, working: EffectEntry) -> str:
-    said = []
+    written = []
     for name, value in working.values.items():
         prior = f" ({case.parameters[value].distribution})" if isinstance(value, str) else ""
-        said.append(f"{name} = {value}{prior}")
-    return ", ".join(said)
+        written.append(f"{name} = {value}{prior}")
+    return ", ".join(written)
 
 
 def _where(working: EffectEntry) -> str:

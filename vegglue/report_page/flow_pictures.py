@@ -11,10 +11,11 @@ from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
-from vegglue.report_page.run import Run, picture, planted
+from vegglue.report_page.run import Run, planted_cells, published_picture
 from vegglue.site.polygons import corners_of
 
-REACH_MARGIN = 8.0  # m, shown beyond the outermost patch and station
+# Drawn upstream and downstream of the outermost patch and station [m]: room for the wake of a patch.
+REACH_MARGIN = 8.0
 
 
 def plans(run: Run, experiment: str) -> Iterator[Picture]:
@@ -29,20 +30,20 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
         reach = max(float(flow.x[0]), start), min(float(flow.x[-1]), end)
         figure = draw_reach(flow, wet_window(flow, reach), patches, stations)
         alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
-        yield picture(run, figure, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
+        yield published_picture(run, figure, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
     figure = draw_plan(flow, patches, stations, _gauges(run, rows[rows["kind"] == WATER_LEVEL]))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
-    yield picture(run, figure, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
+    yield published_picture(run, figure, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
 
 
 def _outlines(run: Run, experiment: str) -> list[Outline]:
-    present = np.unique(run.site.patch[planted(run, experiment)])
+    present = np.unique(run.site.patch[planted_cells(run, experiment)])
     patches = [run.case.plants.patches[index] for index in present]
     return [Outline(patch.name, corners_of(patch)) for patch in patches]
 
 
 def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str:
-    flow, plants = run.flow[experiment], planted(run, experiment)
+    flow, plants = run.flow[experiment], planted_cells(run, experiment)
     speed = np.hypot(flow.u, flow.v)
     inside = ((flow.x >= reach[0]) & (flow.x <= reach[1]))[:, None] & np.isfinite(speed)
     moves = ""

@@ -1,4 +1,4 @@
-"""What calibrating each experiment alone says, in plain sentences with numbers."""
+"""Whether one value of each parameter fits all experiments, in sentences for the terminal and the page."""
 
 from collections.abc import Mapping
 
@@ -6,43 +6,51 @@ import numpy as np
 
 from vegglue.results.posterior import Posterior, Transfer
 
-# Chance below which a parameter is said to differ, between all parameters that were compared.
-REJECTED = 0.01
-# Chance below which it is doubted, on its own.
-DOUBTED_ALONE = 0.05
-# In a reference table, what others found for the same chi2.
-PREFIX = "chi2_"
+# p-value [-], over all parameters compared (Bonferroni), below which a parameter is said to differ between experiments.
+# Stricter than the customary 0.05: whoever reads it gives up one value for all.
+REJECTED_BELOW = 0.01
+# p-value [-] of one parameter by itself below which one value for all is doubted: the customary 1 in 20.
+DOUBTED_BELOW = 0.05
+# Key of a reference table, before the name of a parameter: the chi2 of homogeneity that its source found.
+REFERENCE_CHI2 = "chi2_"
 
 
 def moving_parameters(transfer: Transfer) -> np.ndarray:
-    """Which parameters (parameter,) are not one value for all experiments."""
+    """Whether each parameter (parameter,) differs between experiments: p times the number compared < REJECTED_BELOW."""
     compared = int(np.sum(transfer.freedom > 0))
-    return np.nan_to_num(transfer.p, nan=1.0) * max(compared, 1) < REJECTED
+    return np.nan_to_num(transfer.p, nan=1.0) * max(compared, 1) < REJECTED_BELOW
 
 
-def rejected(transfer: Transfer) -> bool:
-    """Whether the calibration does not carry over between experiments."""
-    return bool(moving_parameters(transfer).any()) or transfer.p_all < REJECTED
+def homogeneity_rejected(transfer: Transfer) -> bool:
+    """Whether the calibration does not carry over: a parameter differs, or all together do (p < REJECTED_BELOW)."""
+    return bool(moving_parameters(transfer).any()) or transfer.p_all < REJECTED_BELOW
 
 
 def homogeneity_in_words(posterior: Posterior, transfer: Transfer, others: Mapping[str, object]) -> list[str]:
-    """Sentences on each shared parameter, the worst first, and what to make of them; others: reference values."""
+    """Sentences on each shared parameter, that of the largest chi2 first, then the misfits and what follows.
+
+    others: the reference table of the case, by key.
+    """
     order = [int(j) for j in np.argsort(-np.nan_to_num(transfer.chi2)) if transfer.freedom[j] > 0]
     if not order:
         return ["Calibrated alone, no two experiments tell the same parameter: nothing to compare between them."]
     moves = moving_parameters(transfer)
-    alike = [j for j in order[1:] if transfer.p[j] >= DOUBTED_ALONE and PREFIX + posterior.parameters[j] not in others]
-    said = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order if j not in alike]
+    alike = [
+        j
+        for j in order[1:]
+        if transfer.p[j] >= DOUBTED_BELOW and REFERENCE_CHI2 + posterior.parameters[j] not in others
+    ]
+    sentences = [_parameter(posterior, transfer, j, bool(moves[j]), others) for j in order if j not in alike]
     if alike:
         rest = ", ".join(posterior.parameters[j] for j in alike)
         least = min(transfer.p[j] for j in alike)
-        said.append(f"One value for all will do as well for {rest} (p = {least:.2g} or more).")
+        sentences.append(f"One value for all will do as well for {rest} (p = {least:.2g} or more).")
     names = [posterior.parameters[j] for j in order if moves[j]]
-    return [*said, _misfits(transfer), _meaning(names, rejected(transfer))]
+    return [*sentences, _misfits(transfer), _meaning(names, homogeneity_rejected(transfer))]
 
 
 def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
-    name, doubted = posterior.parameters[j], transfer.p[j] < DOUBTED_ALONE
+    name, doubted = posterior.parameters[j], transfer.p[j] < DOUBTED_BELOW
     scale = f"log10 {name}" if name in posterior.marginals.log10_median else name
     each = ", ".join(
         f"{value:.3g} ± {error:.1g} ({experiment})"
@@ -54,11 +62,11 @@ def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, ot
     verdict = "one value for all will do"
     if moves or doubted:
         verdict = "not one value for all" if moves else "hardly one value for all"
-    other = others.get(PREFIX + name)
-    beside = f"; the source has {other:g}" if isinstance(other, int | float) else ""
+    other = others.get(REFERENCE_CHI2 + name)
+    reference = f"; the source has {other:g}" if isinstance(other, int | float) else ""
     return (
         f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {transfer.chi2[j]:.3g} with "
-        f"{_degrees(int(transfer.freedom[j]))} of freedom (p = {transfer.p[j]:.2g}{beside}), {verdict}."
+        f"{_degrees(int(transfer.freedom[j]))} of freedom (p = {transfer.p[j]:.2g}{reference}), {verdict}."
     )
 
 

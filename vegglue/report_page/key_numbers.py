@@ -1,4 +1,4 @@
-"""The first lines of the page: one verdict, a few numbers, and the words that other parts of the page share."""
+"""The top of the page: the verdict, a few key numbers, and what other parts of the page write in the same way."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,15 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import how_known
+from vegglue.report_page.posterior_words import UNBELIEVED, identification, pressed_bounds
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED
+
+# Largest |Q/Q_in - 1| [-] of a sound member: a hundredth of what a flow meter can tell.
+MASS_LIMIT = 1e-4
+# Parameters among the key numbers: with sigma and the members, six numbers fit the first screen.
+PARAMETERS_SHOWN = 4
 
 
 @dataclass(frozen=True)
@@ -41,20 +46,26 @@ def verdict_of(case: Case, posterior: Posterior) -> str:
 
 def _how_well(posterior: Posterior) -> str:
     kind = next(iter(posterior.fit.rmse))
-    error, miss = measurement_error(posterior, kind), posterior.fit.rmse[kind]
+    miss = posterior.fit.rmse[kind]
     missed = f"The model misses the {kind_of(kind).words} measurements by {with_unit(miss, kind)} (root mean square)"
+    return f"{missed}{against_measurement_error(posterior, kind, miss)}."
+
+
+def against_measurement_error(posterior: Posterior, kind: str, miss: float) -> str:
+    """The end of a sentence on a root mean square misfit: how it compares with the error of the measurements (HTML)."""
+    error = measurement_error(posterior, kind)
     if not np.isfinite(error):
-        return f"{missed}; their own error is not known."
+        return "; without standard errors nothing can be said of how large it should be"
     if unexplained_error(posterior, kind, miss):
-        return f"{missed}, {short(miss / error, 2)} times their own error."
-    return f"{missed}, as much as their own error of {with_unit(error, kind)} explains."
+        return f", {short(miss / error, 2)} times the measurement error of {with_unit(error, kind)}"
+    return f", no more than the measurement error of {with_unit(error, kind)} explains"
 
 
 def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     """Four to six numbers for the first screen."""
     parameters = [
         KeyNumber(symbol(case, name), estimate(posterior, name), _remark(posterior, name))
-        for name in posterior.parameters[:4]
+        for name in posterior.parameters[:PARAMETERS_SHOWN]
     ]
     kind = next(iter(posterior.fit.sigma))
     error = measurement_error(posterior, kind)
@@ -68,10 +79,15 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
 
 
 def _remark(posterior: Posterior, name: str) -> str:
-    side = pressed_side(posterior, name)
-    if side:
-        return f"presses against its {side} bound"
-    return f"{how_known(posterior, name)}: {percent(posterior.marginals.width_ratio[name])} of the prior width"
+    pressed = pressed_bounds(posterior, name)
+    if pressed:
+        return f"presses against its {' and '.join(pressed)} bound"
+    return identified_width(posterior, name)
+
+
+def identified_width(posterior: Posterior, name: str) -> str:
+    """'identified, 12 % of the prior width'."""
+    return f"{identification(posterior, name)}, {percent(posterior.marginals.width_ratio[name])} of the prior width"
 
 
 def _in_a_list(case: Case, names: list[str]) -> str:
@@ -83,17 +99,13 @@ def _are(names: list[str]) -> str:
     return "is" if len(names) == 1 else "are"
 
 
-# Chance below which a misfit is no chance any more.
-SELDOM = 1e-3
-
-
 def symbol(case: Case, name: str) -> str:
     """How a parameter is written on the page."""
     return symbol_html(case.parameters[name].symbol or name)
 
 
 def as_power(posterior: Posterior, name: str) -> bool:
-    """Whether a parameter is told as a power of ten: looked at in log10, over more than a decade of its prior."""
+    """Whether a parameter is written as a power of ten: it has a log10, and its prior spans more than a decade."""
     low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
     return name in posterior.marginals.log10_median and high > 10 * low
 
@@ -122,21 +134,16 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
 
 
 def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
-    """Whether a root mean square misfit is larger than the errors of its stations allow, by chance once in 1,000.
+    """Whether errors alone leave a root mean square misfit as large as this less than once in 1,000 times.
 
-    Where the posterior knows how its errors hang together, its own chance of the misfit counts as well.
+    miss > error sqrt(chi2_n^-1(0.999) / n), n used stations of the kind; a refined posterior that knows the correlation
+    of its errors adds its own p-value of the misfit. False where the measurement error is not known.
     """
     used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
     count = max(int(used.sum()), 1)
     error, refined = measurement_error(posterior, kind), posterior.refinement
-    doubted = refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < SELDOM
-    return miss > error * float(np.sqrt(scipy.stats.chi2.isf(SELDOM, count) / count)) or (doubted and miss > error)
-
-
-def pressed_side(posterior: Posterior, name: str) -> str:
-    """'upper' or 'lower', the bound of its prior a parameter presses against, or ''."""
-    low, high = posterior.marginals.bound_hit[name]
-    return "upper" if high else "lower" if low else ""
+    doubted = refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < UNBELIEVED
+    return miss > error * float(np.sqrt(scipy.stats.chi2.isf(UNBELIEVED, count) / count)) or (doubted and miss > error)
 
 
 def with_unit(value: float, kind: str) -> str:
@@ -147,3 +154,12 @@ def with_unit(value: float, kind: str) -> str:
 def largest_mass_error(ensemble: Ensemble) -> float:
     """Largest |Q/Q_in - 1| of the solved members [-]."""
     return float(np.max(ensemble.mass_error[ensemble.status != FAILED]))
+
+
+def mass_in_words(ensemble: Ensemble) -> str:
+    """How much of its discharge a member loses or gains at most, against MASS_LIMIT (one sentence)."""
+    worst = largest_mass_error(ensemble)
+    return (
+        f"No member loses or gains more than {short(worst, 2)} of its discharge at any section, "
+        f"{'below' if worst < MASS_LIMIT else 'above'} the limit of {short(MASS_LIMIT, 1)}."
+    )

@@ -2,6 +2,7 @@
 
 import html
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -26,7 +27,7 @@ from vegglue.inference.weighted_statistics import weighted_quantile
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.observations import fitted_curve
 from vegglue.report_page.key_numbers import measurement_error
-from vegglue.report_page.run import Run, patches_drawn, picture, zones
+from vegglue.report_page.run import Run, median_plants, published_picture, station_zones
 from vegglue.results.posterior import Posterior
 
 
@@ -66,7 +67,7 @@ def _section(run: Run, kind: Kind, experiment: str, section: str, rows: pd.DataF
         f"{kind.words.capitalize()} across section {section} of {experiment}: measured points over the modelled 50 and "
         "95 % bands."
     )
-    return picture(run, figure, f"{name}-{experiment}-{section}", caption, alt)
+    return published_picture(run, figure, f"{name}-{experiment}-{section}", caption, alt)
 
 
 def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
@@ -74,7 +75,7 @@ def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
         return None
     flow = run.flow[experiment]
     column = int(np.argmin(np.abs(flow.x - x)))
-    plants, canopy = patches_drawn(run, experiment), np.full(len(flow.y), np.nan)
+    plants, canopy = median_plants(run, experiment), np.full(len(flow.y), np.nan)
     here = plants.column == column
     canopy[plants.row[here]] = flow.bed[column, plants.row[here]] + plants.canopy_height[here, 0]
     return SectionDrawing(flow.y, flow.bed[column], canopy, flow.level[column])
@@ -84,19 +85,19 @@ def residuals(run: Run) -> Iterator[Picture]:
     """Residuals of each kind by zone, velocities across and others along the channel, and against normal quantiles."""
     table, posterior = run.observations.table, run.posterior
     used = table["used"].to_numpy(bool)
-    zone = np.array(zones(run))
+    zone = np.array(station_zones(run))
     for kind in map(kind_of, posterior.fit.sigma):
         rows = np.flatnonzero(used & (table["kind"] == kind.name).to_numpy())
         residual, where = posterior.fit.residual[rows], zone[rows]
         means = {str(name): residual[where == name] for name in dict.fromkeys(where)}
-        told = "; ".join(
+        values = "; ".join(
             f"{html.escape(name)} {fixed(part.mean(), 3)} ± {fixed(part.std(), 3)}" for name, part in means.items()
         )
         unit, axis = unit_html(kind.unit), "y" if kind.velocity else "x"
         figure = draw_residuals(table[axis].to_numpy()[rows], axis, residual, list(where), unit_math(kind.unit))
-        caption = f"Measured minus median prediction, {kind.words}, by zone (mean ± spread, {unit}): {told}."
-        alt = f"Residuals of {kind.words} along {axis}, by zone. {told}"
-        yield picture(run, figure, f"residuals-{kind.name}", caption, alt)
+        caption = f"Measured minus median prediction, {kind.words}, by zone (mean ± spread, {unit}): {values}."
+        alt = f"Residuals of {kind.words} along {axis}, by zone. {values}"
+        yield published_picture(run, figure, f"residuals-{kind.name}", caption, alt)
         score = residual / posterior.fit.noise[rows]
         worst = int(np.argmax(np.abs(score)))
         names = [
@@ -111,11 +112,25 @@ def residuals(run: Run) -> Iterator[Picture]:
             caption += f" The standard errors of the data are {short(known, 2)} {unit}."
         figure = draw_quantiles(score, names)
         alt = f"Ordered residuals of {kind.words} against normal quantiles."
-        yield picture(run, figure, f"quantiles-{kind.name}", caption, alt)
+        yield published_picture(run, figure, f"quantiles-{kind.name}", caption, alt)
 
 
-def verticals(run: Run) -> Iterator[Picture]:
-    """All verticals of each ADV section, and those inside plants with the canopy height."""
+@dataclass(frozen=True)
+class _SurveyedSection:
+    """The verticals of one section of one experiment; canopy: height and standard error [m], if known."""
+
+    experiment: str
+    section: str
+    verticals: list[Vertical]
+    points: int
+    canopy: tuple[float, float] | None
+
+    @property
+    def heading(self) -> str:
+        return f"<b>{html.escape(self.section)}, experiment {html.escape(self.experiment)}</b>"
+
+
+def _surveyed_sections(run: Run) -> Iterator[_SurveyedSection]:
     observations = run.observations
     if observations.profiles.empty:
         return
@@ -126,19 +141,33 @@ def verticals(run: Run) -> Iterator[Picture]:
         drawn = [_vertical(row, here[here["y"] == row["y"]]) for _, row in rows.iterrows()]
         found = observations.canopy_height.get((experiment, section))
         canopy = (found.value, found.standard_error) if found is not None and np.isfinite(found.value) else None
-        name = f"{experiment}-{section}"
-        where = f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>"
-        inside = [vertical for vertical in drawn if vertical.planted]
-        caption = f"{where}: {count(len(here), 'point')} in {count(len(rows), 'vertical')}, each drawn where it stands, with the profile fitted to it; z in the datum of the file."  # noqa: E501
-        alt = f"Point velocities over height in the verticals of section {section}."
-        yield picture(run, draw_verticals(drawn, canopy, _stretch(drawn)), f"verticals-{name}", caption, alt)
-        if inside:
-            height = f"The canopy reads {plus_minus(*canopy)} m high" if canopy else "No canopy top shows"
-            caption = (
-                f"{where}, inside the plants at y = {', '.join(f'{vertical.y:g}' for vertical in inside)} m. {height}."
-            )
-            figure = draw_canopy_profiles(inside, canopy)
-            yield picture(run, figure, f"canopy-{name}", caption, "Velocity against height inside the plants.")
+        yield _SurveyedSection(experiment, section, drawn, len(here), canopy)
+
+
+def verticals(run: Run) -> Iterator[Picture]:
+    """All verticals of each ADV section, as wide as the page."""
+    for one in _surveyed_sections(run):
+        caption = (
+            f"{one.heading}: {count(one.points, 'point')} in {count(len(one.verticals), 'vertical')}, each drawn where "
+            "it stands, with the profile fitted to it; z in the datum of the file."
+        )
+        figure = draw_verticals(one.verticals, one.canopy, _stretch(one.verticals))
+        alt = f"Point velocities over height in the verticals of section {one.section}."
+        yield published_picture(run, figure, f"verticals-{one.experiment}-{one.section}", caption, alt)
+
+
+def canopy_profiles(run: Run) -> Iterator[Picture]:
+    """The verticals of each ADV section that stand inside plants, with the canopy height."""
+    for one in _surveyed_sections(run):
+        inside = [vertical for vertical in one.verticals if vertical.planted]
+        if not inside:
+            continue
+        height = f"The canopy reads {plus_minus(*one.canopy)} m high" if one.canopy else "No canopy top shows"
+        places = ", ".join(f"{vertical.y:g}" for vertical in inside)
+        caption = f"{one.heading}, inside the plants at y = {places} m. {height}."
+        figure = draw_canopy_profiles(inside, one.canopy)
+        alt = "Velocity against height inside the plants."
+        yield published_picture(run, figure, f"canopy-{one.experiment}-{one.section}", caption, alt)
 
 
 def _vertical(profile: pd.Series, points: pd.DataFrame) -> Vertical:
@@ -185,12 +214,12 @@ def discharges(run: Run) -> Iterator[Picture]:
         spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])
         names = {"paper": "linear interpolation", "profile": "profile fit"}
         rows = [(names.get(rule, rule), found.value, found.standard_error) for rule, found in rules.items()]
-        told = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)
+        values = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)
         figure = draw_discharge(rows, (float(spread[0]), float(spread[1]), float(spread[2])))
         caption = (
-            f"<b>Discharge through {html.escape(section)}, experiment {html.escape(experiment)}</b>: {told}; "
+            f"<b>Discharge through {html.escape(section)}, experiment {html.escape(experiment)}</b>: {values}; "
             f"the model lets {fixed(spread[1], 2)} m³/s through."
         )
-        yield picture(
-            run, figure, f"discharge-{experiment}-{section}", caption, f"Discharge through {section}: {told}."
+        yield published_picture(
+            run, figure, f"discharge-{experiment}-{section}", caption, f"Discharge through {section}: {values}."
         )

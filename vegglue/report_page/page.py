@@ -13,12 +13,20 @@ from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.report_page.diagnosis_pictures import diagnosis_pictures
-from vegglue.report_page.diagnosis_words import diagnosis_in_words
+from vegglue.report_page.diagnosis_words import diagnosis_section
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import key_numbers, verdict_of
 from vegglue.report_page.pictures import pictures
 from vegglue.report_page.run import Run, is_synthetic
-from vegglue.report_page.tables import facts, failures, health, members, other_rows, parameter_rows, station_rows
+from vegglue.report_page.tables import (
+    failure_reasons,
+    fit_rows,
+    health_facts,
+    member_counts,
+    parameter_rows,
+    provenance,
+    station_rows,
+)
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -67,17 +75,17 @@ def render(run: Run) -> str:
             verdict=verdict_of(run.case, run.posterior),
             numbers=key_numbers(run.case, run.posterior),
             findings=findings(run),
-            missing=None if run.diagnosis is None else diagnosis_in_words(run.diagnosis),
-            missing_pictures={} if run.diagnosis is None else diagnosis_pictures(run, run.diagnosis),
+            diagnosis=None if run.diagnosis is None else diagnosis_section(run.diagnosis),
+            diagnosis_pictures={} if run.diagnosis is None else diagnosis_pictures(run, run.diagnosis),
             parameters=parameter_rows(run),
-            others=other_rows(run),
+            fit_rows=fit_rows(run),
             pictures=pictures(run),
             stations=stations,
             flagged=[row for row in stations if row.reason],
-            members=members(run.ensemble),
-            failures=failures(run.ensemble),
-            health=list(health(run)),
-            facts=list(facts(run)),
+            member_counts=member_counts(run.ensemble),
+            failure_reasons=failure_reasons(run.ensemble),
+            health_facts=list(health_facts(run)),
+            provenance=list(provenance(run)),
             config=resolved_yaml(run.case),
         )
     )

@@ -1,4 +1,4 @@
-"""What an inference found, in plain sentences with numbers."""
+"""What an inference found, in sentences: one function for each fact, for the terminal and for the page."""
 
 import math
 from collections.abc import Mapping
@@ -6,57 +6,69 @@ from itertools import combinations
 
 import numpy as np
 
+from vegglue.figures.typography import PLAIN_TEXT, Notation
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
-from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Marginals, Posterior
+from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior
 from vegglue.results.refinement import ErrorModel, GroupsLeftOut, LeaveOneOut, MisfitTest, PosteriorModes, Refinement
 
+# |r| [-] above which a pair is told of: the other parameter then explains half the variance of each (r² = 0.49).
 STRONG_CORRELATION = 0.7
+# p-values [-]: below the first, the customary 1 in 20, its words are guarded; below the second, something
+# is said to be missing, which a run should not say by chance.
+DOUBTED, UNBELIEVED = 0.05, 0.001
+# Outlying stations named one by one, at most; more are no single errors, and make a list nobody reads.
+OUTLIERS_NAMED = 5
 
 
 def describe(posterior: Posterior, others: Mapping[str, object] | None = None) -> list[str]:
-    """Sentences on the ensemble and its worth, each parameter, their correlation, the fit, whether experiments agree,
-    the canopy correction. others: reference values of the case.
+    """Everything that `vegglue infer` prints of a posterior, one sentence or two in each entry.
+
+    In this order: the ensemble, its weights, each parameter, correlations, the fit, stations left out, whether the
+    experiments agree, the corrected canopy. others: the reference table of the case, by key.
     """
     return [
-        *(_ensemble(posterior) if posterior.refinement is None else drawn_in_words(posterior, posterior.refinement)),
-        *_worth(posterior),
-        *(sentence for name in posterior.parameters for sentence in _parameter(posterior, name)),
-        *_correlations(posterior),
-        *_misfit(posterior),
-        *(unseen_in_words(posterior, posterior.refinement) if posterior.refinement else ()),
+        *(_ensemble(posterior) if posterior.refinement is None else search_in_words(posterior, posterior.refinement)),
+        *weights_in_words(posterior),
+        *(sentence for name in posterior.parameters for sentence in parameter_in_words(posterior, name)),
+        *correlations_in_words(posterior),
+        *fit_in_words(posterior),
+        *(validation_in_words(posterior, posterior.refinement) if posterior.refinement else ()),
         *(homogeneity_in_words(posterior, posterior.transfer, others or {}) if posterior.transfer else ()),
-        *_canopy(posterior),
+        *canopy_in_words(posterior),
     ]
 
 
 def _ensemble(posterior: Posterior) -> list[str]:
     settings, sample = posterior.settings, posterior.sample
     rule = "the root mean square residual of the best member" if settings.sigma_rule == "best-member" else "known"
-    sigma = of_kinds(posterior.fit.sigma, "for")
     threshold = ""
     if math.isfinite(settings.threshold):
         threshold = f", {posterior.weighting.weighed} of them with weight (efficiency at least {settings.threshold:g})"
     return [
         f"{sample.members} members, {sample.failed or 'none'} of them failed (no weight).",
         f"Weighed by the {settings.likelihood} likelihood over {posterior.fit.used} of {len(posterior.station)} "
-        f"stations{threshold}; sigma is {sigma} ({rule}).",
+        f"stations{threshold}; sigma is {errors_by_kind(posterior.fit.sigma, 'for')} ({rule}).",
     ]
 
 
-def of_kinds(errors: Mapping[str, float], preposition: str) -> str:
-    """0.012 m/s for velocity and 0.003 m for level: one error for each kind of measurement."""
+def errors_by_kind(errors: Mapping[str, float], preposition: str, notation: Notation = PLAIN_TEXT) -> str:
+    """'0.012 m/s for velocity and 0.003 m for level'; errors: one for each kind of measurement [unit of the kind]."""
     known = ((kind_of(name), value) for name, value in errors.items())
-    return " and ".join(f"{value:.3g} {kind.unit} {preposition} {kind.words}" for kind, value in known)
+    return " and ".join(
+        f"{notation.number(value, 3)}{notation.unit(kind.unit)} {preposition} {kind.words}" for kind, value in known
+    )
 
 
-def _worth(posterior: Posterior) -> list[str]:
+def weights_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
+    """How many equal members the weights are worth, and a warning where that is too few for a posterior."""
     weighting = posterior.weighting
-    size = f"{weighting.effective_size:.3g}"
+    size = notation.number(weighting.effective_size, 3)
     sentences = [
-        f"The weights are worth {size} equal members; the largest weight is {weighting.largest_weight:.2g}, the index "
-        f"of their tail k-hat {weighting.pareto_k:.2g} (to be trusted below {TRUSTED_K_HAT})."
+        f"The weights are worth {size} equal members; the largest weight is "
+        f"{notation.number(weighting.largest_weight, 2)}, the index of their tail k-hat "
+        f"{notation.number(weighting.pareto_k, 2)} (to be trusted below {TRUSTED_K_HAT})."
     ]
     if not posterior.claimed:
         remedy = "refine around the best members (`infer --method refine`)"
@@ -69,102 +81,114 @@ def _worth(posterior: Posterior) -> list[str]:
     return sentences
 
 
-def how_known(posterior: Posterior, name: str) -> str:
-    """Whether the data tell a parameter, which few members cannot say."""
+def identification(posterior: Posterior, name: str) -> str:
+    """'identified', 'not identified', or that the members with weight are too few to say."""
     if not posterior.claimed:
         return "too few members to tell"
     return "identified" if posterior.marginals.identified[name] else "not identified"
 
 
-def _parameter(posterior: Posterior, name: str) -> list[str]:
-    unit, marginals = posterior.sample.unit[name].removesuffix("-"), posterior.marginals
-    low, high = marginals.quantiles[name][[0, -1]]
-    logarithm = ""
-    if name in marginals.log10_median:
-        logarithm = f" = 10^({marginals.log10_median[name]:.2f} ± {marginals.log10_sd[name]:.2f})"
-    ratio = f"{100 * marginals.width_ratio[name]:.0f} % of the prior's"
+def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLAIN_TEXT) -> list[str]:
+    """Median, standard deviation and 95 % range of a parameter against its prior, and the bounds it presses against."""
+    marginals, symbol = posterior.marginals, notation.parameter(name)
+    unit, number = notation.unit(posterior.sample.unit[name]), notation.number
+    low, high = (number(float(value), 3) for value in marginals.quantiles[name][[0, -1]])
+    ratio = f"{notation.share(marginals.width_ratio[name])} of the prior's"
     if not marginals.identified[name]:
         return [
-            f"{name} is not identified: its 95 % range, {low:.3g} to {high:.3g} {unit}".rstrip()
-            + f", is still {ratio} (identified means below {100 * IDENTIFIED_BELOW:g} %).",
-            *_bounds(marginals, name),
+            f"{symbol} is not identified: its 95 % range, {low} to {high}{unit}, is still {ratio} (identified means "
+            f"below {100 * IDENTIFIED_BELOW:g} %).",
+            *_bounds(posterior, name, notation),
         ]
-    centre = f"{name}: median {marginals.median[name]:.3g} {unit}".rstrip() + logarithm
-    spread = f"standard deviation {marginals.sd[name]:.2g}, 95 % range {low:.3g} to {high:.3g}, {ratio}"
-    return [f"{centre}, {spread}.", *_bounds(marginals, name)]
-
-
-def _bounds(marginals: Marginals, name: str) -> list[str]:
-    sides = zip(("lower", "upper"), marginals.bounds[name], marginals.bound_mass[name], strict=True)
-    hits = [side for side, hit in zip(sides, marginals.bound_hit[name], strict=True) if hit]
+    power = ""
+    if name in marginals.log10_median:
+        power = f" = {notation.power_of_ten(marginals.log10_median[name], marginals.log10_sd[name])}"
     return [
-        f"{name} presses against the {side} bound of its prior, {bound:.3g}: {mass:.2g} of the posterior lies within "
-        f"{100 * NEAR_BOUND:g} % of the prior's range of it ({NEAR_BOUND:g} if the data said nothing)."
-        for side, bound, mass in hits
+        f"{symbol}: median {number(marginals.median[name], 3)}{unit}{power}, standard deviation "
+        f"{number(marginals.sd[name], 2)}, 95 % range {low} to {high}, {ratio}.",
+        *_bounds(posterior, name, notation),
     ]
 
 
-def tied(posterior: Posterior) -> list[tuple[int, int]]:
-    """Pairs of parameters strongly correlated; none among few members, any two of which are correlated perfectly."""
+def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
+    """The bounds of its prior that a parameter presses against: 'lower', 'upper', both or none."""
+    hit = posterior.marginals.bound_hit[name]
+    return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
+
+
+def _bounds(posterior: Posterior, name: str, notation: Notation) -> list[str]:
+    marginals = posterior.marginals
+    bound = dict(zip(("lower", "upper"), marginals.bounds[name], strict=True))
+    mass = dict(zip(("lower", "upper"), marginals.bound_mass[name], strict=True))
+    return [
+        f"{notation.parameter(name)} presses against the {side} bound of its prior, {notation.number(bound[side], 3)}: "
+        f"{notation.number(mass[side], 2)} of the posterior lies within {100 * NEAR_BOUND:g} % of the prior's range of "
+        f"it ({NEAR_BOUND:g} if the data said nothing)."
+        for side in pressed_bounds(posterior, name)
+    ]
+
+
+def correlated_pairs(posterior: Posterior) -> list[tuple[int, int]]:
+    """Pairs of parameters, by number, correlated more strongly than STRONG_CORRELATION.
+
+    None among few members: any two of them are correlated perfectly.
+    """
     if not posterior.claimed:
         return []
     strong = np.abs(np.nan_to_num(posterior.marginals.correlation)) > STRONG_CORRELATION
     return [(i, j) for i, j in combinations(range(len(posterior.parameters)), 2) if strong[i, j]]
 
 
-def _correlations(posterior: Posterior) -> list[str]:
-    names, matrix = posterior.parameters, posterior.marginals.correlation
+def correlations_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
+    """One sentence for each strongly correlated pair of parameters."""
+    names, matrix = [notation.parameter(name) for name in posterior.parameters], posterior.marginals.correlation
     return [
         f"{names[i]} and {names[j]} are correlated ({matrix[i, j]:+.2f}): the data tell their combination better than "
         "either of them."
-        for i, j in tied(posterior)
+        for i, j in correlated_pairs(posterior)
     ]
 
 
-def _misfit(posterior: Posterior) -> list[str]:
+def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
+    """Misfit of the median prediction and stations outside the total band; chi2 where the errors are known."""
     fit = posterior.fit
-    errors = of_kinds(fit.rmse, "in")
     used = posterior.station["used"].to_numpy(bool)
     value = posterior.station["value"].to_numpy(float)
     outside = (value < posterior.predicted.total_band[0]) | (value > posterior.predicted.total_band[-1])
     sentences = [
-        f"The median prediction misses by {errors} (root mean square); {int(np.sum(outside & used))} of "
-        f"{fit.used} measurements lie outside the total 95 % band, {0.05 * fit.used:.1f} are expected to."
+        f"The median prediction misses by {errors_by_kind(fit.rmse, 'in', notation)} (root mean square); "
+        f"{int(np.sum(outside & used))} of {fit.used} measurements lie outside the total 95 % band, "
+        f"{0.05 * fit.used:.1f} are expected to."
     ]
     if math.isfinite(fit.chi2) and posterior.refinement is None:
         sentences.append(
-            f"Against the standard errors of the data, the best member has chi2 = {fit.chi2:.3g} over "
-            f"{fit.used} stations."
+            "Against the standard errors of the data, the best member has chi2 = "
+            f"{notation.number(fit.chi2, 3)} over {fit.used} stations."
         )
     return sentences
 
 
-def _canopy(posterior: Posterior) -> list[str]:
+def canopy_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
+    """The median of plant drag before and after it is corrected to another canopy height; [] without a correction."""
     canopy = posterior.canopy
     if canopy is None:
         return []
-    raw = f"{posterior.marginals.median[canopy.parameter]:.3g}"
     return [
         f"For a canopy of {canopy.to_height:g} m instead of {canopy.from_height:g} m (equal C at a depth of "
-        f"{canopy.depth:g} m), the median of {canopy.parameter} goes from {raw} to {canopy.median:.3g} = "
-        f"10^({canopy.log10_median:.2f} ± {canopy.log10_sd:.2f})."
+        f"{canopy.depth:g} m), the median of {notation.parameter(canopy.parameter)} goes from "
+        f"{notation.number(posterior.marginals.median[canopy.parameter], 3)} to {notation.number(canopy.median, 3)} = "
+        f"{notation.power_of_ten(canopy.log10_median, canopy.log10_sd)}."
     ]
 
 
-# Chances below which errors alone are not believed to explain what is seen.
-DOUBTED, UNBELIEVED = 0.05, 0.001
-# Stations that are named one by one, at most.
-NAMED = 5
-
-
-def drawn_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
-    """Sentences on the search, the modes, the draws and the errors they were weighed by."""
+def search_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
+    """How a refined posterior was found: search, modes and draws first, then the errors they were weighed by."""
     modes, sample = refined.modes, posterior.sample
     starts = f"{modes.starts} of the best members were followed" if modes.starts > 1 else "The best member was followed"
     return [
         f"{starts} downhill and ended in {_modes(posterior, modes)}; {sample.members} members were drawn around, "
         f"{sample.failed or 'none'} of them failed (no weight).",
-        *_errors_in_words(posterior, refined.error_model),
+        *_errors(posterior, refined.error_model),
     ]
 
 
@@ -179,20 +203,20 @@ def _modes(posterior: Posterior, modes: PosteriorModes) -> str:
     return f"{modes.mode_chi2.size} modes ({'; '.join(each)})"
 
 
-def _errors_in_words(posterior: Posterior, model: ErrorModel) -> list[str]:
-    sizes = of_kinds(posterior.fit.sigma, "for")
+def _errors(posterior: Posterior, model: ErrorModel) -> list[str]:
+    sizes = errors_by_kind(posterior.fit.sigma, "for")
     if model.errors == "estimated":
         estimate = (
             f"The errors are estimated from what the best place leaves, {sizes}: what the model misses counts as "
             "error, so its chi2 says nothing; give standard errors and `infer.sigma: known` to test the model."
         )
-        return [estimate, *_correlated(model)]
+        return [estimate, *_neighbours(model)]
     grid = (
         f"that of the grid ({model.grid_error:.2g} on the whole) among them"
         if math.isfinite(model.grid_error)
         else "without that of the grid, whose cells cannot be doubled"
     )
-    sentences = [f"The errors are those stated with the data, {sizes}, {grid}.", *_correlated(model)]
+    sentences = [f"The errors are those stated with the data, {sizes}, {grid}.", *_neighbours(model)]
     if model.scale > 1.0:
         sentences.append(
             f"They had to be multiplied by {model.scale:.2f}: stations beside each other scatter more than is stated."
@@ -200,38 +224,38 @@ def _errors_in_words(posterior: Posterior, model: ErrorModel) -> list[str]:
     return sentences
 
 
-def _correlated(model: ErrorModel) -> list[str]:
+def _neighbours(model: ErrorModel) -> list[str]:
     if model.correlation == 0.0:
         return []
     return [f"Errors of neighbours along a section are correlated by {model.correlation:.2f} (estimated)."]
 
 
-def unseen_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
-    """Sentences on the misfit under all errors, stations left out, bands, and stations that stand out."""
+def validation_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
+    """How a refined posterior predicts: misfit under all errors, stations left out, bands, stations that stand out."""
     return [
         *(() if refined.error_model.errors == "estimated" else _misfit_under_errors(refined.misfit)),
-        *_scores(posterior, refined.leave_one_out, refined.groups),
+        *_left_out(posterior, refined.leave_one_out, refined.groups),
         *_bands(refined.leave_one_out),
         *_outliers(posterior, refined.misfit),
     ]
 
 
 def _misfit_under_errors(misfit: MisfitTest) -> list[str]:
-    said = f"Under these errors chi2 = {misfit.chi2:.4g} with {misfit.freedom} degrees of freedom (p = "
-    said += f"{misfit.p_misfit:.2g})"
+    result = f"Under these errors chi2 = {misfit.chi2:.4g} with {misfit.freedom} degrees of freedom (p = "
+    result += f"{misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
-        return [f"{said}: the errors do not explain what is left, something is missing in the model or in its data."]
-    return [f"{said}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."]
+        return [f"{result}: the errors do not explain what is left, something is missing in the model or in its data."]
+    return [f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."]
 
 
-def _scores(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -> list[str]:
+def _left_out(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -> list[str]:
     doubtful = int(np.sum(alone.score_k > TRUSTED_K_HAT))
     doubt = f", {doubtful} of them not to be trusted (k-hat above {TRUSTED_K_HAT})" if doubtful else ""
     sentences = [
         f"Leaving each station out in turn, the log predictive density is {alone.elpd:.1f} ± "
         f"{alone.elpd_error:.1f} over {posterior.fit.used} stations{doubt}."
     ]
-    shaky = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_K_HAT]
+    untrusted = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_K_HAT]
     if groups.left_out.size:
         each = groups.left_out_score / groups.left_out_stations
         worst = int(np.argmin(each))
@@ -239,28 +263,30 @@ def _scores(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -> 
             f"Of {groups.left_out.size} sections and experiments left out in turn, the one told worst from the others "
             f"is {groups.left_out[worst]} ({each[worst]:.2f} a station, {np.median(each):.2f} in the middle)."
         )
-    if shaky:
-        sentences.append(f"Without {', '.join(shaky)} the posterior moves too far for these draws: not to be trusted.")
+    if untrusted:
+        sentences.append(
+            f"Without {', '.join(untrusted)} the posterior moves too far for these draws: not to be trusted."
+        )
     return sentences
 
 
 def _bands(alone: LeaveOneOut) -> list[str]:
-    said = (
+    counted = (
         f"Predicted from all others, {100 * alone.inside50:.0f} % of the measurements lie within their 50 % band and "
         f"{100 * alone.inside95:.0f} % within that of 95 %"
     )
     if alone.p_calibration < DOUBTED:
-        return [f"{said}; they fill their bands unevenly (p = {alone.p_calibration:.2g})."]
-    return [f"{said}, as evenly as they should (p = {alone.p_calibration:.2g})."]
+        return [f"{counted}; they fill their bands unevenly (p = {alone.p_calibration:.2g})."]
+    return [f"{counted}, as evenly as they should (p = {alone.p_calibration:.2g})."]
 
 
 def _outliers(posterior: Posterior, misfit: MisfitTest) -> list[str]:
-    many = int(misfit.outlier.sum())
-    if many > NAMED:
+    outliers = int(misfit.outlier.sum())
+    if outliers > OUTLIERS_NAMED:
         worst = int(np.nanargmax(np.abs(np.where(misfit.outlier, misfit.surprise, np.nan))))
         row = posterior.station.iloc[worst]
         return [
-            f"{many} stations stand out by more than chance allows from what all others and the model tell, most "
+            f"{outliers} stations stand out by more than chance allows from what all others and the model tell, most "
             f"of all {row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m, by "
             f"{misfit.surprise[worst]:+.1f} of its errors: so many are no single errors but something missing."
         ]

@@ -46,24 +46,24 @@ def is_synthetic(case: Case) -> bool:
     return made_with or any(observation.synthetic for observation in case.observations)
 
 
-def picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
+def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
     """The figure as a file of the run and as a part of its page."""
     file = re.sub(r"[^A-Za-z0-9_.-]+", "-", name)  # experiments and sections are named by their user
     return publish(figure, run.folder / "figures", file, caption, alt, SYNTHETIC if is_synthetic(run.case) else "")
 
 
-def patches_drawn(run: Run, experiment: str) -> VegetatedCells:
+def median_plants(run: Run, experiment: str) -> VegetatedCells:
     """The plants present in an experiment, at the medians of the parameters."""
     medians = {name: np.array([value]) for name, value in run.posterior.marginals.median.items()}
     return build_problem(run.case, run.site, experiment, medians).plants
 
 
-def planted(run: Run, experiment: str) -> np.ndarray:
+def planted_cells(run: Run, experiment: str) -> np.ndarray:
     """Whether each cell (nx, ny) bears plants in an experiment."""
     return np.isin(run.site.patch, patches_present(run.case, experiment))
 
 
-def zones(run: Run) -> list[str]:
+def station_zones(run: Run) -> list[str]:
     """Where each station stands: 'plants' in a patch that is present, else its friction class; 'section' where a whole
     cross-section is measured.
     """
@@ -71,7 +71,7 @@ def zones(run: Run) -> list[str]:
     column = np.clip(np.searchsorted(grid.x + 0.5 * grid.dx, table["x"]), 0, len(grid.x) - 1)
     row = np.clip(np.searchsorted(grid.y + 0.5 * grid.dy, table["y"]), 0, len(grid.y) - 1)
     names = np.array(run.site.class_names)[run.site.friction_class[column, row]]
-    cells = {experiment: planted(run, experiment) for experiment in table["experiment"].unique()}
+    cells = {experiment: planted_cells(run, experiment) for experiment in table["experiment"].unique()}
     among = [cells[experiment][i, j] for experiment, i, j in zip(table["experiment"], column, row, strict=True)]
     whole = [not kind_of(name).at_point for name in table["kind"]]
     return [str(name) for name in np.where(whole, "section", np.where(among, "plants", names))]

@@ -1,4 +1,4 @@
-"""The tables of a report: parameters beside the values of others, stations, health of the run, how it was made."""
+"""The tables of the page: parameters with reference values, stations, health of the run, how it was made."""
 
 import html
 import platform
@@ -14,23 +14,28 @@ from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_mi
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
-from vegglue.report_page.posterior_words import how_known
-from vegglue.report_page.run import Run, zones
+from vegglue.report_page.posterior_words import identification, pressed_bounds
+from vegglue.report_page.run import Run, station_zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CorrectedCanopy
 from vegglue.solver.status import FAILED, STATUS_WORDS, members_with
 
-SHORTLY = {"identified": "yes", "not identified": "no"}
+# Answers of the column "Identified"; that there are too few members to tell is said in full.
+YES_NO = {"identified": "yes", "not identified": "no"}
 
 
 @dataclass(frozen=True)
-class _Beside:
-    """What another study has, our difference from it, what a synthetic record was made with, and the same (HTML)."""
+class ReferenceComparison:
+    """Values of others for one parameter, and how far ours differs from them (HTML).
+
+    study: of another study. made_with: of a synthetic record. Differences: ours minus theirs in standard
+    deviations. – where there is no such value.
+    """
 
     study: str = "–"
-    from_study: str = "–"
-    known: str = "–"
-    from_known: str = "–"
+    study_difference: str = "–"
+    made_with: str = "–"
+    made_with_difference: str = "–"
 
 
 @dataclass(frozen=True)
@@ -41,14 +46,14 @@ class ParameterRow:
     meaning: str
     prior: str
     posterior: str
-    span: str
-    known: str
-    beside: _Beside
+    range95: str
+    identified: str
+    reference: ReferenceComparison
 
 
 @dataclass(frozen=True)
-class OtherRow:
-    """One line more of the table of parameters (text)."""
+class FitRow:
+    """A line below the parameters in their table: the residual sigma of a kind, or the number of stations (text)."""
 
     symbol: str
     meaning: str
@@ -82,33 +87,32 @@ def parameter_rows(run: Run) -> list[ParameterRow]:
         logarithmic = as_power(posterior, name)
         centre = posterior.marginals.log10_median[name] if logarithmic else posterior.marginals.median[name]
         sd = posterior.marginals.log10_sd[name] if logarithmic else posterior.marginals.sd[name]
-        beside = _Beside() if canopy and canopy.parameter == name else _beside(run, name, centre, sd)
-        rows.append(_parameter_row(run, name, beside))
+        comparison = ReferenceComparison() if canopy and canopy.parameter == name else _compared(run, name, centre, sd)
+        rows.append(_parameter_row(run, name, comparison))
     if canopy is not None:
-        beside = _beside(run, canopy.parameter, canopy.log10_median, canopy.log10_sd)
-        rows.append(_corrected_row(run.case, canopy, beside))
+        comparison = _compared(run, canopy.parameter, canopy.log10_median, canopy.log10_sd)
+        rows.append(_corrected_row(run.case, canopy, comparison))
     return rows
 
 
-def _parameter_row(run: Run, name: str, beside: _Beside) -> ParameterRow:
+def _parameter_row(run: Run, name: str, comparison: ReferenceComparison) -> ParameterRow:
     posterior = run.posterior
     low, high = posterior.marginals.quantiles[name][[0, -1]]
-    hits = zip(("lower", "upper"), posterior.marginals.bound_hit[name], strict=True)
-    bound = " and ".join(side for side, hit in hits if hit)
-    answer = how_known(posterior, name)
-    known = f"{SHORTLY.get(answer, answer)}, {percent(posterior.marginals.width_ratio[name])}"
+    bound = " and ".join(pressed_bounds(posterior, name))
+    answer = identification(posterior, name)
+    identified = f"{YES_NO.get(answer, answer)}, {percent(posterior.marginals.width_ratio[name])}"
     return ParameterRow(
         symbol(run.case, name),
         html.escape(run.case.parameters[name].meaning),
         _prior(run, name),
         estimate(posterior, name),
         f"{short(low)} to {short(high)}",
-        known + (f", at {bound} bound" if bound else ""),
-        beside,
+        identified + (f", at {bound} bound" if bound else ""),
+        comparison,
     )
 
 
-def _corrected_row(case: Case, canopy: CorrectedCanopy, beside: _Beside) -> ParameterRow:
+def _corrected_row(case: Case, canopy: CorrectedCanopy, comparison: ReferenceComparison) -> ParameterRow:
     low, high = canopy.quantiles[[0, -1]]
     return ParameterRow(
         symbol(case, canopy.parameter),
@@ -117,7 +121,7 @@ def _corrected_row(case: Case, canopy: CorrectedCanopy, beside: _Beside) -> Para
         f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>",
         f"{short(low)} to {short(high)}",
         "",
-        beside,
+        comparison,
     )
 
 
@@ -130,46 +134,46 @@ def _prior(run: Run, name: str) -> str:
     return f"{words[prior.distribution]}, 95{NARROW}% in {short(low)} to {short(high)}"
 
 
-def _stated(run: Run, name: str) -> tuple[float, float] | None:
+def _study_value(run: Run, name: str) -> tuple[float, float] | None:
     """Median and standard deviation another study gives, on the scale the parameter is looked at."""
     table = run.case.reference.table if run.case.reference else {}
     stated = table.get(f"log10_{name}" if as_power(run.posterior, name) else name)
     return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
 
 
-def _beside(run: Run, name: str, centre: float, sd: float) -> _Beside:
+def _compared(run: Run, name: str, centre: float, sd: float) -> ReferenceComparison:
     """What others have for a parameter, and how far off `centre` ± `sd` lies (log10 where it is looked at so).
 
     From another study in the standard deviations of both together; from known values in our own and in the study's.
     """
     logarithmic = as_power(run.posterior, name)
-    stated, known = _stated(run, name), (run.case.reference.made_with if run.case.reference else {}).get(name)
-    study = from_study = known_value = from_known = "–"
+    stated, known = _study_value(run, name), (run.case.reference.made_with if run.case.reference else {}).get(name)
+    study = study_difference = made_with = made_with_difference = "–"
     if stated is not None:
         study = f"10<sup>{as_given(*stated)}</sup>" if logarithmic else as_given(*stated)
-        from_study = f"{fixed((centre - stated[0]) / np.hypot(sd, np.nan_to_num(stated[1])), 1)} sd"
+        study_difference = f"{fixed((centre - stated[0]) / np.hypot(sd, np.nan_to_num(stated[1])), 1)} sd"
     if known is not None:
         off = centre - (np.log10(known) if logarithmic else known)
-        known_value, from_known = as_given(known), f"{fixed(off / sd, 1)} sd"
+        made_with, made_with_difference = as_given(known), f"{fixed(off / sd, 1)} sd"
         if stated is not None and np.isfinite(stated[1]):
-            from_known += f" ({fixed(off / stated[1], 1)} of the study’s)"
-    return _Beside(study, from_study, known_value, from_known)
+            made_with_difference += f" ({fixed(off / stated[1], 1)} of the study’s)"
+    return ReferenceComparison(study, study_difference, made_with, made_with_difference)
 
 
-def other_rows(run: Run) -> list[OtherRow]:
-    """What is no parameter but stands in the same table of the other study: sigma of each kind, number of stations."""
+def fit_rows(run: Run) -> list[FitRow]:
+    """Sigma of each kind and the number of stations, which other studies state beside their parameters."""
     stated = run.case.reference.table if run.case.reference else {}
     study = {key: as_given(value) for key, value in stated.items() if isinstance(value, float)}
     rows = [
-        OtherRow("σ", f"residual, {kind.words}", short(value, 2), kind.unit, study.get("sigma", "–"))
+        FitRow("σ", f"residual, {kind.words}", short(value, 2), kind.unit, study.get("sigma", "–"))
         for kind, value in ((kind_of(name), value) for name, value in run.posterior.fit.sigma.items())
     ]
-    return [*rows, OtherRow("n", "stations used", str(run.posterior.fit.used), "", study.get("n", "–"))]
+    return [*rows, FitRow("n", "stations used", str(run.posterior.fit.used), "", study.get("n", "–"))]
 
 
 def station_rows(run: Run) -> list[StationRow]:
     """All stations, used or not, in the order of the table of observations."""
-    table = run.observations.table.assign(zone=zones(run))
+    table = run.observations.table.assign(zone=station_zones(run))
     return [_station_row(run, index, row) for index, (_, row) in enumerate(table.iterrows())]
 
 
@@ -192,20 +196,20 @@ def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
     )
 
 
-def members(ensemble: Ensemble) -> list[tuple[str, int, str]]:
-    """How many members ended how, and their share."""
+def member_counts(ensemble: Ensemble) -> list[tuple[str, int, str]]:
+    """For each status of a member: its words, how many members have it, and their share as text."""
     counts = [(word, members_with(ensemble.status, number)) for number, word in STATUS_WORDS.items()]
     return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
 
 
-def failures(ensemble: Ensemble) -> list[tuple[str, int]]:
+def failure_reasons(ensemble: Ensemble) -> list[tuple[str, int]]:
     """The reasons of failed members with their counts, the most frequent first."""
     reasons = pd.Series(ensemble.reason[ensemble.status == FAILED].astype(str))
     return [(str(reason), int(number)) for reason, number in reasons.value_counts().items()]
 
 
-def health(run: Run) -> Iterator[tuple[str, str]]:
-    """What tells whether the numbers are to be trusted: a name and a value each."""
+def health_facts(run: Run) -> Iterator[tuple[str, str]]:
+    """Mass errors, weights and iterations, by which the numbers are trusted or not: a name and a value each."""
     ensemble, posterior = run.ensemble, run.posterior
     solved = ensemble.status != FAILED
     yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
@@ -233,8 +237,8 @@ def _duration(seconds: float) -> str:
     )
 
 
-def facts(run: Run) -> Iterator[tuple[str, str]]:
-    """What the run depends on: a name and a value each."""
+def provenance(run: Run) -> Iterator[tuple[str, str]]:
+    """What the run was made of: config, data, versions, grid and choices of the model; a name and a value each."""
     numerics, infer = run.case.numerics, run.case.infer
     yield "config", run.case.source.name
     yield "hash of config and data", case_hash(run.case)[:16]
