@@ -14,7 +14,7 @@ from vegglue.effects.definition import Amplitude
 from vegglue.screening.family_wise_p import Family
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.residual_screening import Screening, screen
-from vegglue.screening.spatial_scan import Spots
+from vegglue.screening.spatial_scan import DragSpots
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 STATION = stations_of(CASE, ("A", "B"), 6)
@@ -34,7 +34,7 @@ def screened(values: Array, effects: int = EFFECTS) -> Screening:
     """With the first so many effects to be tested."""
     slope, prints, traces = changes()
     base = at_best(CASE, STATION, values, slope)
-    spots = Spots(np.arange(SPOTS), np.arange(SPOTS), 1.0, traces)
+    spots = DragSpots(np.arange(SPOTS), np.arange(SPOTS), 1.0, traces)
     columns = [np.array([column]) for column in range(effects)]
     tested = columns, [{}] * effects, AMPLITUDES[:effects], prints[:, :effects]
     known = Fingerprints(base.fitted.point, [], *tested, spots)

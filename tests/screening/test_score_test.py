@@ -58,7 +58,7 @@ def test_the_likeliest_rival_is_true_as_often_as_told(
 
     With half or twice the exponent 0.62 and 0.89 are told.
     """
-    monkeypatch.setattr(score_test, "TRACE_ERROR", 0.0)
+    monkeypatch.setattr(score_test, "FINGERPRINT_ERROR", 0.0)
     slopes, prints = problem
     random, tries = np.random.default_rng(12), 2000
     prints = prints[:, :1] + 0.6 * prints
@@ -81,10 +81,10 @@ def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
 
 def test_the_fewest_groups_hold_what_is_asked() -> None:
     chance = np.array([0.5, 0.04, 0.3, 0.16])
-    assert score_test.fewest([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]
-    assert score_test.fewest([[3], [2], [0, 1]], chance, 0.6) == [[0, 1], [2]]
-    assert score_test.fewest([[0], [1], [2], [3]], chance, 0.95) == [[0], [2], [3]]
-    assert score_test.fewest([[0], [1], [2], [3]], chance, 0.97) == [[0], [2], [3], [1]]
+    assert score_test.fewest_groups([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]
+    assert score_test.fewest_groups([[3], [2], [0, 1]], chance, 0.6) == [[0, 1], [2]]
+    assert score_test.fewest_groups([[0], [1], [2], [3]], chance, 0.95) == [[0], [2], [3]]
+    assert score_test.fewest_groups([[0], [1], [2], [3]], chance, 0.97) == [[0], [2], [3], [1]]
 
 
 def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
@@ -101,7 +101,7 @@ def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
         residual = (1 - 2 * sign) * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
         drawn = replace(projected, residual=residual)
         chance = score_test.chances(drawn, family, may_be, 3.0)
-        kept = [j for group in score_test.likely(drawn, family, chance, 0.9) for j in group]
+        kept = [j for group in score_test.likeliest_families(drawn, family, chance, 0.9) for j in group]
         said, held = said + sum(chance[family[j]].sum() for j in kept), held + (true in kept)
         sizes.append(len(kept))
     assert held == pytest.approx(said, abs=4.0 * np.sqrt(0.09 * tries))
@@ -117,8 +117,8 @@ def test_without_a_score_all_that_may_be_are_as_likely(problem: tuple[np.ndarray
     may_be[:, 6:] = False
     chance = score_test.chances(projected, family, may_be, 3.0)
     assert [chance[columns].sum() for columns in family] == pytest.approx([0.5, 0.5, 0.0])
-    assert score_test.likely(projected, family, chance, 0.9) == [[0], [1]]
-    assert score_test.likely(projected, [], np.zeros(0), 0.9) == []
+    assert score_test.likeliest_families(projected, family, chance, 0.9) == [[0], [1]]
+    assert score_test.likeliest_families(projected, [], np.zeros(0), 0.9) == []
 
 
 def test_what_looks_alike_shares_its_chances(problem: tuple[np.ndarray, np.ndarray]) -> None:
@@ -126,8 +126,8 @@ def test_what_looks_alike_shares_its_chances(problem: tuple[np.ndarray, np.ndarr
     slopes, prints = problem
     projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints[:, [0, 1, 0]])
     family = [np.array([j]) for j in range(3)]
-    assert score_test.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.55) == [[0, 2]]
-    assert score_test.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.9) == [[0, 2], [1]]
+    assert score_test.likeliest_families(projected, family, np.array([0.3, 0.4, 0.3]), 0.55) == [[0, 2]]
+    assert score_test.likeliest_families(projected, family, np.array([0.3, 0.4, 0.3]), 0.9) == [[0, 2], [1]]
 
 
 def test_names_with_one_trace_form_a_group() -> None:

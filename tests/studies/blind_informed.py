@@ -41,6 +41,8 @@ def _sets(seen: Screening, signal: float, level: float, random: np.random.Genera
             sign, column = ways[random.integers(len(ways))]
             residual = (1 - 2 * sign) * signal * units[:, column] + random.standard_normal(len(units))
             drawn = replace(seen.projected, residual=residual)
-            kept = score_test.likely(drawn, family, score_test.chances(drawn, family, may_be, signal), level)
+            kept = score_test.likeliest_families(
+                drawn, family, score_test.chances(drawn, family, may_be, signal), level
+            )
             found.append((any(true in group for group in kept), len(kept)))
     return np.array(found, dtype=float)

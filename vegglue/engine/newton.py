@@ -24,7 +24,7 @@ from vegglue.solver.wet_band import chord_in_band, widen
 # Step of differences in z, small against the prior and large against rounding.
 DIFFERENCE_STEP = 1e-3
 # Relative exactness of tangents.
-EXACT = 1e-5
+TANGENT_TOLERANCE = 1e-5
 # Members solved side by side from one point.
 LANES_FROM_A_POINT = 16
 
@@ -102,7 +102,7 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
         problem = build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: value})
         changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - calm) / gain)[..., 0]
         built.append((problem, gain))
-    moved = tangents(base, flow.state, flow.factors, changes, EXACT)
+    moved = tangents(base, flow.state, flow.factors, changes, TANGENT_TOLERANCE)
     for lane, j in enumerate(here):
         problem, gain = built[lane]
         state = flow.state + gain * moved[..., lane : lane + 1]
@@ -148,7 +148,9 @@ def _flow(model: Model, experiment: str, z: Array, near: Point | None) -> Steady
     if factors is None:
         return None
     part = crop(problem, *band)
-    slopes = tangents(part, solution.state, factors, _causes(model, experiment, z, solution.state, band), EXACT)
+    slopes = tangents(
+        part, solution.state, factors, _causes(model, experiment, z, solution.state, band), TANGENT_TOLERANCE
+    )
     return SteadyFlow(solution.state, band, problem.shape[1], factors, slopes)
 
 
