@@ -12,12 +12,14 @@ import numpy as np
 
 from vegglue.arrays import Array
 
+# Degree of the polynomial at most. Chosen, not measured: coefficients grow as p^4 / 24, and each needs runs.
 HIGHEST_DEGREE = 4
-# At least; a polynomial through fewer would follow single runs.
+# Least runs for each coefficient. Chosen, not measured: a polynomial through fewer would follow single runs.
 RUNS_PER_COEFFICIENT = 2.0
-# Relative to the mean square of a term: keeps the normal equations solvable where runs leave a term undetermined.
+# Ridge over the mean square of a term [-]: keeps the normal equations solvable where runs leave a term undetermined.
 RIDGE = 1e-6
-# Log density below that of the best run [per parameter] at which the root of a run's weight has fallen to a half.
+# Fall of the log density below the best run [per parameter] at which the root of a run's weight is a half. Chosen, not
+# measured: a smaller one fits the mode more closely and the tails less.
 HALF_WEIGHT_DROP = 5.0
 
 

@@ -18,6 +18,8 @@ from vegglue.inference.emulator import Emulator, fit_emulator
 from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weights
 from vegglue.inference.weighted_statistics import effective_size
 
+# Rounds at most, draws of the first, and of any other at most. Chosen, not measured: they bound the runs of the model
+# (some 5,000), and a larger first round makes a better emulator of a proposal that may be poor.
 SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16
@@ -29,7 +31,7 @@ LogDensity = Callable[[Array, Array], Array]
 class Sample:
     """All draws z (m, p), values predicted there (m, n), NaN where that failed, and log density (m,), -inf there.
 
-    weights (m,): of sum 1; drawn, worth: draws and effective draws so far, after each round.
+    weights (m,): of sum 1; drawn, effective: draws and effective draws so far, after each round.
     """
 
     z: Array

@@ -12,6 +12,7 @@ from vegglue.inference.weighted_statistics import effective_size, systematic_dra
 
 # Degrees of freedom of every component: tails heavy enough for a posterior that is not normal.
 FREEDOM = 5.0
+# The numbers below are chosen, not measured: they trade time for effective draws, and no weight depends on them.
 # Effective draws that a fit of the mixture asks for; with fewer the weights are tempered, w^t with t < 1.
 EFFECTIVE_TO_FIT = 200
 # Rounds of adaptation, draws in each (of an emulator, which cost little); components at most, and added in a round.
