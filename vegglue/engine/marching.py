@@ -25,7 +25,7 @@ from vegglue.site.channel_geometry import channel_geometry
 from vegglue.solver.march import march
 
 # A flow rests when no level or velocity changes faster than this [m/s, m/s2]; this is
-# checked every so many steps. Chosen, not measured: central differences keep an error of some 1e-9 over their step.
+# checked every so many steps. Chosen, not measured: a smaller rate marches for longer.
 REST_RATE, STEPS_BETWEEN_CHECKS = 1e-9, 100
 # Central differences in z; the force [m/s2] of a response, a hundredth of what drives water down a slope of 1 in 1,000.
 MARCHED_DIFFERENCE_STEP, SMALL_FORCE = 0.02, 1e-4

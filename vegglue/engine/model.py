@@ -9,7 +9,7 @@ from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import build_site
 from vegglue.site.zones import ranges_without_cells
 
-# Least number of cells of a coarser grid, along and across. Chosen, not measured: with fewer, a section is not resolved.
+# Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.
 FEWEST_CELLS = 6
 # Length over width of cells above which a coarser grid has wider ones only: across the flow is where the error is.
 LONG_CELL = 2.0

@@ -19,7 +19,7 @@ from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weigh
 from vegglue.inference.weighted_statistics import effective_size
 
 # Rounds at most, draws of the first, and of any other at most. Chosen, not measured: they bound the runs of the model
-# (some 5,000), and a larger first round makes a better emulator of a proposal that may be poor.
+# (6,336 at most), and a larger first round makes a better emulator of a proposal that may be poor.
 SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16

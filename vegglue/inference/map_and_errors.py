@@ -23,7 +23,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.screening.residual_screening import screen
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
-# prior]. Chosen, not measured: more starts find more modes and each costs some 10 runs of the model.
+# prior]. Chosen, not measured: more starts find more modes and each costs a fit.
 MOST_STARTS, BEST_MEMBERS, START_DISTANCE = 4, 64, 0.7
 # Rise of the objective [-] above that of the best mode from which a mode is left out: its weight is below exp(-15).
 NEGLIGIBLE_MODE = 30.0
@@ -115,7 +115,7 @@ def _distance(end: MapEstimate, z: Array) -> float:
 
 
 # Times that the size of the errors is estimated from the residual, each followed by a fit. Chosen, not measured: more
-# cost runs of the model, and two bring the size close to where it stays.
+# cost more runs of the model.
 SIZE_ESTIMATES = 2
 
 
