@@ -114,8 +114,8 @@ def _distance(end: MapEstimate, z: Array) -> float:
     return float(np.sqrt(away @ np.linalg.solve(end.covariance, away)))
 
 
-# Times that the size of the errors is estimated from the residual, each followed by a fit. Chosen, not measured: more
-# cost more runs of the model.
+# Times that the size of the errors is estimated from the residual, each followed by a fit. Chosen, not measured:
+# further ones cost runs of the model.
 SIZE_ESTIMATES = 2
 
 
