@@ -5,7 +5,7 @@ import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.fit import Fitted, chi2, covariance, objective
+from vegglue.calibration.fit import MapEstimate, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point
@@ -32,5 +32,5 @@ def at_best(case: Case, station: pd.DataFrame, values: Array, slope: Array) -> B
     white = slope / error[:, None]
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ (values / error))
     point = Point(z, slope @ z, slope, {})
-    fitted = Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), True)
+    fitted = MapEstimate(point, chi2(noise, point), objective(noise, point), covariance(noise, point))
     return Baseline(Model(case, build_site(case), station, NEWTON), noise, fitted, None, None)

@@ -7,9 +7,9 @@ import scipy.stats
 
 from vegglue.calibration.noise import (
     covariance_of,
-    discounted,
-    drawn_errors,
-    estimated,
+    downweight_outliers,
+    draw_whitened_errors,
+    estimate_noise,
     noise_of,
     with_correlation,
     with_grid_error,
@@ -83,7 +83,7 @@ def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
     for _ in range(6):
         missing = physics @ random.standard_normal(physics.shape[1]) * 0.03
         left = correlated(rho, random) + missing
-        noise = estimated(noise_of(stations()), left, physics)
+        noise = estimate_noise(noise_of(stations()), left, physics)
         found.append(noise.correlation)
         assert noise.scale < 1.3, "missing physics is not taken for noise"
     assert np.mean(found) == pytest.approx(rho, abs=0.12)
@@ -92,12 +92,12 @@ def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
 def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
     random = np.random.default_rng(6)
     left = correlated(0.0, random, error=0.02)
-    noise = estimated(noise_of(stations(0.01)), left, smooth())
+    noise = estimate_noise(noise_of(stations(0.01)), left, smooth())
     assert noise.scale == pytest.approx(2.0, rel=0.2)
 
 
 def test_a_station_set_aside_counts_for_nothing() -> None:
-    noise = discounted(noise_of(stations()), np.array([5]))
+    noise = downweight_outliers(noise_of(stations()), np.array([5]))
     left = np.zeros(SECTIONS * STATIONS)
     left[5] = 1.0
     assert np.abs(noise.whiten(left)).max() < 0.2
@@ -118,12 +118,12 @@ def test_doubt_about_the_correlation_keeps_alarms_rare() -> None:
     alarms = {"known": 0, "doubted": 0}
     for _ in range(TRIES):
         left = correlated(0.6, random)
-        noise = estimated(noise_of(stations()), left, physics)
+        noise = estimate_noise(noise_of(stations()), left, physics)
         white = noise.whiten(traces)
         score = np.abs(noise.whiten(left) @ white / np.linalg.norm(white, axis=0)).max()
         certain = with_correlation(noise, noise.correlation, noise.scale)
         for name, one in (("known", certain), ("doubted", noise)):
-            errors = drawn_errors(one, 1000, random) @ white / np.linalg.norm(white, axis=0)
+            errors = draw_whitened_errors(one, 1000, random) @ white / np.linalg.norm(white, axis=0)
             alarms[name] += int(score > np.quantile(np.abs(errors).max(axis=1), 0.95))
     assert alarms["doubted"] < alarms["known"], "a correlation that is only estimated makes alarms of its own"
     assert scipy.stats.binomtest(alarms["doubted"], TRIES, 0.05).pvalue > 1e-3

@@ -40,14 +40,14 @@ def test_an_amplitude_and_its_gain_undo_each_other(value):
     assert amplitude.at(gain) == pytest.approx(value)
     assert amplitude.size(gain) == pytest.approx(value - 0.5)
     assert amplitude.at(gain + 100.0) == 3.0
-    assert amplitude.gain(0.5 + amplitude.scale) == pytest.approx(amplitude.plausible)
+    assert amplitude.gain(0.5 + amplitude.scale) == pytest.approx(amplitude.plausible_gain)
 
 
 def test_a_size_may_be_within_its_support_and_within_belief():
     amplitude = Amplitude("strength", "1/m", "drag c", 0.1, -2.0, 3.0, off=0.5, power=2)
-    assert [amplitude.may_be(gain, 30.0) for gain in (6.2, -6.2, 6.3, -6.3)] == [True, True, False, False]
-    assert amplitude.may_be(0.2**2, 3.0), "two times its scale"
-    assert not amplitude.may_be(0.4**2, 3.0), "four times"
+    assert [amplitude.allows(gain, 30.0) for gain in (6.2, -6.2, 6.3, -6.3)] == [True, True, False, False]
+    assert amplitude.allows(0.2**2, 3.0), "two times its scale"
+    assert not amplitude.allows(0.4**2, 3.0), "four times"
 
 
 def drag(cells, strength):

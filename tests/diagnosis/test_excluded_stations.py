@@ -9,7 +9,7 @@ import pytest
 from diagnoses import a_diagnosis
 
 from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.fit import Fitted, chi2, covariance, objective
+from vegglue.calibration.fit import MapEstimate, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
@@ -61,7 +61,7 @@ def quickly(model: Model, known: object) -> Baseline:
     noise, size = noise_of(model.station), len(model.names)
     slope = 0.01 * np.random.default_rng(1).standard_normal((len(model.station), size))
     point = Point(np.zeros(size), model.station["value"].fillna(0.0).to_numpy() + 0.01, slope, {})
-    fitted = Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), True)
+    fitted = MapEstimate(point, chi2(noise, point), objective(noise, point), covariance(noise, point))
     return Baseline(model, noise, fitted, None, None)
 
 

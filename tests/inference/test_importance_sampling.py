@@ -49,7 +49,7 @@ def test_moments_of_a_normal_posterior(dimensions: int) -> None:
     first = mixture_at_modes(centre[None] + 0.5 * sd, 1.5 * covariance[None], np.zeros(1))
     drawn = sample(lambda z: z @ design.T, density, first, 1000, seed=1)
     mean, spread = moments(drawn)
-    assert drawn.worth[-1] >= 1000
+    assert drawn.effective[-1] >= 1000
     assert np.all(np.abs(mean - centre) < 4 * sd / math.sqrt(1000))
     assert spread == pytest.approx(sd, rel=4 / math.sqrt(2000))
     assert pareto_shape(drawn.weights) < 0.5
@@ -95,7 +95,7 @@ def test_same_seed_same_draws_and_all_count() -> None:
     assert np.array_equal(first.z, again.z)
     assert np.array_equal(first.weights, again.weights)
     assert first.drawn[-1] == len(first.z)
-    assert first.worth[-1] == pytest.approx(effective_size(first.weights))
+    assert first.effective[-1] == pytest.approx(effective_size(first.weights))
     assert not np.array_equal(first.z, sample(bent, squares, start(2), 300, seed=5).z)
 
 
@@ -105,7 +105,7 @@ def test_too_few_rounds_are_no_error() -> None:
         return -0.5 * np.sum((z - 5) ** 2 / 1e-8, axis=1)
 
     drawn = sample(lambda z: np.ones((len(z), 1)), needle, start(3), 1e9, seed=6)
-    assert drawn.worth[-1] < drawn.drawn[-1]
+    assert drawn.effective[-1] < drawn.drawn[-1]
     assert np.isfinite(drawn.weights).all()
 
 

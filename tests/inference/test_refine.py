@@ -10,7 +10,7 @@ import scipy.stats
 from posteriors import assert_same
 from reach import COARSE, said_to, write_reach
 
-from vegglue.calibration.fit import Fitted, fit
+from vegglue.calibration.fit import MapEstimate, fit
 from vegglue.calibration.noise import Noise, covariance_of, noise_of, with_correlation
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at, z_at
@@ -20,8 +20,8 @@ from vegglue.engine.interface import Point, linearise, predict
 from vegglue.engine.model import model_of
 from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
-from vegglue.inference.homogeneity import alike, only, told_by_data, transfer
-from vegglue.inference.map_and_errors import distinct, groundwork, starting_places, unexplained_residual
+from vegglue.inference.homogeneity import equal_values_test, one_experiment, transfer, without_prior
+from vegglue.inference.map_and_errors import distinct_modes, modes_and_errors, standardised_residual, starting_points
 from vegglue.inference.refine import log_posterior, refinable, refine
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
@@ -58,7 +58,7 @@ def refined(reach: tuple[Case, Observations, Ensemble]) -> Posterior:
 @pytest.fixture(scope="module")
 def noise(reach: tuple[Case, Observations, Ensemble]) -> Noise:
     case, observations, ensemble = reach
-    return groundwork(model_of(case, observations), ensemble, "known").noise
+    return modes_and_errors(model_of(case, observations), ensemble, "known").noise
 
 
 def test_a_thousand_effective_draws_around_the_truth(refined: Posterior) -> None:
@@ -89,7 +89,7 @@ def test_the_log_density_is_that_of_errors_and_prior(
     reach: tuple[Case, Observations, Ensemble], refined: Posterior, noise: Noise
 ) -> None:
     assert refined.refinement is not None
-    assert np.sqrt(np.mean(noise.grid**2)) == pytest.approx(refined.refinement.error_model.grid_error)
+    assert np.sqrt(np.mean(noise.grid_error**2)) == pytest.approx(refined.refinement.error_model.grid_error)
     z = z_at(reach[0], refined.sample.theta)[:50]
     errors = scipy.stats.multivariate_normal(np.zeros(15), covariance_of(noise))
     expected = errors.logpdf(noise.value - refined.sample.prediction[:50]) + scipy.stats.norm.logpdf(z).sum(axis=1)
@@ -195,7 +195,7 @@ def test_far_places_are_solved_on_their_own(reach: tuple[Case, Observations, Ens
 def test_starts_are_the_best_that_lie_apart(reach: tuple[Case, Observations, Ensemble]) -> None:
     case, observations, ensemble = reach
     noise, z = noise_of(observations.table), z_at(case, ensemble.parameters)
-    starts = starting_places(noise, z, ensemble.prediction)
+    starts = starting_points(noise, z, ensemble.prediction)
     logs = log_posterior(noise, z, ensemble.prediction)
     assert np.array_equal(starts[0], z[np.argmax(logs)])
     apart = np.linalg.norm(starts[:, None] - starts[None], axis=2) + np.eye(len(starts))
@@ -214,11 +214,11 @@ def test_an_ensemble_without_a_solved_member_is_told(reach: tuple[Case, Observat
 
 
 def test_ends_of_the_search_are_counted_once() -> None:
-    def end(place: float, objective: float) -> Fitted:
+    def end(place: float, objective: float) -> MapEstimate:
         point = Point(np.array([place]), np.zeros(1), np.zeros((1, 1)), {})
-        return Fitted(point, objective, objective, np.eye(1), True)
+        return MapEstimate(point, objective, objective, np.eye(1))
 
-    found = distinct([end(2.5, 12.0), end(0.1, 10.1), end(0.0, 10.0), end(9.0, 80.0)])
+    found = distinct_modes([end(2.5, 12.0), end(0.1, 10.1), end(0.0, 10.0), end(9.0, 80.0)])
     assert [one.objective for one in found] == [10.0, 12.0]
 
 
@@ -230,35 +230,37 @@ def test_what_stands_out_is_standard_normal_otherwise(reach: tuple[Case, Observa
     noise = with_correlation(noise_of(observations.table), 0.4, 1.0)
     random = np.random.default_rng(1)
     clean = [
-        unexplained_residual(replace(noise, value=point.prediction + noise.lower @ random.normal(size=15)), point)
+        standardised_residual(replace(noise, value=point.prediction + noise.lower @ random.normal(size=15)), point)
         for _ in range(400)
     ]
     assert np.std(clean) == pytest.approx(1, abs=0.08)
     value = point.prediction.copy()
     value[4] += 0.1
-    assert np.argmax(np.abs(unexplained_residual(replace(noise, value=value), point))) == 4
+    assert np.argmax(np.abs(standardised_residual(replace(noise, value=value), point))) == 4
 
 
 def test_homogeneity_of_the_papers_table() -> None:
-    bed = alike(np.array([0.062, 0.098, 0.104]), np.array([0.007, 0.008, 0.010]))
+    bed = equal_values_test(np.array([0.062, 0.098, 0.104]), np.array([0.007, 0.008, 0.010]))
     assert bed[:2] == (pytest.approx(16.9, abs=0.05), 2)
-    assert alike(np.array([0.99, 2.70, 4.0]), np.array([0.28, 0.33, 0.44]))[0] == pytest.approx(37.6, abs=0.05)
-    assert alike(np.array([1.0, 1.2, np.nan]), np.array([0.1, 0.1, np.nan])) == (
+    assert equal_values_test(np.array([0.99, 2.70, 4.0]), np.array([0.28, 0.33, 0.44]))[0] == pytest.approx(
+        37.6, abs=0.05
+    )
+    assert equal_values_test(np.array([1.0, 1.2, np.nan]), np.array([0.1, 0.1, np.nan])) == (
         pytest.approx(2), 1, pytest.approx(scipy.stats.chi2.sf(2, 1)),
     )  # fmt: skip
-    assert math.isnan(alike(np.array([1.0, np.nan]), np.array([0.1, np.nan]))[0])
+    assert math.isnan(equal_values_test(np.array([1.0, np.nan]), np.array([0.1, np.nan]))[0])
 
 
 def test_the_prior_is_taken_off(reach: tuple[Case, Observations, Ensemble]) -> None:
     case = reach[0]
     likelihood, error = np.array([0.4, -0.3]), np.array([0.1, 0.9])
     variance = 1 / (1 + 1 / error**2)
-    value, own = told_by_data(case, likelihood * variance / error**2, variance)
+    value, own = without_prior(case, likelihood * variance / error**2, variance)
     exact = theta_at(case, likelihood)
     assert value[0] == pytest.approx(exact["n_b"][0], rel=1e-3)
     assert value[1] == pytest.approx(math.log10(exact["phi"][0]), abs=0.03)
     assert own[0] == pytest.approx(0.1 * 0.08 * scipy.stats.norm.pdf(0.4), rel=0.01)
-    assert np.isnan(told_by_data(case, np.zeros(2), np.array([0.1, 0.8]))[0]).tolist() == [False, True]
+    assert np.isnan(without_prior(case, np.zeros(2), np.array([0.1, 0.8]))[0]).tolist() == [False, True]
 
 
 TWO = (
@@ -304,7 +306,7 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
 )
 def test_what_is_said_of_experiments(refined: Posterior, apart: float, words: str) -> None:
     value, error = np.array([0.05, 0.05 + apart]), np.array([0.01, 0.008])
-    chi2, freedom, p = alike(value, error)
+    chi2, freedom, p = equal_values_test(value, error)
     found = Transfer(
         scale=1.0, gain=chi2, more=1, p_all=p, experiments=np.array(["June", "July"], object),
         value=np.column_stack([value, [1.0, np.nan]]), error=np.column_stack([error, [0.1, np.nan]]),
@@ -322,7 +324,7 @@ def test_what_is_said_of_experiments(refined: Posterior, apart: float, words: st
 def test_errors_of_one_experiment_are_those_of_all(reach: tuple[Case, Observations, Ensemble]) -> None:
     case, observations, _ = reach
     noise = with_correlation(noise_of(observations.table), 0.3, 1.2)
-    model, own = only(model_of(case, observations), noise, "June")
+    model, own = one_experiment(model_of(case, observations), noise, "June")
     assert own.lower @ own.lower.T == pytest.approx(covariance_of(noise))
     assert list(model.case.experiments) == ["June"]
 

@@ -14,7 +14,7 @@ from vegglue.effects.definition import Amplitude
 from vegglue.screening.family_wise_p import Family
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.residual_screening import Screening, screen
-from vegglue.screening.spatial_scan import Spots
+from vegglue.screening.spatial_scan import DragSpots
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 STATION = stations_of(CASE, ("A", "B"), 6)
@@ -26,17 +26,17 @@ def changes() -> tuple[Array, Array, Array]:
     """Slopes, fingerprints of effects and of spots (station, ...): what a standard deviation of each changes [m/s]."""
     random = np.random.default_rng(4)
     sizes = len(CASE.parameters), EFFECTS, SPOTS
-    slope, prints, traces = (0.02 * random.standard_normal((len(STATION), size)) for size in sizes)
-    return slope, prints, traces
+    slope, of_effects, of_spots = (0.02 * random.standard_normal((len(STATION), size)) for size in sizes)
+    return slope, of_effects, of_spots
 
 
 def screened(values: Array, effects: int = EFFECTS) -> Screening:
     """With the first so many effects to be tested."""
-    slope, prints, traces = changes()
+    slope, of_effects, of_spots = changes()
     base = at_best(CASE, STATION, values, slope)
-    spots = Spots(np.arange(SPOTS), np.arange(SPOTS), 1.0, traces)
+    spots = DragSpots(np.arange(SPOTS), np.arange(SPOTS), 1.0, of_spots)
     columns = [np.array([column]) for column in range(effects)]
-    tested = columns, [{}] * effects, AMPLITUDES[:effects], prints[:, :effects]
+    tested = columns, [{}] * effects, AMPLITUDES[:effects], of_effects[:, :effects]
     known = Fingerprints(base.fitted.point, [], *tested, spots)
     return screen(base, before=SimpleNamespace(fingerprints=known))
 

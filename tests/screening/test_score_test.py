@@ -17,9 +17,9 @@ def problem() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_calibration_takes_away_what_it_can_mimic(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    slopes, prints = problem
-    prints = np.column_stack([prints, slopes @ np.array([1.0, -2.0, 0.5])])
-    projected = score_test.project(100.0 * slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
+    slopes, fingerprints = problem
+    fingerprints = np.column_stack([fingerprints, slopes @ np.array([1.0, -2.0, 0.5])])
+    projected = score_test.project(100.0 * slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
     assert projected.visible[-1] < 0.01
     assert (projected.visible[:-1] > 0.8).all()
 
@@ -33,9 +33,9 @@ def test_a_prior_keeps_a_parameter_from_mimicking(problem: tuple[np.ndarray, np.
 
 
 def test_the_score_of_a_planted_effect_is_its_length(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    slopes, prints = problem
-    residual = 2.5 * prints[:, 3]
-    projected = score_test.project(slopes, residual, np.zeros(SLOPES), prints)
+    slopes, fingerprints = problem
+    residual = 2.5 * fingerprints[:, 3]
+    projected = score_test.project(slopes, residual, np.zeros(SLOPES), fingerprints)
     found = score_test.scores(projected, np.zeros(PRINTS, bool))
     assert int(np.argmax(np.abs(found))) == 3
     assert found[3] == pytest.approx(2.5 * projected.length[3])
@@ -43,8 +43,8 @@ def test_the_score_of_a_planted_effect_is_its_length(problem: tuple[np.ndarray, 
 
 
 def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    slopes, prints = problem
-    projected = score_test.project(slopes, -2.5 * prints[:, 3], np.zeros(SLOPES), prints)
+    slopes, fingerprints = problem
+    projected = score_test.project(slopes, -2.5 * fingerprints[:, 3], np.zeros(SLOPES), fingerprints)
     one_sided = np.zeros(PRINTS, bool)
     one_sided[3] = True
     assert score_test.scores(projected, one_sided)[3] == 0.0
@@ -54,15 +54,15 @@ def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.n
 def test_the_likeliest_rival_is_true_as_often_as_told(
     problem: tuple[np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Eight effects that look alike, traces without error, lengths from 3 to 9: told 0.79, true 0.81.
+    """Eight effects that look alike, fingerprints without error, lengths from 3 to 9: told 0.79, true 0.81.
 
     With half or twice the exponent 0.62 and 0.89 are told.
     """
-    monkeypatch.setattr(score_test, "TRACE_ERROR", 0.0)
-    slopes, prints = problem
+    monkeypatch.setattr(score_test, "FINGERPRINT_ERROR", 0.0)
+    slopes, fingerprints = problem
     random, tries = np.random.default_rng(12), 2000
-    prints = prints[:, :1] + 0.6 * prints
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
+    fingerprints = fingerprints[:, :1] + 0.6 * fingerprints
+    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
     told, right = 0.0, 0
     for _ in range(tries):
         true, length = int(random.integers(PRINTS)), random.uniform(3.0, 9.0)
@@ -73,7 +73,7 @@ def test_the_likeliest_rival_is_true_as_often_as_told(
 
 
 def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
-    """15 % of a trace of 40 standard errors are 6: a misfit 37 larger proves as little as 1 for a short one."""
+    """15 % of a fingerprint of 40 standard errors are 6: a misfit 37 larger proves as little as 1 for a short one."""
     assert score_test.chances_of_rivals(np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert score_test.chances_of_rivals(np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert score_test.chances_of_rivals(np.array([46.0, 9.0]))[1] < 1e-5
@@ -81,27 +81,27 @@ def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
 
 def test_the_fewest_groups_hold_what_is_asked() -> None:
     chance = np.array([0.5, 0.04, 0.3, 0.16])
-    assert score_test.fewest([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]
-    assert score_test.fewest([[3], [2], [0, 1]], chance, 0.6) == [[0, 1], [2]]
-    assert score_test.fewest([[0], [1], [2], [3]], chance, 0.95) == [[0], [2], [3]]
-    assert score_test.fewest([[0], [1], [2], [3]], chance, 0.97) == [[0], [2], [3], [1]]
+    assert score_test.fewest_groups([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]
+    assert score_test.fewest_groups([[3], [2], [0, 1]], chance, 0.6) == [[0, 1], [2]]
+    assert score_test.fewest_groups([[0], [1], [2], [3]], chance, 0.95) == [[0], [2], [3]]
+    assert score_test.fewest_groups([[0], [1], [2], [3]], chance, 0.97) == [[0], [2], [3], [1]]
 
 
 def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
     """One of six effects, the last of three shapes, is there, 3 standard errors long: sets hold it as often as said."""
-    slopes, prints = problem
+    slopes, fingerprints = problem
     random, family, tries = np.random.default_rng(2), [np.array([j]) for j in range(5)] + [np.array([5, 6, 7])], 800
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
-    may_be = np.array([[True] * PRINTS, [j % 2 == 0 for j in range(PRINTS)]])
-    ways = [[(sign, j) for j in columns for sign in (0, 1) if may_be[sign, j]] for columns in family]
+    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
+    allowed = np.array([[True] * PRINTS, [j % 2 == 0 for j in range(PRINTS)]])
+    ways = [[(sign, j) for j in columns for sign in (0, 1) if allowed[sign, j]] for columns in family]
     said, held, sizes = 0.0, 0, []
     for _ in range(tries):
         true = int(random.integers(len(family)))
         sign, column = ways[true][random.integers(len(ways[true]))]
         residual = (1 - 2 * sign) * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
         drawn = replace(projected, residual=residual)
-        chance = score_test.chances(drawn, family, may_be, 3.0)
-        kept = [j for group in score_test.likely(drawn, family, chance, 0.9) for j in group]
+        chance = score_test.chances(drawn, family, allowed, 3.0)
+        kept = [j for group in score_test.likeliest_families(drawn, family, chance, 0.9) for j in group]
         said, held = said + sum(chance[family[j]].sum() for j in kept), held + (true in kept)
         sizes.append(len(kept))
     assert held == pytest.approx(said, abs=4.0 * np.sqrt(0.09 * tries))
@@ -110,24 +110,24 @@ def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
 
 
 def test_without_a_score_all_that_may_be_are_as_likely(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    slopes, prints = problem
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints)
+    slopes, fingerprints = problem
+    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
     family = [np.arange(3), np.arange(3, 6), np.arange(6, PRINTS)]
-    may_be = np.ones((2, PRINTS), bool)
-    may_be[:, 6:] = False
-    chance = score_test.chances(projected, family, may_be, 3.0)
+    allowed = np.ones((2, PRINTS), bool)
+    allowed[:, 6:] = False
+    chance = score_test.chances(projected, family, allowed, 3.0)
     assert [chance[columns].sum() for columns in family] == pytest.approx([0.5, 0.5, 0.0])
-    assert score_test.likely(projected, family, chance, 0.9) == [[0], [1]]
-    assert score_test.likely(projected, [], np.zeros(0), 0.9) == []
+    assert score_test.likeliest_families(projected, family, chance, 0.9) == [[0], [1]]
+    assert score_test.likeliest_families(projected, [], np.zeros(0), 0.9) == []
 
 
 def test_what_looks_alike_shares_its_chances(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    """Two families with one trace hold 0.3 each and come before one with 0.4, in one group."""
-    slopes, prints = problem
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints[:, [0, 1, 0]])
+    """Two families with one fingerprint hold 0.3 each and come before one with 0.4, in one group."""
+    slopes, fingerprints = problem
+    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints[:, [0, 1, 0]])
     family = [np.array([j]) for j in range(3)]
-    assert score_test.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.55) == [[0, 2]]
-    assert score_test.likely(projected, family, np.array([0.3, 0.4, 0.3]), 0.9) == [[0, 2], [1]]
+    assert score_test.likeliest_families(projected, family, np.array([0.3, 0.4, 0.3]), 0.55) == [[0, 2]]
+    assert score_test.likeliest_families(projected, family, np.array([0.3, 0.4, 0.3]), 0.9) == [[0, 2], [1]]
 
 
 def test_names_with_one_trace_form_a_group() -> None:

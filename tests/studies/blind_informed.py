@@ -33,14 +33,16 @@ def informed(looks: list[Screening], signal: float, level: float) -> tuple[float
 def _sets(seen: Screening, signal: float, level: float, random: np.random.Generator) -> Array:
     """Whether the truth is in the set, and its groups, (data sets, 2); each effect that may be as long is hidden."""
     units, family = seen.projected.units, seen.fingerprints.columns
-    may_be = seen.possible_signs(signal, LARGEST_SIZE)
+    allowed = seen.possible_signs(signal, LARGEST_SIZE)
     found = []
     for true, columns in enumerate(family):
-        ways = [(sign, int(column)) for column in columns for sign in (0, 1) if may_be[sign, column]]
+        ways = [(sign, int(column)) for column in columns for sign in (0, 1) if allowed[sign, column]]
         for _ in range(DRAWS if ways else 0):
             sign, column = ways[random.integers(len(ways))]
             residual = (1 - 2 * sign) * signal * units[:, column] + random.standard_normal(len(units))
             drawn = replace(seen.projected, residual=residual)
-            kept = score_test.likely(drawn, family, score_test.chances(drawn, family, may_be, signal), level)
+            kept = score_test.likeliest_families(
+                drawn, family, score_test.chances(drawn, family, allowed, signal), level
+            )
             found.append((any(true in group for group in kept), len(kept)))
     return np.array(found, dtype=float)

@@ -8,7 +8,7 @@ from reach import said_to
 from vegglue.case.config import load_case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.measurements.observations import read_observations
-from vegglue.screening.candidates import at_work, candidates_of, with_effect
+from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.workflow.extend import write_child
 
 ROOT = Path(__file__).parents[2]
@@ -31,7 +31,7 @@ def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:
     every = candidates_of(case, station)
     assert {one.effect.each for one in every} >= {"case", "experiment", "section"}
     for one in every:
-        assert at_work(with_effect(case, one, {})) == {one.key: one}
+        assert candidates_in_case(with_effect(case, one, {})) == {one.key: one}
         assert candidate_named(case, station, one.name) == one
 
 

@@ -1,4 +1,4 @@
-"""A model brought to its best place: the errors of the data, least squares with exact slopes, the error of the grid.
+"""The calibration of a model: the covariance of the errors, least squares with exact slopes, the error of the grid.
 
 May import: case, site, measurements, engine.
 Open first: noise.py, fit.py.

@@ -1,6 +1,9 @@
-"""The best place of a prior: maximum a posteriori by least squares with exact slopes.
+"""The maximum a posteriori (MAP) estimate of the parameters, by damped least squares with exact slopes.
 
-minimise |W (y - f(z))|^2 + |z|^2,   W' W the inverse covariance of the errors
+    minimise |W (y - f(z))|^2 + |z|^2,   W' W = cov^-1
+
+y are the measurements, f the predictions and cov the covariance of the errors. z are the parameters on the scale on
+which their prior is standard normal.
 """
 
 from dataclasses import dataclass
@@ -12,43 +15,47 @@ from vegglue.calibration.noise import Noise
 from vegglue.case.parameter_space import FURTHEST, theta_at
 from vegglue.engine.interface import Model, Point, linearise
 
-# A step that promises less than this improvement of the misfit ends the search.
-SETTLED = 0.02
+# Predicted decrease of the objective [-] below which the search ends: the point is then within sqrt(0.02) = 0.14
+# standard errors of the minimum. Chosen, not measured: a smaller one costs more runs of the model.
+NEGLIGIBLE_DECREASE = 0.02
+# Steps of one search at most. Chosen, not measured: each is a run of the model.
 MOST_STEPS = 14
-# Longest step [standard deviations of the prior].
+# Longest step in any z [standard deviations of the prior]. Chosen, not measured: longer ones leave the range in which
+# the slopes hold and are taken back, shorter ones are many.
 LONGEST_FIT_STEP = 1.5
-# Added to the curvature, in that of the prior, until a step is short enough: what the data determine well stays free.
+# Levenberg's damping, over the curvature of the prior [-], raised until a step is short enough. The factor of 1.8 from
+# one to the next is chosen: it sets how closely a step keeps to its longest length.
 DAMPINGS = (0.0, *np.geomspace(1e-2, 1e10, 49))
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """Where a search ended: a point, |W (y - f)|^2, the same with the prior's |z|^2, and the covariance of z (p, p)."""
+class MapEstimate:
+    """A point, its chi2 = |W (y - f)|^2 and objective = chi2 + |z|^2 [-], and the covariance of z around it (p, p)."""
 
     point: Point
     chi2: float
     objective: float
     covariance: Array
-    settled: bool
 
 
-def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> Fitted:
-    """From a point downhill, as far as the slopes can be trusted (More 1978, doi:10.1007/BFb0067700), until no step
-    promises to help.
+def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> MapEstimate:
+    """The MAP estimate, searched from a point by Levenberg-Marquardt steps (More 1978, doi:10.1007/BFb0067700).
+
+    The longest step shrinks where the slopes predict the decrease badly. The search ends when the predicted decrease is
+    below NEGLIGIBLE_DECREASE, or after `steps`.
     """
-    point, longest, settled = start, LONGEST_FIT_STEP, False
+    point, longest = start, LONGEST_FIT_STEP
     for _ in range(steps):
-        step, promised = _step(noise, point, longest)
-        settled = promised < SETTLED
-        if settled:
+        step, predicted = _step(noise, point, longest)
+        if predicted < NEGLIGIBLE_DECREASE:
             break
         moved = linearise(model, point.z + step, point)
-        gained = -np.inf if moved is None else objective(noise, point) - objective(noise, moved)
+        decrease = -np.inf if moved is None else objective(noise, point) - objective(noise, moved)
         length = float(np.abs(step).max())
-        longest = length / 4.0 if gained < promised / 4.0 else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
-        if moved is not None and gained > 0.0:
+        longest = length / 4.0 if decrease < predicted / 4.0 else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
+        if moved is not None and decrease > 0.0:
             point = moved
-    return Fitted(point, chi2(noise, point), objective(noise, point), covariance(noise, point), settled)
+    return MapEstimate(point, chi2(noise, point), objective(noise, point), covariance(noise, point))
 
 
 def chi2(noise: Noise, point: Point) -> float:
@@ -62,13 +69,13 @@ def objective(noise: Noise, point: Point) -> float:
 
 
 def covariance(noise: Noise, point: Point) -> Array:
-    """(J' W' W J + I)^-1, of z around the best place (p, p)."""
+    """(J' W' W J + I)^-1 (p, p): the covariance of z around a MAP estimate, J = df/dz."""
     slope = noise.whiten(noise.used(point.slope))
     return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
 
 
-def interval95(model: Model, fitted: Fitted, name: str) -> tuple[float, float, float]:
-    """The best value of a parameter and the ends of its 95 % interval, from the covariance of z, in its own unit."""
+def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, float, float]:
+    """theta(z_j) and theta(z_j -/+ 1.96 s_j) of a parameter, in its unit, s_j^2 the variance of z_j."""
     j = model.names.index(name)
     z = np.repeat(fitted.point.z[None], 3, axis=0)
     z[:, j] += 1.96 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
@@ -77,11 +84,11 @@ def interval95(model: Model, fitted: Fitted, name: str) -> tuple[float, float, f
 
 
 def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:
-    """The step (Levenberg 1944), damped until it is no longer than `longest`, and what it should gain."""
+    """The step (p,) (Levenberg 1944), damped until no longer than `longest`, and the predicted decrease."""
     slope = noise.whiten(noise.used(point.slope))
-    left = noise.whiten(noise.residual(point.prediction))
-    matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ left - point.z
-    # Further out nothing changes any more: what would go there is held, and does not keep the others back.
+    residual = noise.whiten(noise.residual(point.prediction))
+    matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
+    # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
     held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
     matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
     for damping in DAMPINGS:

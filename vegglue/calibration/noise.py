@@ -1,9 +1,13 @@
-"""What a residual may be without anything missing: errors of the data, correlated along a section, and of the grid.
+"""The covariance of the errors: those of the measurements, correlated along a section, and those of the grid.
 
-cov = s^2 D R D + E,   R_ij = rho^(d_ij / d) within a section of an experiment, E the error of discretisation,
-E_ij = (c + (1 - c) 1_ij) g_i g_j, c the share that all stations have in common
+    cov = s^2 D R D + E,   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
+
+D are the standard errors of the measurements and s their scale. rho is the correlation of neighbours in a section, d
+their usual spacing and d_ij the distance between stations i and j. R_ij is 0 between sections, experiments and kinds.
+g is the error of discretisation and c its correlation between two stations.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -15,38 +19,42 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of
 
-# How much of the difference between a grid and one of twice its size is taken as the error of the finer one [-]:
-# 1/(2^p - 1) for an order p between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to
-# open-f are the same and amplitudes move by 1.5 %; with 0 something is found where nothing is hidden.
-OF_DIFFERENCE = 0.6
-# Share of that error which all stations have in common: where one grid is too fast, the misfit looks as its difference
-# to another grid does, and is no evidence of anything missing.
-COMMON = 0.5
-# Difference of twice the log-likelihood above which stated errors count as too small (1 % of chi2 with one degree).
-TOO_SMALL = 6.6
-# Correlations, and sizes of what else there is, from the best of which the search for the likeliest begins.
-RHO, SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
-# Correlations among which the doubt about it is spread, and how likely none is before the data have spoken: as some.
-CORRELATIONS, NONE = np.linspace(0.05, 0.95, 19), 0.5
+# Error of the grid over the difference of predictions to a grid of twice the cell size [-]: 1/(2^p - 1) for an order p
+# between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to open-f are the same and
+# amplitudes move by 1.5 %; with 0 something is found where nothing is hidden.
+GRID_ERROR_SHARE = 0.6
+# Correlation c of that error between two stations [-]. It is above 0 because a grid that is too fast is so everywhere:
+# the misfit then looks like the difference to another grid, and is no evidence of a missing effect. It is below 1
+# because the difference is not known exactly. Chosen, not measured: a higher one hides effects of that pattern.
+GRID_ERROR_CORRELATION = 0.5
+# Rise of twice the log-likelihood with a free scale s, above which stated errors count as too small [-]: the 99 % point
+# of chi2 with one degree of freedom.
+SCALE_EVIDENCE = 6.6
+# Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
+# Chosen, not measured: more pairs cost time and guard against a local maximum.
+START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
+# Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
+# decide between some correlation and none. Chosen, not measured: closer levels only cost time.
+CORRELATION_LEVELS, UNCORRELATED_CHANCE = np.linspace(0.05, 0.95, 19), 0.5
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Errors of the used stations `rows` (n,): values (n,), standard errors (n,), places, and the covariance (n, n)."""
+    """Measured values of the n used stations and the covariance of their errors, see the head of this file."""
 
-    rows: np.ndarray
-    value: Array
-    error: Array
-    apart: Array  # |y_i - y_j| over the usual spacing, infinite between sections (n, n)
-    grid: Array  # error of the grid (n,), zero when unknown
-    common: float  # share of the grid's error that all stations have in common
-    correlation: float
-    scale: float
-    lower: Array  # Cholesky factor of the covariance
-    doubt: Array  # correlations that the residual leaves open, and the chance of each (2, k)
+    rows: np.ndarray  # of the used stations among all (n,)
+    value: Array  # measured (n,) [m/s or m]
+    error: Array  # standard errors as stated (n,) [m/s or m]
+    separation: Array  # d_ij / d (n, n) [-], infinite between sections
+    grid_error: Array  # g (n,) [m/s or m], zero when unknown
+    grid_correlation: float  # c [-]
+    correlation: float  # rho [-]
+    scale: float  # s [-]
+    lower: Array  # lower Cholesky factor of the covariance (n, n)
+    correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
 
     def used(self, values: Array) -> Array:
-        """Rows of the used stations, of (station, ...)."""
+        """The rows of the used stations (n, ...) of values of all stations (station, ...)."""
         return values[self.rows]
 
     def among_all(self, values: Array, stations: int) -> Array:
@@ -56,8 +64,8 @@ class Noise:
         return wide
 
     @property
-    def of_data(self) -> Array:
-        """Standard errors of the data (n,), made larger where they look too small."""
+    def data_error(self) -> Array:
+        """s times the stated standard errors (n,) [m/s or m]."""
         return self.scale * self.error
 
     def residual(self, prediction: Array) -> Array:
@@ -65,12 +73,12 @@ class Noise:
         return self.value - prediction[self.rows]
 
     def whiten(self, values: Array) -> Array:
-        """W values: errors become independent and of size one; (n, ...)."""
+        """W values (n, ...) [-], W = L^-1 with cov = L L': whitened errors are independent and standard normal."""
         return np.asarray(scipy.linalg.solve_triangular(self.lower, values, lower=True))
 
 
 def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) -> Noise:
-    """Independent errors as stated in the data; fallback: by kind, where a station states none.
+    """Independent errors as stated in the data; fallback: standard errors by kind, for stations that state none.
 
     Errors: InputError when a used station has neither.
     """
@@ -90,46 +98,50 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     zero = np.zeros(len(used))
     rows = np.flatnonzero(station["used"].to_numpy(bool))
     value = used["value"].to_numpy(float)
-    known = np.array([[0.0], [1.0]])
-    return _factored(Noise(rows, value, error, _apart(used), zero, COMMON, 0.0, 1.0, np.diag(error), known))
+    certain = np.array([[0.0], [1.0]])
+    return _with_cholesky(
+        Noise(rows, value, error, _separation(used), zero, GRID_ERROR_CORRELATION, 0.0, 1.0, np.diag(error), certain)
+    )
 
 
 def with_grid_error(noise: Noise, difference: Array) -> Noise:
-    """The same with the error of discretisation, from the difference (station,) to a grid of twice the cell size."""
-    return _factored(replace(noise, grid=OF_DIFFERENCE * difference[noise.rows]))
+    """The noise with g = GRID_ERROR_SHARE difference (station,), that of predictions to cells of twice the size."""
+    return _with_cholesky(replace(noise, grid_error=GRID_ERROR_SHARE * difference[noise.rows]))
 
 
-def scattered(noise: Noise) -> Noise:
-    """The same with an error of the grid that is each station's own: for predictions on that very grid.
+def with_independent_grid_errors(noise: Noise) -> Noise:
+    """The noise with c = 0, for a fit that is to predict on its own grid.
 
-    A common one leaves the fit free to shift all stations as a finer grid would, and with them all it predicts.
+    With c > 0 the fit may shift all stations as a finer grid would, and then shifts what it predicts elsewhere.
     """
-    return _factored(replace(noise, common=0.0))
+    return _with_cholesky(replace(noise, grid_correlation=0.0))
 
 
 def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
-    known = np.array([[correlation], [1.0]])
-    return _factored(replace(noise, correlation=correlation, scale=scale, doubt=known))
+    """The noise with rho and s given [-], and no uncertainty of rho."""
+    certain = np.array([[correlation], [1.0]])
+    return _with_cholesky(replace(noise, correlation=correlation, scale=scale, correlation_chances=certain))
 
 
-def discounted(noise: Noise, outliers: np.ndarray) -> Noise:
-    """The same, but stations `outliers` (places among the used ones) count for next to nothing."""
+def downweight_outliers(noise: Noise, outliers: np.ndarray) -> Noise:
+    """The noise with standard errors 1,000 times as large at `outliers`, indices among the used stations."""
     error = noise.error.copy()
     error[outliers] = 1e3 * noise.error[outliers]
-    return _factored(replace(noise, error=error))
+    return _with_cholesky(replace(noise, error=error))
 
 
-def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
-    """Correlation and scale of the errors by the likelihood of the residual `left` (n,), physics set aside.
+def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
+    """rho and s of the errors by maximum likelihood of the residual r (n,), measured minus predicted.
 
-        left ~ N(0, cov(rho, s) + t^2 F F')
+        r ~ N(0, cov(rho, s) + t^2 F F')
 
-    with F (n, k) all that calibration and missing effects could do to the predictions: what is smooth in that way is
-    not taken for noise. rho >= 0; s only when the stated errors are too small beyond doubt.
+    systematic: F (n, k), changes of the predictions that calibration and missing effects could make, each of plausible
+    size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only when
+    the likelihood rejects the stated errors at 1 %.
     """
-    cost = _cost_of(noise, left, explained)
-    begin = [(cost(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho in RHO for t in SIZES]
-    _, *start = min(begin)
+    deviance = _deviance_of(noise, residual, systematic)
+    pairs = itertools.product(START_CORRELATIONS, START_SIZES)
+    _, *start = min((deviance(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho, t in pairs)
 
     def best(scale_free: bool) -> tuple[float, float, float, float]:
         def unfold(x: Array) -> tuple[float, float, float]:
@@ -137,7 +149,7 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
             return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
 
         end = scipy.optimize.minimize(
-            lambda x: cost(*unfold(x)),
+            lambda x: deviance(*unfold(x)),
             np.array([*start, 0.0][: 3 if scale_free else 2]),
             method="Nelder-Mead",
             options={"xatol": 0.02, "fatol": 0.02},
@@ -145,67 +157,69 @@ def estimated(noise: Noise, left: Array, explained: Array) -> Noise:
         return float(end.fun), *unfold(end.x)
 
     fixed, free = best(False), best(True)
-    _, rho, scale, log_t = free if fixed[0] - free[0] > TOO_SMALL and free[2] > 1.0 else fixed
+    _, rho, scale, log_t = free if fixed[0] - free[0] > SCALE_EVIDENCE and free[2] > 1.0 else fixed
     found = with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
-    return replace(found, doubt=_doubt(lambda level: cost(level, scale, log_t)))
+    return replace(found, correlation_chances=_correlation_chances(lambda level: deviance(level, scale, log_t)))
 
 
-def _cost_of(noise: Noise, left: Array, explained: Array) -> Callable[[float, float, float], float]:
-    """-2 log-likelihood of rho, s and ln t, but for a constant."""
-    gram = explained @ explained.T
+def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:
+    """-2 ln likelihood (rho, s, ln t) up to a constant."""
+    gram = systematic @ systematic.T
 
-    def cost(rho: float, scale: float, log_t: float) -> float:
+    def deviance(rho: float, scale: float, log_t: float) -> float:
         covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
         factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
-        return float(2.0 * np.log(np.diag(factor)).sum() + left @ scipy.linalg.cho_solve((factor, lower), left))
+        return float(2.0 * np.log(np.diag(factor)).sum() + residual @ scipy.linalg.cho_solve((factor, lower), residual))
 
-    return cost
+    return deviance
 
 
-def _doubt(cost: Callable[[float], float]) -> Array:
-    """Correlations, none among them, and how likely each is (2, k); cost: -2 log-likelihood of one."""
-    levels = np.concatenate([[0.0], CORRELATIONS])
-    costs = np.array([cost(float(level)) for level in levels])
-    before = np.where(levels == 0.0, NONE, (1.0 - NONE) / CORRELATIONS.size)
-    chance = before * np.exp(-0.5 * (costs - costs.min()))
+def _correlation_chances(deviance: Callable[[float], float]) -> Array:
+    """Values of rho, 0 the first, and the posterior probability of each (2, k); deviance: rho -> -2 ln likelihood."""
+    levels = np.concatenate([[0.0], CORRELATION_LEVELS])
+    costs = np.array([deviance(float(level)) for level in levels])
+    prior = np.where(levels == 0.0, UNCORRELATED_CHANCE, (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size)
+    chance = prior * np.exp(-0.5 * (costs - costs.min()))
     return np.stack([levels, chance / chance.sum()])
 
 
-def drawn_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
-    """Whitened errors (draws, n) whose correlation is one of those left open, as likely as it is.
+def draw_whitened_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
+    """Whitened errors W e (draws, n) [-], e ~ N(0, cov(rho)), rho drawn from its posterior probabilities.
 
-    Independent and of size one only when the correlation is beyond doubt.
+    They are independent and standard normal only when rho is certain.
     """
     parts = []
-    for level, many in zip(noise.doubt[0], random.multinomial(draws, noise.doubt[1]), strict=True):
-        lower = _factored(replace(noise, correlation=float(level))).lower
-        parts.append(random.standard_normal((many, noise.rows.size)) @ noise.whiten(lower).T)
+    levels, chances = noise.correlation_chances
+    for level, count in zip(levels, random.multinomial(draws, chances), strict=True):
+        lower = _with_cholesky(replace(noise, correlation=float(level))).lower
+        parts.append(random.standard_normal((count, noise.rows.size)) @ noise.whiten(lower).T)
     return np.concatenate(parts)
 
 
-def _factored(noise: Noise) -> Noise:
+def _with_cholesky(noise: Noise) -> Noise:
     return replace(noise, lower=np.asarray(np.linalg.cholesky(covariance_of(noise))))
 
 
 def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E of the used stations (n, n)."""
-    related = np.eye(noise.rows.size) if noise.correlation == 0.0 else np.exp(noise.apart * np.log(noise.correlation))
-    covariance = noise.scale**2 * related * np.outer(noise.error, noise.error)
-    common = noise.common * np.outer(noise.grid, noise.grid)
-    return np.asarray(covariance + common + np.diag((1.0 - noise.common) * noise.grid**2))
+    rho, size = noise.correlation, noise.rows.size
+    correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
+    covariance = noise.scale**2 * correlations * np.outer(noise.error, noise.error)
+    shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
+    return np.asarray(covariance + shared + np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2))
 
 
-def _apart(used: pd.DataFrame) -> Array:
-    """Distances along each section in units of the spacing of its stations; infinite across sections and kinds, and
-    where errors of neighbours are not correlated.
+def _separation(used: pd.DataFrame) -> Array:
+    """d_ij / d (n, n) [-]: distance over the median spacing of a section; infinite between sections and kinds, and for
+    kinds whose errors are not correlated.
     """
-    apart = np.full((len(used), len(used)), np.inf)
-    np.fill_diagonal(apart, 0.0)
+    separation = np.full((len(used), len(used)), np.inf)
+    np.fill_diagonal(separation, 0.0)
     correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
     keys = used[["experiment", "section", "kind"]].astype(str).agg("\n".join, axis=1).to_numpy()
     for key in np.unique(keys[correlated]):
         here = np.flatnonzero(keys == key)
         y = used["y"].to_numpy(float)[here]
         spacing = np.median(np.diff(np.sort(y))) if here.size > 1 else 1.0
-        apart[np.ix_(here, here)] = np.abs(y[:, None] - y[None]) / max(spacing, 1e-9)
-    return apart
+        separation[np.ix_(here, here)] = np.abs(y[:, None] - y[None]) / max(spacing, 1e-9)
+    return separation

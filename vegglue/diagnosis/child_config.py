@@ -13,7 +13,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.screening.candidates import Candidate, places_of, prior_of, working_of
+from vegglue.screening.candidates import Candidate, effect_entry, prior_of, where_it_may_act
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -27,7 +27,7 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
         raise InputError(f"--add: `{name}` is not an effect of the library: {nearest(name.split('[')[0], known)}")
     effect = known[found[1]]
     where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
-    places = places_of(case, station)
+    places = where_it_may_act(case, station)
     kind = next((kind for kind, names in places.items() if where and set(where) <= set(names)), None)
     if where and (kind is None or (kind in ("section", "device") and effect.stage != "sensor")):
         raise InputError(
@@ -55,7 +55,7 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
         if unknown:
             names = [shape.name for shape in candidate.effect.shapes]
             raise InputError(f"--shape: `{min(unknown)}` is not a shape of {candidate.name}: it has {names or 'none'}.")
-        working = working_of(candidate, candidate.parameter, shapes)
+        working = effect_entry(candidate, candidate.parameter, shapes)
         tree["effects"][candidate.key] = working.model_dump(mode="json", exclude_defaults=True)
         prior = prior_of(candidate.effect).model_dump(exclude_none=True, exclude={"symbol"})
         tree["parameters"][candidate.parameter] = prior

@@ -17,7 +17,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
-from vegglue.inference.homogeneity import alike, told_by_data
+from vegglue.inference.homogeneity import equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 
@@ -149,9 +149,9 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     told = []
     for experiment in dict.fromkeys(names):
         step, spread = _step(noise, slope, left, point.z, np.flatnonzero(names == experiment))
-        told.append(told_by_data(base.model.case, point.z + step, np.diag(spread)))
+        told.append(without_prior(base.model.case, point.z + step, np.diag(spread)))
     value, error = (np.array(part) for part in zip(*told, strict=True))
-    chances = {name: alike(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
+    chances = {name: equal_values_test(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
     return {name: p for name, p in chances.items() if np.isfinite(p)}
 
 

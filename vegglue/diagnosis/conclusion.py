@@ -65,7 +65,7 @@ def concluded(first: Screening, last: Screening, steps: Sequence[Step], suspects
             station=before.model.station,
             first=before.fitted.point.prediction,
             last=base.fitted.point.prediction,
-            error=base.noise.among_all(base.noise.of_data, len(base.model.station)),
+            error=base.noise.among_all(base.noise.data_error, len(base.model.station)),
         ),
         drag_map=_drag_map(last if still == "drag" else first),  # a location is found in what the steps leave
     )
@@ -92,7 +92,7 @@ def _misfit(first: Screening, last: Screening) -> Misfit:
 def _errors(screening: Screening) -> EstimatedErrors:
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in screening.flagged)
-    return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid), flagged)
+    return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid_error), flagged)
 
 
 def _first_screening(screening: Screening) -> FirstScreening:
@@ -111,7 +111,7 @@ def _drag_location(screening: Screening) -> DragLocation:
     family, spots, noise = screening.spots, screening.fingerprints.spots, screening.base.noise
     best = family.best
     drag = float(family.scores[best] / max(family.length[best], 1e-300))
-    white = noise.whiten(noise.used(spots.traces[:, best : best + 1]))[:, 0] ** 2
+    white = noise.whiten(noise.used(spots.fingerprints[:, best : best + 1]))[:, 0] ** 2
     names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
     share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
     pointing = tuple(name for name, part in share.items() if part > POINTS_AT_IT)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from vegglue.calibration.fit import fit
-from vegglue.calibration.noise import discounted
+from vegglue.calibration.noise import downweight_outliers
 from vegglue.progress import Say
 from vegglue.results.diagnosis import Step
 from vegglue.screening.residual_screening import Screening, screen
@@ -54,7 +54,7 @@ def without_outliers(screening: Screening, steps: Sequence[Step], say: Say) -> S
     while detected(screening, steps) == "outlier" and len(screening.flagged) < MOST_OUTLIERS:
         say("setting a station aside")
         station, base = screening.stations.best, screening.base
-        noise = discounted(base.noise, np.array([station]))
+        noise = downweight_outliers(base.noise, np.array([station]))
         base = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
         screening = screen(base, (*screening.flagged, station), screening)
     return screening

@@ -29,7 +29,7 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
             "section": [_section(kind, str(name)) for kind, name in zip(kinds, used["section"], strict=True)],
             "zone": _zones(model, used, kinds),
             "left": noise.residual(point.prediction),
-            "error": noise.of_data,
+            "error": noise.data_error,
         }
     )
     rows = []

@@ -183,7 +183,7 @@ def _plain(one: Experiment) -> bool:
 
 def _errors(station: pd.DataFrame, noise: Noise) -> Array:
     """Errors of measurements at hand, and those to come: as good as the usual one of their kind."""
-    errors = noise.among_all(noise.of_data, len(station))
+    errors = noise.among_all(noise.data_error, len(station))
     kinds = station["kind"].to_numpy()
     for kind in dict.fromkeys(kinds):
         known = errors[(kinds == kind) & np.isfinite(errors)]

@@ -10,7 +10,7 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, search_model
-from vegglue.calibration.fit import Fitted, chi2, fit, interval95, objective
+from vegglue.calibration.fit import MapEstimate, chi2, fit, interval95, objective
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -18,7 +18,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.parallel import in_threads
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, at_work, with_effect
+from vegglue.screening.candidates import Candidate, candidates_in_case, with_effect
 from vegglue.screening.residual_screening import Screening, refit_start
 
 # Suspects that are refitted in one round, and steps each of them may take.
@@ -39,7 +39,7 @@ class Refit:
 
     candidate: Candidate
     column: int
-    fitted: Fitted
+    fitted: MapEstimate
     amplitude: float
     interval95: tuple[float, float]
 
@@ -93,7 +93,7 @@ def rivals_among(
     chance = score_test.chances_of_rivals(fall)
     near = chance >= HARDLY * chance.max()
     alike = np.where(near & near[:, None], cosine[np.ix_(columns, columns)], 0.0)
-    kept = score_test.fewest(score_test.alike_groups(range(len(refits)), alike), chance, IN_SET)
+    kept = score_test.fewest_groups(score_test.alike_groups(range(len(refits)), alike), chance, IN_SET)
     likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
@@ -149,7 +149,7 @@ def pruned(base: Baseline, earlier: list[str], say: Callable[[str], None]) -> tu
     """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
     unneeded: list[str] = []
     for name in earlier:
-        one = next(one for one in at_work(base.model.case).values() if one.name == name)
+        one = next(one for one in candidates_in_case(base.model.case).values() if one.name == name)
         j = base.model.names.index(one.parameter)
         spread = float(np.sqrt(base.fitted.covariance[j, j]))
         off = z_of(base.model.case.parameters[one.parameter], one.effect.amplitude.off)

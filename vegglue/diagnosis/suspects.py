@@ -36,7 +36,7 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     names = [one.name for one in screening.fingerprints.candidates]
     possible = screening.possible_signs(UNDETECTED_LENGTH, LARGEST_POSSIBLE)
     chance = score_test.chances(screening.projected, families, possible, UNDETECTED_LENGTH)
-    groups = score_test.likely(screening.projected, families, chance, NOT_EXCLUDED_CHANCE)
+    groups = score_test.likeliest_families(screening.projected, families, chance, NOT_EXCLUDED_CHANCE)
     return tuple(tuple(names[j] for j in group) for group in groups)
 
 
@@ -91,7 +91,7 @@ def _confounder(screening: Screening, column: int) -> tuple[str, float]:
     names = screening.base.model.names
     if not names:
         return "", 0.0
-    cosines = _unit(screening.prints[:, column]) @ _unit(screening.slopes)
+    cosines = _unit(screening.whitened_fingerprints[:, column]) @ _unit(screening.whitened_slopes)
     nearest = int(np.argmax(np.abs(cosines)))
     return names[nearest], float(cosines[nearest])
 

@@ -63,10 +63,10 @@ class Amplitude:
         """The value that has this gain, or the nearest one in the support."""
         return float(np.clip(self.off + self.size(gain), self.low, self.high))
 
-    def may_be(self, gain: float, most: float) -> bool:
-        """Whether the value that has this gain lies in the support, and within `most` times the scale of off."""
+    def allows(self, gain: float, largest: float) -> bool:
+        """Whether the value of that gain lies within the support and no further from off than `largest` times scale."""
         value = self.off + self.size(gain)
-        return self.low <= value <= self.high and abs(value - self.off) <= most * self.scale
+        return self.low <= value <= self.high and abs(value - self.off) <= largest * self.scale
 
     @property
     def small(self) -> float:
@@ -75,7 +75,7 @@ class Amplitude:
         return step if self.off + step <= self.high else -step
 
     @property
-    def plausible(self) -> float:
+    def plausible_gain(self) -> float:
         """scale^power, the gain of a plausible size."""
         return self.scale**self.power
 

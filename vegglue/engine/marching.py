@@ -24,10 +24,11 @@ from vegglue.flow.sensor import read_sensors
 from vegglue.site.channel_geometry import channel_geometry
 from vegglue.solver.march import march
 
-# A flow rests when no level or velocity changes faster than this [m/s, m/s2]; it is looked at every so many steps.
-AT_REST, BETWEEN_LOOKS = 1e-9, 100
+# A flow rests when no level or velocity changes faster than this [m/s, m/s2]; this is
+# checked every so many steps. Chosen, not measured: a smaller rate marches for longer.
+REST_RATE, STEPS_BETWEEN_CHECKS = 1e-9, 100
 # Central differences in z; the force [m/s2] of a response, a hundredth of what drives water down a slope of 1 in 1,000.
-MARCHED_STEP, SMALL_FORCE = 0.02, 1e-4
+MARCHED_DIFFERENCE_STEP, SMALL_FORCE = 0.02, 1e-4
 
 
 def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
@@ -44,7 +45,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
 
 def _linearised(model: Model, z: Array, near: Point | None, time_step: float, longest: float) -> Point | None:
     """All members of the central differences are marched side by side, the first of them at z itself."""
-    steps = MARCHED_STEP * np.eye(z.size)
+    steps = MARCHED_DIFFERENCE_STEP * np.eye(z.size)
     members = np.vstack([z[None], z + steps, z - steps])
     prediction = np.full((len(members), len(model.station)), np.nan)
     flows = {}
@@ -56,7 +57,7 @@ def _linearised(model: Model, z: Array, near: Point | None, time_step: float, lo
     if not np.isfinite(prediction).all():
         return None
     ahead, behind = prediction[1 : 1 + z.size], prediction[1 + z.size :]
-    return Point(z, prediction[0], (ahead - behind).T / (2.0 * MARCHED_STEP), flows)
+    return Point(z, prediction[0], (ahead - behind).T / (2.0 * MARCHED_DIFFERENCE_STEP), flows)
 
 
 def _predicted(model: Model, points: Sequence[Point], z: Array, time_step: float, longest: float) -> Array:
@@ -119,13 +120,13 @@ def _start(problem: Problem, near: Point | None, experiment: str) -> Array:
 
 def _rested(problem: Problem, state: Array, time_step: float, longest: float) -> Array:
     """States (nx, 3, ny, m) marched until all rest; NaN where a member does not."""
-    for _ in range(int(longest / (time_step * BETWEEN_LOOKS))):
-        before = march(problem, state, time_step, BETWEEN_LOOKS)
+    for _ in range(int(longest / (time_step * STEPS_BETWEEN_CHECKS))):
+        before = march(problem, state, time_step, STEPS_BETWEEN_CHECKS)
         state = march(problem, before, time_step, 1)
         rate = np.abs(state - before).max(axis=(0, 1, 2)) / time_step
-        if (rate < AT_REST).all():
+        if (rate < REST_RATE).all():
             return state
-    return np.where(rate < AT_REST, state, np.nan)
+    return np.where(rate < REST_RATE, state, np.nan)
 
 
 def _read(model: Model, experiment: str, problem: Problem, state: Array) -> Array:

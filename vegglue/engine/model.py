@@ -9,10 +9,10 @@ from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import build_site
 from vegglue.site.zones import ranges_without_cells
 
-# A coarser grid has at least so many cells along and across: below, a section is hardly resolved.
+# Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.
 FEWEST_CELLS = 6
 # Length over width of cells above which a coarser grid has wider ones only: across the flow is where the error is.
-LONG = 2.0
+LONG_CELL = 2.0
 
 
 def model_of(case: Case, observations: Observations, engine: Engine = NEWTON) -> Model:
@@ -26,7 +26,7 @@ def coarser(model: Model) -> Model | None:
     None where their number is odd or would become too small, or an inflow or the outlet would hold no cell centre.
     """
     grid = model.site.grid
-    along = 1 if grid.dx > LONG * grid.dy else 2
+    along = 1 if grid.dx > LONG_CELL * grid.dy else 2
     if grid.x.size % along or grid.y.size % 2 or min(grid.x.size / along, grid.y.size / 2) < FEWEST_CELLS:
         return None
     cell = (along * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])

@@ -12,13 +12,15 @@ import numpy as np
 
 from vegglue.arrays import Array
 
+# Degree of the polynomial at most. Chosen, not measured: coefficients grow as p^4 / 24, and each needs runs.
 HIGHEST_DEGREE = 4
-# At least; a polynomial through fewer would follow single runs.
+# Least runs for each coefficient. Chosen, not measured: a polynomial through fewer would follow single runs.
 RUNS_PER_COEFFICIENT = 2.0
-# Relative to the mean square of a term: keeps the normal equations solvable where runs leave a term undetermined.
+# Ridge over the mean square of a term [-]: keeps the normal equations solvable where runs leave a term undetermined.
 RIDGE = 1e-6
-# Log density below that of the best run [per parameter] at which the root of a run's weight has fallen to a half.
-HALF_WEIGHT_AT = 5.0
+# Fall of the log density below the best run [per parameter] at which the root of a run's weight is a half. Chosen, not
+# measured: a smaller one fits the mode more closely and the tails less.
+HALF_WEIGHT_DROP = 5.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Emulator:
 def fit_emulator(z: Array, values: Array, log_density: Array, centre: Array, lower: Array) -> Emulator:
     """Weighted least squares through the runs z (m, p) -> values (m, n), of the highest degree that they determine.
 
-    weight = (1 + (max l - l) / (HALF_WEIGHT_AT p))^-2 with l the log density of each run (m,): the fit is best where
+    weight = (1 + (max l - l) / (HALF_WEIGHT_DROP p))^-2 with l the log density of each run (m,): the fit is best where
     the posterior is. centre (p,), lower (p, p): u = lower^-1 (z - centre) are the variables of the polynomial.
     """
     known = np.isfinite(log_density)
@@ -52,7 +54,7 @@ def fit_emulator(z: Array, values: Array, log_density: Array, centre: Array, low
         for chosen in combinations_with_replacement(range(p), d)
     )
     terms = _terms(_standard(z, centre, lower), powers)
-    weight = 1.0 / (1.0 + (log_density.max() - log_density) / (HALF_WEIGHT_AT * p)) ** 2
+    weight = 1.0 / (1.0 + (log_density.max() - log_density) / (HALF_WEIGHT_DROP * p)) ** 2
     size = np.sqrt((weight @ terms**2) / weight.sum())
     root = np.sqrt(weight)[:, None]
     left = terms / size * root

@@ -18,6 +18,8 @@ from vegglue.inference.emulator import Emulator, fit_emulator
 from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weights
 from vegglue.inference.weighted_statistics import effective_size
 
+# Rounds at most, draws of the first, and of any other at most. Chosen, not measured: they bound the runs of the model
+# (6,336 at most), and a larger first round makes a better emulator of a proposal that may be poor.
 SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16
@@ -29,7 +31,7 @@ LogDensity = Callable[[Array, Array], Array]
 class Sample:
     """All draws z (m, p), values predicted there (m, n), NaN where that failed, and log density (m,), -inf there.
 
-    weights (m,): of sum 1; drawn, worth: draws and effective draws so far, after each round.
+    weights (m,): of sum 1; drawn, effective: draws and effective draws so far, after each round.
     """
 
     z: Array
@@ -37,7 +39,7 @@ class Sample:
     log_density: Array
     weights: Array
     drawn: tuple[int, ...]
-    worth: tuple[float, ...]
+    effective: tuple[float, ...]
 
 
 def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float, seed: int) -> Sample:
@@ -50,7 +52,7 @@ def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float,
     rounds: list[tuple[int, Mixture]] = []
     parts: list[tuple[Array, Array, Array]] = []
     drawn: list[int] = []
-    worth: list[float] = []
+    effective: list[float] = []
     while True:
         new = draw(mixture, points.random(size))
         values = predict(new)
@@ -59,13 +61,13 @@ def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float,
         z, values, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
         weights = pooled_weights(logs, z, rounds)
         drawn.append(len(z))
-        worth.append(effective_size(weights))
-        if worth[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
-            return Sample(z, values, logs, weights, tuple(drawn), tuple(worth))
+        effective.append(effective_size(weights))
+        if effective[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
+            return Sample(z, values, logs, weights, tuple(drawn), tuple(effective))
         last = effective_size(pooled_weights(parts[-1][2], new, rounds[-1:])) / size
         emulator = fit_emulator(z, values, logs, mixture.centre[0], mixture.lower[0])
         mixture = adapt(partial(_emulated, emulator, density), mixture, seed + len(rounds))
-        size = _next_size(wanted - worth[-1], last)
+        size = _next_size(wanted - effective[-1], last)
 
 
 def _emulated(emulator: Emulator, density: LogDensity, z: Array) -> Array:

@@ -34,28 +34,28 @@ class StationScores:
     below: Array
 
 
-def log_likelihoods(left: Array, precision: Array) -> Array:
+def log_likelihoods(residual: Array, precision: Array) -> Array:
     """ln p(y_i | the other stations, draw) (m, n) of residuals (m, n), errors of the inverse covariance (n, n)."""
     own = np.diag(precision)
-    return np.asarray(0.5 * np.log(own / (2.0 * np.pi)) - 0.5 * (left @ precision) ** 2 / own)
+    return np.asarray(0.5 * np.log(own / (2.0 * np.pi)) - 0.5 * (residual @ precision) ** 2 / own)
 
 
-def leave_one_out(left: Array, precision: Array, weights: Array) -> StationScores:
+def leave_one_out(residual: Array, precision: Array, weights: Array) -> StationScores:
     """Every station left out in turn: residuals (m, n), inverse covariance (n, n), weights (m,) above 0."""
-    logs = log_likelihoods(left, precision)
-    away = (left @ precision) / np.sqrt(np.diag(precision))
-    score, k, below = (np.empty(left.shape[1]) for _ in range(3))
-    for i in range(left.shape[1]):
+    logs = log_likelihoods(residual, precision)
+    away = (residual @ precision) / np.sqrt(np.diag(precision))
+    score, k, below = (np.empty(residual.shape[1]) for _ in range(3))
+    for i in range(residual.shape[1]):
         others, k[i] = pareto_smoothed(np.log(weights) - logs[:, i])
         score[i] = _log_mean(logs[:, i], others)
         below[i] = others @ ndtr(away[:, i])
     return StationScores(score, k, below)
 
 
-def leave_out(left: Array, precision: Array, weights: Array, group: np.ndarray) -> LeftOut:
+def leave_out(residual: Array, precision: Array, weights: Array, group: np.ndarray) -> LeftOut:
     """The stations `group` left out together."""
     part = precision[np.ix_(group, group)]
-    pull = (left @ precision)[:, group]
+    pull = (residual @ precision)[:, group]
     size = np.sum(pull * np.linalg.solve(part, pull.T).T, axis=1)
     logs = 0.5 * np.linalg.slogdet(part)[1] - 0.5 * group.size * np.log(2.0 * np.pi) - 0.5 * size
     others, k = pareto_smoothed(np.log(weights) - logs)

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import Fitted
+from vegglue.calibration.fit import MapEstimate
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
@@ -22,7 +22,7 @@ from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import Sample, sample
 from vegglue.inference.leave_one_out import log_likelihoods
 from vegglue.inference.likelihood import efficiency, root_mean_square, stations_by_kind
-from vegglue.inference.map_and_errors import Groundwork, groundwork
+from vegglue.inference.map_and_errors import ModesAndErrors, modes_and_errors
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.refinement_summary import precision_of, refinement_of
 from vegglue.inference.student_mixture import Mixture, mixture_at_modes
@@ -44,7 +44,7 @@ def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say 
     """
     check_stations(ensemble, observations.table)
     say("following the best members downhill")
-    base = groundwork(model_of(case, observations), ensemble, case.infer.sigma)
+    base = modes_and_errors(model_of(case, observations), ensemble, case.infer.sigma)
     say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
     run = partial(predict, base.model, [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
@@ -71,14 +71,14 @@ def log_posterior(noise: Noise, z: Array, prediction: Array) -> Array:
     return logs
 
 
-def mixture_around(fits: tuple[Fitted, ...]) -> Mixture:
+def mixture_around(fits: tuple[MapEstimate, ...]) -> Mixture:
     """A component for each mode, its share proportional to exp(-objective / 2) |covariance|^(1/2) (Laplace)."""
     covariances = np.stack([one.covariance for one in fits])
     mass = np.array([-0.5 * one.objective for one in fits]) + 0.5 * np.linalg.slogdet(covariances)[1]
     return mixture_at_modes(np.stack([one.point.z for one in fits]), covariances, mass)
 
 
-def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior:
+def _posterior(base: ModesAndErrors, drawn: Sample, ensemble: Ensemble) -> Posterior:
     """What follows from the draws alone; `refine` adds `refinement` and `transfer`."""
     case, station, noise = base.model.case, base.model.station, base.noise
     error = noise.among_all(np.sqrt(np.diag(covariance_of(noise))), len(station))
@@ -97,7 +97,7 @@ def _posterior(base: Groundwork, drawn: Sample, ensemble: Ensemble) -> Posterior
     )
 
 
-def _weighted_sample(base: Groundwork, drawn: Sample) -> WeightedSample:
+def _weighted_sample(base: ModesAndErrors, drawn: Sample) -> WeightedSample:
     case, station, noise = base.model.case, base.model.station, base.noise
     theta = theta_at(case, drawn.z)
     residual = station["value"].to_numpy(float) - drawn.values

@@ -14,7 +14,7 @@ from vegglue.case.prior import sample_prior
 from vegglue.inference.importance_sampling import Sample
 from vegglue.inference.leave_one_out import leave_one_out, leave_out, share_inside
 from vegglue.inference.likelihood import root_mean_square
-from vegglue.inference.map_and_errors import Groundwork
+from vegglue.inference.map_and_errors import ModesAndErrors
 from vegglue.results.refinement import (
     ErrorModel,
     GroupsLeftOut,
@@ -29,7 +29,7 @@ from vegglue.results.refinement import (
 OUTLIER_BELOW = 0.01
 
 
-def refinement_of(base: Groundwork, drawn: Sample, best: int) -> Refinement:
+def refinement_of(base: ModesAndErrors, drawn: Sample, best: int) -> Refinement:
     """base: errors and modes; drawn: the members drawn around the modes; best: index of the member that fits best."""
     case, noise = base.model.case, base.noise
     kept = drawn.weights > 0
@@ -41,12 +41,12 @@ def refinement_of(base: Groundwork, drawn: Sample, best: int) -> Refinement:
             errors="stated" if case.infer.sigma == "known" else "estimated",
             correlation=noise.correlation,
             scale=noise.scale,
-            grid_error=root_mean_square(noise.grid) if base.grid_known else float("nan"),
+            grid_error=root_mean_square(noise.grid_error) if base.grid_error_known else float("nan"),
         ),
         modes=_modes(base, drawn),
         draws=ImportanceDraws(
             drawn=np.array(drawn.drawn),
-            worth=np.array(drawn.worth),
+            worth=np.array(drawn.effective),
             log_density=drawn.log_density,
             prior_theta=sample_prior(case.parameters, len(drawn.z), case.simulate.seed),
         ),
@@ -56,7 +56,7 @@ def refinement_of(base: Groundwork, drawn: Sample, best: int) -> Refinement:
     )
 
 
-def _modes(base: Groundwork, drawn: Sample) -> PosteriorModes:
+def _modes(base: ModesAndErrors, drawn: Sample) -> PosteriorModes:
     near = np.argmin([np.linalg.norm(drawn.z - one.point.z, axis=1) for one in base.fits], axis=0)
     theta = theta_at(base.model.case, np.stack([one.point.z for one in base.fits]))
     return PosteriorModes(
@@ -82,7 +82,7 @@ def _leave_one_out(left: Array, precision: Array, weights: Array, at_all: Callab
     )
 
 
-def _misfit(base: Groundwork, prediction: Array, at_all: Callable[[Array], Array]) -> MisfitTest:
+def _misfit(base: ModesAndErrors, prediction: Array, at_all: Callable[[Array], Array]) -> MisfitTest:
     """chi2 = |W (y - f)|^2 of the best member's predictions f (station,), and each residual that stands out."""
     noise, count = base.noise, base.noise.rows.size
     chi2 = float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
@@ -91,8 +91,8 @@ def _misfit(base: Groundwork, prediction: Array, at_all: Callable[[Array], Array
         chi2=chi2,
         freedom=freedom,
         p_misfit=float(scipy.stats.chi2.sf(chi2, max(freedom, 1))),
-        surprise=at_all(base.surprise),
-        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.surprise)) * 2) < OUTLIER_BELOW,
+        surprise=at_all(base.standardised),
+        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.standardised)) * 2) < OUTLIER_BELOW,
     )
 
 

@@ -12,6 +12,7 @@ from vegglue.inference.weighted_statistics import effective_size, systematic_dra
 
 # Degrees of freedom of every component: tails heavy enough for a posterior that is not normal.
 FREEDOM = 5.0
+# The numbers below are chosen, not measured: they trade time for effective draws, and no weight depends on them.
 # Effective draws that a fit of the mixture asks for; with fewer the weights are tempered, w^t with t < 1.
 EFFECTIVE_TO_FIT = 200
 # Rounds of adaptation, draws in each (of an emulator, which cost little); components at most, and added in a round.
@@ -19,9 +20,9 @@ ADAPTATION_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, COMPONENTS_ADDED = 8, 4096, 
 # Rounds whose draws are pooled; draws of equal weight that a fit is made to, in so many steps.
 ROUNDS_POOLED, DRAWS_FITTED, FIT_STEPS = 3, 2000, 10
 # Share of the effective draws given up to cover the tails, for a normal density: the mixture adapts to a flatter one.
-SPENT_ON_TAILS = 0.2
+TAIL_SHARE = 0.2
 # Adaptation ends when this share of the draws is effective, or when a round gains less than this factor on the last.
-ENOUGH, LEAST_GAIN = 0.85, 1.03
+WELL_ADAPTED, LEAST_GAIN = 0.85, 1.03
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixtur
         rounds = [*rounds[1 - ROUNDS_POOLED :], (EMULATED_DRAWS, mixture)]
         parts = [*parts[1 - ROUNDS_POOLED :], (new, logs)]
         worth = effective_size(pooled_weights(logs, new, rounds[-1:])) / EMULATED_DRAWS
-        if worth > ENOUGH or 0.5 < worth < LEAST_GAIN * before:
+        if worth > WELL_ADAPTED or 0.5 < worth < LEAST_GAIN * before:
             break
         before = worth
         z, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -104,8 +105,8 @@ def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixtur
 
 
 def _power(dimensions: int) -> float:
-    """b < 1 with (b (2 - b))^(dimensions / 2) = 1 - SPENT_ON_TAILS, the effective share of draws from p^b, p normal."""
-    return float(1.0 - np.sqrt(1.0 - (1.0 - SPENT_ON_TAILS) ** (2.0 / dimensions)))
+    """b < 1 with (b (2 - b))^(dimensions / 2) = 1 - TAIL_SHARE, the effective share of draws from p^b, p normal."""
+    return float(1.0 - np.sqrt(1.0 - (1.0 - TAIL_SHARE) ** (2.0 / dimensions)))
 
 
 def tempered(weights: Array, wanted: float) -> Array:

@@ -1,4 +1,4 @@
-"""What a case could lack: every effect of the library where it may act, as a case with one parameter more."""
+"""Candidates: every effect of the library that a case could lack, as a case with one parameter more."""
 
 import itertools
 import re
@@ -16,8 +16,8 @@ from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
 from vegglue.measurements.kinds import velocity_rows
 
-# Combinations of shapes that a search tries at most.
-MOST_SHAPES = 12
+# Combinations of shapes of an effect that a search tries at most. Chosen, not measured: each is a tangent of the flow.
+MOST_SETTINGS = 12
 
 
 @dataclass(frozen=True)
@@ -49,27 +49,27 @@ class Candidate:
         grids = [shape.grid or (shape.default,) for shape in self.effect.shapes]
         names = [shape.name for shape in self.effect.shapes]
         combinations = [dict(zip(names, values, strict=True)) for values in itertools.product(*grids)]
-        every = -(-len(combinations) // MOST_SHAPES)
+        every = -(-len(combinations) // MOST_SETTINGS)
         return combinations[::every]
 
 
 def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
-    """All effects of the library that could act in the case and do not yet, once for each place they may act in."""
+    """Effects of the library that do not act in the case yet, once for each experiment, section or device."""
     found = []
-    places = places_of(case, station)
+    possible = where_it_may_act(case, station)
     for effect in library(case.effect_file).values():
         if "search" in effect.tags or (effect.stage == "plants" and not case.plants.patches):
             continue
         if effect.each == "case":
             found.append(Candidate(effect))
             continue
-        for place in places[effect.each]:
-            found.append(Candidate(effect, **{f"{effect.each}s": (place,)}))
+        for name in possible[effect.each]:
+            found.append(Candidate(effect, **{f"{effect.each}s": (name,)}))
     return [one for one in found if one.key not in case.effects]
 
 
-def places_of(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
-    """Where a cause of its own may act: experiments, sections of velocities, and devices, as far as they are used."""
+def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
+    """Experiments, sections with used velocities, and used devices: an effect may act in one of them alone."""
     used = station[station["used"].to_numpy(bool)]
     velocity = used[velocity_rows(used)]
     return {
@@ -79,15 +79,15 @@ def places_of(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
     }
 
 
-def at_work(case: Case) -> dict[str, Candidate]:
-    """What the effects of a case once were, by their keys."""
+def candidates_in_case(case: Case) -> dict[str, Candidate]:
+    """The effects of a case as candidates, by their keys."""
     return {
-        key: Candidate(effect_of(case, key), working.experiments or (), working.sections, working.devices)
-        for key, working in case.effects.items()
+        key: Candidate(effect_of(case, key), entry.experiments or (), entry.sections, entry.devices)
+        for key, entry in case.effects.items()
     }
 
 
-def working_of(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:
+def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:
     """The entry of a candidate in a case; amplitude: a number or the name of a parameter."""
     effect = candidate.effect
     return EffectEntry(
@@ -105,20 +105,20 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
     parameter = candidate.parameter
     return case.model_copy(
         update={
-            "effects": {**case.effects, candidate.key: working_of(candidate, parameter, shapes)},
+            "effects": {**case.effects, candidate.key: effect_entry(candidate, parameter, shapes)},
             "parameters": {**case.parameters, parameter: prior_of(candidate.effect)},
         }
     )
 
 
 def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
-    """The case with one effect more, as a cause whose answer is the fingerprint of the effect."""
+    """The case with one effect more, as a cause; the response to it is the fingerprint of the effect."""
     changed = with_effect(case, candidate, shapes)
     return Cause(changed, candidate.parameter, candidate.effect.amplitude, candidate.experiments)
 
 
 def prior_of(effect: Effect) -> Parameter:
-    """Normal around off, as wide as plausible, within the support."""
+    """The prior of an amplitude: normal around off, its standard deviation the plausible size, within the support."""
     amplitude = effect.amplitude
     return Parameter(
         distribution="normal",
@@ -132,7 +132,7 @@ def prior_of(effect: Effect) -> Parameter:
     )
 
 
-def start_of(effect: Effect, gain: float) -> float:
+def start_amplitude(effect: Effect, gain: float) -> float:
     """The amplitude of that gain, kept off the ends of its support."""
     amplitude = effect.amplitude
     margin = 0.01 * min(amplitude.scale, amplitude.high - amplitude.low)

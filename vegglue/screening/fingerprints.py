@@ -1,4 +1,4 @@
-"""What could be missing, as traces in the predictions at one point: of every candidate, and of drag at every place."""
+"""Fingerprints at one point: how predictions change with every candidate effect, and with a drag spot anywhere."""
 
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -10,15 +10,15 @@ from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Point, responses
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of
-from vegglue.screening.spatial_scan import Spots, spots_of
+from vegglue.screening.spatial_scan import DragSpots, drag_spots
 from vegglue.site.channel_geometry import half_width
 
 
 @dataclass(frozen=True)
 class Fingerprints:
-    """prints (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain.
+    """values (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain, one column per setting.
 
-    columns: for each candidate, its columns among the prints; settings, amplitudes: those of each column.
+    columns: for each candidate, its columns; settings, amplitudes: shapes and amplitude of each column (c,).
     """
 
     point: Point
@@ -26,22 +26,22 @@ class Fingerprints:
     columns: list[np.ndarray]
     settings: list[dict[str, float]]
     amplitudes: list[Amplitude]
-    prints: Array
-    spots: Spots
+    values: Array
+    spots: DragSpots
 
     @property
     def one_sided(self) -> np.ndarray:
-        """Which columns (c,) are of effects that can only grow from off."""
+        """Whether the effect of each column (c,) has amplitudes on one side of off only."""
         return np.array([amplitude.low >= amplitude.off for amplitude in self.amplitudes], bool)
 
-    def may_be(self, gains: Array, most: float) -> np.ndarray:
-        """Whether the effect of each column may have a gain (c,), and its opposite, (2, c): see `Amplitude.may_be`."""
+    def allowed(self, gains: Array, largest: float) -> np.ndarray:
+        """Whether gains (c,), and their opposites, are allowed for each column, (2, c); see `Amplitude.allows`."""
         pairs = list(zip(self.amplitudes, gains, strict=True))
-        return np.array([[amplitude.may_be(sign * gain, most) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
+        return np.array([[amplitude.allows(sign * gain, largest) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
 
 
 def fingerprints_of(base: Baseline) -> Fingerprints:
-    """Those of the search model: they only have to point the right way. Spots are sized by the model itself."""
+    """Fingerprints of the search model, exact enough for a direction. The radius of spots is that of the fine model."""
     search = search_model(base)
     model, point = search.model, search.point
     candidates = candidates_of(model.case, model.station)
@@ -53,6 +53,6 @@ def fingerprints_of(base: Baseline) -> Fingerprints:
         columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
         settings=[shapes for _, shapes in every],
         amplitudes=[one.effect.amplitude for one, _ in every],
-        prints=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
-        spots=spots_of(model, point, half_width(base.model.site)),
+        values=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
+        spots=drag_spots(model, point, half_width(base.model.site)),
     )

@@ -20,7 +20,7 @@ from vegglue.engine.interface import Model, Point, linearise, responses
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, candidates_of, cause_of, working_of
+from vegglue.screening.candidates import Candidate, candidates_of, cause_of, effect_entry
 from vegglue.twins import unlisted_objects
 from vegglue.twins.sealed_answer import ANY, BAD_PROBE, UNLISTED, Hidden
 
@@ -87,13 +87,13 @@ def candidate_of(model: Model, name: str) -> Candidate:
 
 def case_hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
     """The case with the effect at work at its true size; one that stands in no list is read from its own file."""
-    working = working_of(candidate, hidden.amplitude, hidden.shapes)
+    working = effect_entry(candidate, hidden.amplitude, hidden.shapes)
     return _knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
 
 
 def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
     """A probe of velocity that reads wrong, by `size` standard errors if that is given."""
-    velocity = np.flatnonzero(np.isfinite(errors.apart).sum(axis=1) > 1)  # gauges have no neighbours
+    velocity = np.flatnonzero(np.isfinite(errors.separation).sum(axis=1) > 1)  # gauges have no neighbours
     station = int(errors.rows[random.choice(velocity)])
     excess = size_given(f"{BAD_PROBE}={size}", size)
     return Hidden(BAD_PROBE, BAD * float(random.choice([-1.0, 1.0])) if excess is None else excess, {}, 0.0, station)

@@ -18,7 +18,7 @@ from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.candidates import Candidate, start_of
+from vegglue.screening.candidates import Candidate, start_amplitude
 from vegglue.workflow.compare import Comparison, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import MAKE_ROOM, folder_of, remember_place
@@ -124,7 +124,7 @@ def _start_child(child: Case, folder: Path, found: Diagnosis, added: Sequence[Ad
     """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
     theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
     for one, _ in added:
-        theta.setdefault(one.parameter, start_of(one.effect, one.effect.amplitude.plausible))
+        theta.setdefault(one.parameter, start_amplitude(one.effect, one.effect.amplitude.plausible_gain))
     remember_place(child, folder, theta)
 
 

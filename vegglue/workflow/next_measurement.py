@@ -72,7 +72,7 @@ def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
     detectability = suspect.detectability
     gain = amplitude.gain(amplitude.off + detectability.smallest)
     length = found.first_screening.threshold + POWER_QUANTILE
-    return length * amplitude.plausible / gain / max(detectability.visibility, 1e-6)
+    return length * amplitude.plausible_gain / gain / max(detectability.visibility, 1e-6)
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
@@ -81,6 +81,6 @@ def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: boo
     for suspect in (one for one in found.suspects if one.name in names):
         candidate = candidate_named(case, found.predictions.station, suspect.name)
         amplitude = candidate.effect.amplitude
-        gain = amplitude.plausible if plausible else amplitude.gain(suspect.amplitude.value)
+        gain = amplitude.plausible_gain if plausible else amplitude.gain(suspect.amplitude.value)
         rivals.append((candidate, suspect.shapes, gain))
     return rivals
