@@ -1,4 +1,4 @@
-"""Cases as files: YAML with `extends`, its names checked against each other, and the hash that ties results to it."""
+"""Cases as files: YAML read with all that `extends` names, and refused in one sentence where it is wrong."""
 
 import os
 import re

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, grid_difference, search_model
+from vegglue.calibration.baseline import Baseline, grid_difference
 from vegglue.calibration.fit import MapEstimate, chi2, fit, interval95, objective
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
@@ -65,7 +65,7 @@ def accepted(
     None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
     say nothing, or when no flow is found with it.
     """
-    search = search_model(screening.base)
+    search = screening.search
     fall = [objective(search.noise, search.point) - one.fitted.objective for one in refits]
     if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
         return None
@@ -106,7 +106,7 @@ def _calibrated_with(screening: Screening, best: Refit) -> Baseline | None:
     model = _with(base.model, screening, best)
     if base.coarse is None:
         return Baseline(model, base.noise, best.fitted, None, None)
-    on_own_grid = search_model(base).model is base.model
+    on_own_grid = screening.search.model is base.model
     start = place if on_own_grid else linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
         return None
@@ -131,7 +131,7 @@ def _worth_refitting(screening: Screening) -> list[int]:
 
 def _refit(screening: Screening, candidate: int) -> Refit | None:
     one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
-    search = search_model(screening.base)
+    search = screening.search
     model = replace(search.model, case=with_effect(search.model.case, one, screening.fingerprints.settings[column]))
     start = linearise(model, refit_start(screening, candidate, model.case), search.point)
     if start is None:

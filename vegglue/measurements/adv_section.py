@@ -12,12 +12,11 @@ from vegglue.errors import InputError
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.section_discharge import (
+    GRID_STEP,
     CrossSection,
     Discharge,
-    combine,
-    conveyance_weights,
-    grid_weights,
     neighbour_error,
+    section_discharges,
 )
 from vegglue.measurements.vertical_profile import (
     CanopyHeight,
@@ -33,7 +32,6 @@ from vegglue.site.grid import Grid
 from vegglue.site.zones import cells_of_patch
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
-GRID_STEP = 0.02  # m, along y and z: cells of the regular grid a section is summed on
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
 SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing about its time scale
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
@@ -66,7 +64,7 @@ def read_section(case: Case, observation: Observation) -> Section:
     columns = [_column(group) for _, group in points[points["used"]].groupby("y")]
     among = [column for column, plants in zip(columns, good["plants"], strict=True) if plants]
     canopy = fit_canopy_height(among) if among else None
-    return Section(points, profiles, _discharge(section, columns, good, error), error, canopy)
+    return Section(points, profiles, section_discharges(section, columns, good, error), error, canopy)
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
@@ -213,21 +211,3 @@ def _profile(points: pd.DataFrame) -> dict[str, object]:
     law = "two layers" if first["plants"] else "log law"
     curve = {"within": fit.within, "slope": fit.slope, "top": fit.top, "scatter": fit.scatter}
     return row | curve | {"fitted": fitted, "fitted_error": fitted_error, "law": law}
-
-
-def _discharge(section: CrossSection, columns: list[Column], good: pd.DataFrame, error: float) -> dict[str, Discharge]:
-    """By both rules, from the verticals that are used; `error` is of one vertical among its neighbours [m/s]."""
-    position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
-    grid = grid_weights(section, position, columns, GRID_STEP)
-    paper = sum(float(weights @ column.velocity) for weights, column in zip(grid, columns, strict=True))
-    errors = [
-        factor * float(np.linalg.norm(weights * column.standard_error))
-        for weights, column, factor in zip(grid, columns, scatter, strict=True)
-    ]
-    area = conveyance_weights(section, position, good["depth"].to_numpy())
-    profile = float(area @ good["fitted"].to_numpy())
-    spacing = error * float(np.linalg.norm(area))
-    return {
-        "paper": combine(paper, float(np.linalg.norm(errors)), spacing, abs(paper - profile) / float(np.sqrt(3.0))),
-        "profile": combine(profile, float(np.linalg.norm(area * good["fitted_error"].to_numpy())), spacing, 0.0),
-    }

@@ -7,9 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.measurements.vertical_profile import Column, linear_weights
+
+# Cells of the regular grid a section is summed on, along y and z [m].
+GRID_STEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -124,3 +128,27 @@ def _lagrange(nodes: Array, at: float) -> Array:
 def combine(value: float, sampling: float, spacing: float, rule: float) -> Discharge:
     """standard_error^2 = max(sampling, spacing)^2 + rule^2 [m3/s]; an unknown (NaN) spacing error is left out."""
     return Discharge(value, float(np.hypot(np.fmax(sampling, spacing), rule)), sampling, spacing, rule)
+
+
+def section_discharges(
+    section: CrossSection, columns: Sequence[Column], good: pd.DataFrame, error: float
+) -> dict[str, Discharge]:
+    """Q = sum_i w_i u_i [m3/s] by both rules, from the verticals that are used.
+
+    columns: their points; good: their profiles (rows of Observations.profiles); error: of one vertical, as its
+    neighbours tell it [m/s].
+    """
+    position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
+    grid = grid_weights(section, position, columns, GRID_STEP)
+    paper = sum(float(weights @ column.velocity) for weights, column in zip(grid, columns, strict=True))
+    errors = [
+        factor * float(np.linalg.norm(weights * column.standard_error))
+        for weights, column, factor in zip(grid, columns, scatter, strict=True)
+    ]
+    area = conveyance_weights(section, position, good["depth"].to_numpy())
+    profile = float(area @ good["fitted"].to_numpy())
+    spacing = error * float(np.linalg.norm(area))
+    return {
+        "paper": combine(paper, float(np.linalg.norm(errors)), spacing, abs(paper - profile) / float(np.sqrt(3.0))),
+        "profile": combine(profile, float(np.linalg.norm(area * good["fitted_error"].to_numpy())), spacing, 0.0),
+    }

@@ -6,12 +6,11 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.calibration.baseline import SearchModel
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Point, responses
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of
 from vegglue.screening.spatial_scan import DragSpots, drag_spots
-from vegglue.site.channel_geometry import half_width
 
 
 @dataclass(frozen=True)
@@ -40,9 +39,8 @@ class Fingerprints:
         return np.array([[amplitude.allows(sign * gain, largest) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
 
 
-def fingerprints_of(base: Baseline) -> Fingerprints:
-    """Fingerprints of the search model, exact enough for a direction. The radius of spots is that of the fine model."""
-    search = search_model(base)
+def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
+    """Fingerprints of the search model, exact enough for a direction; half_width: of the floor of the channel [m]."""
     model, point = search.model, search.point
     candidates = candidates_of(model.case, model.station)
     tried = [one.settings() for one in candidates]
@@ -54,5 +52,5 @@ def fingerprints_of(base: Baseline) -> Fingerprints:
         settings=[shapes for _, shapes in every],
         amplitudes=[one.effect.amplitude for one, _ in every],
         values=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
-        spots=drag_spots(model, point, half_width(base.model.site)),
+        spots=drag_spots(model, point, half_width),
     )

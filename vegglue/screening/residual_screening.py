@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
@@ -14,6 +14,7 @@ from vegglue.screening import score_test
 from vegglue.screening.candidates import start_amplitude
 from vegglue.screening.family_wise_p import Family, family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
+from vegglue.site.channel_geometry import half_width
 
 # Drag [1/m] of a spot that counts as plausible when the noise is estimated: twenty times the friction of a bed of
 # n = 0.04 under 1 m of water. Chosen, not measured; from 0.1 to 1 the verdicts on open-a to open-f are the same.
@@ -28,12 +29,14 @@ FREE_SIZE = 1e4
 class Screening:
     """Score tests of the residual of a calibrated model against all effects that could be missing.
 
-    base: with the noise as estimated here; flagged: stations rejected as outliers, indices among the used ones.
+    base: with the noise as estimated here; search: its model that is fitted again and again; flagged: stations rejected
+    as outliers, indices among the used ones.
     whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
     projected out. effects, spots, stations: score tests of candidates, of drag spots and of single stations.
     """
 
     base: Baseline
+    search: SearchModel
     flagged: tuple[int, ...]
     fingerprints: Fingerprints
     whitened_slopes: Array
@@ -72,8 +75,9 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     The correlation of the errors is estimated first. before: an earlier screening, whose fingerprints are used again if
     they belong to the same point; seed: of the draws of errors alone.
     """
-    point = search_model(base).point
-    fingerprints = _earlier(before, point) or fingerprints_of(base)
+    search = search_model(base)
+    point = search.point
+    fingerprints = _earlier(before, point) or fingerprints_of(search, half_width(base.model.site))
     changes = point.slope, fingerprints.values, fingerprints.spots.fingerprints
     slope, of_effects, spots = (base.noise.used(values) for values in changes)
     residual, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
@@ -86,9 +90,10 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     def of_either_sign(values: Array) -> Family:
         return family_of(against(values), np.zeros(values.shape[1], bool), errors, seed)
 
-    projected = against(of_effects)
+    projected, with_noise = against(of_effects), replace(base, noise=noise)
     return Screening(
-        base=replace(base, noise=noise),
+        base=with_noise,
+        search=search_model(with_noise),
         flagged=flagged,
         fingerprints=fingerprints,
         whitened_slopes=noise.whiten(slope),
