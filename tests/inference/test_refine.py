@@ -340,7 +340,7 @@ def test_a_long_markov_chain_finds_the_same(
     point = linearise(model, best)
     assert point is not None
     sampler = emcee.EnsembleSampler(
-        32, 2, lambda z: log_posterior(noise, z, predict(model, [point], 2, z)), vectorize=True
+        32, 2, lambda z: log_posterior(noise, z, predict(model, [point], z)), vectorize=True
     )
     sampler.random_state = np.random.RandomState(3).get_state()
     sampler.run_mcmc(best + 0.02 * np.random.default_rng(4).normal(size=(32, 2)), 1500)
