@@ -29,6 +29,7 @@ def chezy(folder: Path, **environment: str) -> tuple[float, int]:
     return float(value), int(hits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["beside the code", "in a read-only folder", "where the user says"])
 def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, where: str) -> None:
     copy = tmp_path / "vegglue"

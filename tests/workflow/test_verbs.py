@@ -46,6 +46,7 @@ def test_every_name_is_there_and_the_same_for_editors() -> None:
         vegglue.simulat  # noqa: B018
 
 
+@pytest.mark.slow
 def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
     runs, heard, said = tmp_path / "runs", list[Progress](), list[str]()
     case = vegglue.load_case(str(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)))
@@ -79,6 +80,7 @@ def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
     assert diagnosis.verdict.sentence.split(" (")[0] in page.read_text(encoding="utf-8"), "the page tells the diagnosis"
 
 
+@pytest.mark.slow
 def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
     case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL))
     runs = tmp_path / "runs"
