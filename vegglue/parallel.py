@@ -29,11 +29,6 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
     yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
 
 
-def in_order(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> list[Any]:
-    """work(*task) for every task, in their order."""
-    return list(_pool(jobs, "generator")(delayed(_alone)(work, task) for task in tasks))
-
-
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
     """So many threads at once in all that is done within; -1 for one on every core. Errors: InputError for 0."""

@@ -1,6 +1,5 @@
 """Cases as files: YAML read with all that `extends` names, and refused in one sentence where it is wrong."""
 
-import os
 import re
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from vegglue.case.consistency import disagreement
 from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 
 # Keys whose value is a path, relative to the file it is written in.
 PATHS = ("file", "raster", "points", "effect_file")
@@ -161,8 +160,3 @@ def _depth(tree: Any, place: KeyPath) -> int:
             return depth
         tree = tree[key]
     return len(place)
-
-
-def shown_path(path: Path) -> str:
-    """The path as sentences name it: relative to where the user stands."""
-    return os.path.relpath(path)

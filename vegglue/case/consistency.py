@@ -1,6 +1,5 @@
 """Whether the parts of a case agree: every name used is declared and every declaration used, files and places exist."""
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from vegglue.case.schema import Case
 from vegglue.case.site_schema import COEFFICIENT_OF, Inflow, Stand, StandOverride
 from vegglue.effects.definition import Amplitude, Shape
 from vegglue.effects.library import library
+from vegglue.errors import shown_path
 
 # Names that dimensions of the result files have, and a variable in them must not.
 DIMENSIONS = ("chain", "draw", "member", "station", "experiment", "section")
@@ -172,9 +172,7 @@ def _files(case: Case) -> Iterator[Refusal]:
     named += [(("effect_file",), case.effect_file)]
     for place, file in named:
         if file is not None and not file.is_file():
-            yield Refusal(
-                place, f"expected an existing file, got {os.path.relpath(file)}: put it there or correct the path"
-            )
+            yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
 
 
 def _likelihood(case: Case) -> Iterator[Refusal]:

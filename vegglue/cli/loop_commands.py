@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
-from vegglue.case.config import load_case, shown_path
+from vegglue.case.config import load_case
 from vegglue.cli.options import Config, Jobs, Json, Runs, Trust, console, number_given, say_on
 from vegglue.cli.tables import question_json, show_diagnosis, show_ladder, show_questions
 from vegglue.diagnosis.comparison import rung_json
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.workflow.compare import compare
 from vegglue.workflow.diagnose import diagnose

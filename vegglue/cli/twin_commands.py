@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from vegglue.case.config import load_case, shown_path
+from vegglue.case.config import load_case
 from vegglue.cli.options import Runs, console
+from vegglue.errors import shown_path
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.twin import make_twin, reveal
 

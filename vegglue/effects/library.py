@@ -1,7 +1,6 @@
 """The library of effects, listed by hand: a new one is a function in one of these files and an entry in its list."""
 
 import importlib.util
-import os
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -9,7 +8,7 @@ from types import MappingProxyType
 
 from vegglue.effects import boundary, exchange, force, plants, resistance, sensor, site, unlisted
 from vegglue.effects.definition import Effect
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 
 SHIPPED: tuple[Effect, ...] = (
     *site.EFFECTS,
@@ -30,16 +29,18 @@ def library(own: Path | None = None) -> Mapping[str, Effect]:
     Errors: InputError when the file cannot be run, has no EFFECTS, or repeats a name.
     """
     known = {effect.name: effect for effect in SHIPPED}
-    for effect in effects_of(own) if own else ():
+    if own is None:
+        return MappingProxyType(known)
+    for effect in effects_of(own):
         if effect.name in known:
-            raise InputError(f"{_shown(own)}: the effect `{effect.name}` exists already; give yours another name.")
+            raise InputError(f"{shown_path(own)}: the effect `{effect.name}` exists already; give yours another name.")
         known[effect.name] = effect
     return MappingProxyType(known)
 
 
 def effects_of(path: Path) -> tuple[Effect, ...]:
     """The effects of a user's file, which is run. Errors: InputError when it cannot be, or has no EFFECTS."""
-    shown = _shown(path)
+    shown = shown_path(path)
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
         raise InputError(f"{shown}: expected a Python file (.py) with a tuple EFFECTS; correct `effect_file`.")
@@ -52,7 +53,3 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
     if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):
         raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {type(found).__name__}; add it.")
     return found
-
-
-def _shown(path: Path | None) -> str:
-    return os.path.relpath(path or "")

@@ -5,7 +5,6 @@ results are too.
 """
 
 import hashlib
-import os
 import time
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -16,7 +15,7 @@ import numpy as np
 from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.flow.problem import Problem, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
@@ -53,11 +52,11 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     StorageError when another run holds the folder or the disk is full (what was written stays).
     """
     if not case.parameters:
-        raise InputError(f"{os.path.relpath(case.source)}: `parameters` expected a prior or more, got none: add one.")
+        raise InputError(f"{shown_path(case.source)}: `parameters` expected a prior or more, got none: add one.")
     site = build_site(case)
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
-        raise InputError(f"{os.path.relpath(case.source)}: {sentence}")
+        raise InputError(f"{shown_path(case.source)}: {sentence}")
     sample = sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))

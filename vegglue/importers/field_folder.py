@@ -14,7 +14,7 @@ from typing import Any
 
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MANNING_BED,
@@ -90,13 +90,15 @@ def _read_site(path: Path) -> Tree:
     try:
         site = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"{_shown(path)} cannot be read: {error.strerror}; a folder to import has one.") from None
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; a folder to import has one.") from None
     except ValueError as error:
-        raise InputError(f"{_shown(path)} is not valid JSON: {error}; correct it there.") from None
+        raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
     _need(path, site, "", "channel", "experiments")
     _need(path, site["channel"], "channel.", "length_m", "bottom_width_m", "bank_slope_v_per_h", "bed_slope")
     if not site["experiments"]:
-        raise InputError(f"{_shown(path)}: `experiments` expected one or more, got none; add those that were measured.")
+        raise InputError(
+            f"{shown_path(path)}: `experiments` expected one or more, got none; add those that were measured."
+        )
     for name, given in site["experiments"].items():
         _need(path, given, f"experiments.{name}.", "discharge_m3_s", "downstream_level_m")
     return dict(site)
@@ -105,10 +107,10 @@ def _read_site(path: Path) -> Tree:
 def _need(path: Path, tree: Any, within: str, *keys: str) -> None:
     for key in keys:
         if not isinstance(tree, Mapping) or key not in tree:
-            raise InputError(f"{_shown(path)}: `{within}{key}` is missing; add it.")
+            raise InputError(f"{shown_path(path)}: `{within}{key}` is missing; add it.")
         value = tree[key]
         if within and not (isinstance(value, int | float) and math.isfinite(value)):
-            raise InputError(f"{_shown(path)}: `{within}{key}` expected a number, got {value!r}; correct it.")
+            raise InputError(f"{shown_path(path)}: `{within}{key}` expected a number, got {value!r}; correct it.")
 
 
 def _trapezoid(channel: Mapping[str, Any]) -> Tree:
@@ -162,13 +164,9 @@ def _observations(folder: Path, target: Path) -> list[Tree]:
             found.append(observed(kind.name, _named(folder / kind.file, target)))
     if not found:
         files = ", ".join(kind.file for kind in KINDS.values())
-        raise InputError(f"{_shown(folder)}: expected one of {files}, got none; put what was measured there.")
+        raise InputError(f"{shown_path(folder)}: expected one of {files}, got none; put what was measured there.")
     return found
 
 
 def _named(file: Path, target: Path) -> str:
     return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
-
-
-def _shown(path: Path) -> str:
-    return os.path.relpath(path)

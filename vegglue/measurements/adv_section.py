@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case, Observation
-from vegglue.errors import InputError
-from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.errors import InputError, shown_path
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.section_discharge import (
     GRID_STEP,
@@ -91,7 +91,7 @@ def _read_points(observation: Observation) -> pd.DataFrame:
     chosen = rows[rows["case"] == wanted]
     if chosen.empty:
         raise InputError(
-            f"{shown_name(path)}: expected rows with case {wanted!r}, got only {', '.join(rows['case'].unique())}; "
+            f"{shown_path(path)}: expected rows with case {wanted!r}, got only {', '.join(rows['case'].unique())}; "
             f"correct `case` in the observation."
         )
     refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
@@ -137,7 +137,7 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame) -> pd.Da
     reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
     if (reason != "").all():
         raise InputError(
-            f"{shown_name(observation.file)}: expected points of case {observation.case!r} between the bed and the "
+            f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the "
             f"water surface at z = {surface:g} m, got none; check `floor`, `surface` and `offset` of the observation."
         )
     return points.assign(

@@ -1,13 +1,12 @@
 """Measured tables: CSV files read strictly, every fault named with its file and row."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 
 
 def read_table(
@@ -25,18 +24,18 @@ def read_table(
     except (OSError, ValueError, pd.errors.ParserWarning) as error:  # pandas' own errors are ValueErrors
         why = " ".join(str(error).split())
         raise InputError(
-            f"{shown_name(path)}: expected a CSV table in UTF-8, which cannot be read ({why}); check it."
+            f"{shown_path(path)}: expected a CSV table in UTF-8, which cannot be read ({why}); check it."
         ) from None
     raw.columns = raw.columns.str.strip()
     missing = [column for column in (*names, *numbers) if column not in raw.columns]
     if missing:
         raise InputError(
-            f"{shown_name(path)}, row 1: expected the columns {', '.join((*names, *numbers))}, got "
+            f"{shown_path(path)}, row 1: expected the columns {', '.join((*names, *numbers))}, got "
             f"{', '.join(raw.columns)} without {', '.join(missing)}; rename or add what is missing."
         )
     raw.index = pd.RangeIndex(2, len(raw) + 2)
     if raw.empty:
-        raise InputError(f"{shown_name(path)}: expected rows below the heading, got none.")
+        raise InputError(f"{shown_path(path)}: expected rows below the heading, got none.")
     texts = [*names, *(column for column in labels if column in raw.columns)]
     values = [*numbers, *(column for column in optional if column in raw.columns)]
     return pd.DataFrame(
@@ -45,15 +44,10 @@ def read_table(
     )
 
 
-def shown_name(path: Path) -> str:
-    """The path as sentences name it: relative to where the user stands."""
-    return os.path.relpath(path)
-
-
 def refuse_rows(path: Path, wrong: pd.Series, complaint: str) -> None:
     """Errors: InputError with the complaint, naming the file and the first row where `wrong` (rows,) is true."""
     if wrong.any():
-        raise InputError(f"{shown_name(path)}, row {wrong.idxmax()}: {complaint}.")
+        raise InputError(f"{shown_path(path)}, row {wrong.idxmax()}: {complaint}.")
 
 
 def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
@@ -63,7 +57,7 @@ def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> 
         row = repeated.idxmax()
         same = (table.loc[: row - 1, list(columns)] == table.loc[row, list(columns)]).all(axis=1).idxmax()
         raise InputError(
-            f"{shown_name(path)}, row {row}: expected {', '.join(columns)} to differ from every other row, got those "
+            f"{shown_path(path)}, row {row}: expected {', '.join(columns)} to differ from every other row, got those "
             f"of row {same} again; take one of the two out."
         )
 
@@ -72,7 +66,7 @@ def _texts(path: Path, column: "pd.Series[str]") -> "pd.Series[str]":
     text = column.str.strip()
     if (text == "").any():
         raise InputError(
-            f"{shown_name(path)}, row {(text == '').idxmax()}: expected a name in column {column.name}, got nothing."
+            f"{shown_path(path)}, row {(text == '').idxmax()}: expected a name in column {column.name}, got nothing."
         )
     return text
 
@@ -83,5 +77,5 @@ def _numbers(path: Path, column: "pd.Series[str]") -> "pd.Series[float]":
     if wrong.any():
         row = wrong.idxmax()
         got = f"expected a number in column {column.name}, got {column[row]!r}"
-        raise InputError(f"{shown_name(path)}, row {row}: {got}; mend or remove the row.")
+        raise InputError(f"{shown_path(path)}, row {row}: {got}; mend or remove the row.")
     return values

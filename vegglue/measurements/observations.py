@@ -8,9 +8,9 @@ import pandas as pd
 
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.measurements.adv_section import Section, average_of, read_section
-from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
@@ -72,7 +72,7 @@ def read_observations(case: Case) -> Observations:
             key = (str(observation.experiment), str(observation.section))
             if key in sections:
                 raise InputError(
-                    f"{shown_name(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
+                    f"{shown_path(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
                     f"observations of it; take one out of the case."
                 )
             sections[key] = read_section(case, observation)
@@ -99,7 +99,7 @@ def _refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
             for word in words:
                 if word not in known:
                     raise InputError(
-                        f"{shown_name(case.source)}: `effects.{name}.{column}s` names the {column} `{word}`, of which "
+                        f"{shown_path(case.source)}: `effects.{name}.{column}s` names the {column} `{word}`, of which "
                         f"there are no measurements: {nearest(word, known)}"
                     )
 
@@ -134,7 +134,7 @@ def _kind_in(case: Case, observation: Observation) -> Kind:
     """Errors: InputError naming config and file when the kind is unknown."""
     if observation.kind not in KINDS:
         raise InputError(
-            f"{shown_name(case.source)}: the observation in {observation.file.name} expected a `kind` among adv, "
+            f"{shown_path(case.source)}: the observation in {observation.file.name} expected a `kind` among adv, "
             f"{', '.join(KINDS)}, got {observation.kind!r}: {nearest(observation.kind, ['adv', *KINDS])}"
         )
     return kind_of(observation.kind)
@@ -183,7 +183,7 @@ def _chosen(path: Path, rows: pd.DataFrame, name: str, text: str | None) -> pd.D
     chosen = rows[rows[name] == text]
     if chosen.empty:
         raise InputError(
-            f"{shown_name(path)}: expected rows with {name} {text!r}, got only {', '.join(rows[name].unique())}; "
+            f"{shown_path(path)}: expected rows with {name} {text!r}, got only {', '.join(rows[name].unique())}; "
             f"correct `{name}` in the observation."
         )
     return chosen

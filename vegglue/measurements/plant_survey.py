@@ -8,8 +8,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Survey
-from vegglue.errors import InputError
-from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows, shown_name
+from vegglue.errors import InputError, shown_path
+from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
 
 SURVEYED = (
     "plant_height",
@@ -77,7 +77,7 @@ def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
     missing = [name for name in SURVEYED if name not in set(rows["quantity"])]
     if missing:
         raise InputError(
-            f"{shown_name(path)}: expected a row for each of {known}, got none for {', '.join(missing)}; add it."
+            f"{shown_path(path)}: expected a row for each of {known}, got none for {', '.join(missing)}; add it."
         )
     columns = (rows["quantity"], rows["mean"], rows["standard_deviation"], rows["samples"])
     return {

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.config import shown_path
 from vegglue.case.parts import Interval
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Inflow, Patch, Zone
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.site.grid import Grid
 from vegglue.site.polygons import in_polygon
 from vegglue.site.terrain import nearest_at, read_raster
