@@ -15,6 +15,7 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
 
+Bounds = tuple[float, float]
 # Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.
 FURTHEST = 6.0
 
@@ -79,3 +80,11 @@ def parameters_at(case: Case, points: Array) -> dict[str, Array]:
 def middle_value(case: Case, value: Value) -> float:
     """The number, or the median of the prior of the parameter of that name [its unit]."""
     return float(quantile(case.parameters[value], 0.5)) if isinstance(value, str) else value
+
+
+def prior_range(case: Case, value: Value) -> Bounds:
+    """What a value may be: 95 % of its prior, or itself twice."""
+    if isinstance(value, str):
+        low, high = quantile(case.parameters[value], [0.025, 0.975])
+        return float(low), float(high)
+    return value, value

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import middle_value
+from vegglue.case.parameter_space import middle_value, prior_range
 from vegglue.case.schema import Case, Experiment
-from vegglue.checks.ensemble_and_priors import prior_range, shown_bounds
+from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
 from vegglue.site.channel_geometry import expected_depth

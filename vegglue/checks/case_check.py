@@ -12,7 +12,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_patches,
 )
 from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
-from vegglue.checks.stations import remarks_on_patch_edges, remarks_on_stations
+from vegglue.checks.stations import remarks_on_absurd_values, remarks_on_patch_edges, remarks_on_stations
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
 
@@ -20,6 +20,7 @@ from vegglue.site.gridded_site import Site
 def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
     remarks = (
+        remarks_on_absurd_values(case, site, observations),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
         remarks_on_patches(case, site),

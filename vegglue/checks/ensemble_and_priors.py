@@ -6,8 +6,7 @@ import numpy as np
 
 from vegglue.case.consistency import values
 from vegglue.case.messages import KeyPath
-from vegglue.case.parts import Value
-from vegglue.case.prior import quantile
+from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.checks.stations import station_in_words
 from vegglue.measurements.observations import Observations
@@ -15,17 +14,8 @@ from vegglue.results.fields import excess
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
 
-Bounds = tuple[float, float]
 # Fewer members leave two or three in each tail of 2.5 %.
 FEW_MEMBERS = 100
-
-
-def prior_range(case: Case, value: Value) -> Bounds:
-    """What a value may be: 95 % of its prior, or itself twice."""
-    if isinstance(value, str):
-        low, high = quantile(case.parameters[value], [0.025, 0.975])
-        return float(low), float(high)
-    return value, value
 
 
 def shown_bounds(bounds: Bounds) -> str:

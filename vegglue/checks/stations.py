@@ -1,4 +1,4 @@
-"""Does every station stand in the water, and away from the edges of patches?"""
+"""Does every station stand in the water, away from the edges of patches, and show what a flow can have?"""
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import Observations
+from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.gridded_site import Site
 from vegglue.site.polygons import corners_of, distance_to_outline
@@ -45,6 +46,11 @@ def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[s
                 f"Stations of {section} at y = {at} m lie on the edge of patch {patch.name}: "
                 f"there the model interpolates between plants and open water."
             )
+
+
+def remarks_on_absurd_values(case: Case, site: Site, observations: Observations) -> Iterator[str]:
+    """Marks for missing values, wrong units, another datum, and standard errors without sense."""
+    yield from absurd_values(case, site, observations.table)
 
 
 def station_in_words(row: Mapping[Hashable, Any]) -> str:
