@@ -17,7 +17,8 @@ from vegglue.site.gridded_site import Site
 THICKEST_GROWTH = 0.5
 # And below which none lies: planed wood and glass.
 SMOOTHEST_WALLS = 0.01
-# Velocity head of critical flow over its depth [-], Fr^2 / 2: no level lies further below that of the outlet.
+# Velocity head of critical flow over its depth [-], Fr^2 / 2: no level lies further below that of the outlet. The same
+# is left above what growth holds up, for gauges that are off by as much as an effect may find.
 CRITICAL_HEAD = 0.5
 
 
@@ -54,7 +55,7 @@ class PlausibleFlow:
 
 
 def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleFlow:
-    """U = Q / A(x) with A under the expected level, and z_out - h / 2 <= z <= the level of `_highest`.
+    """U = Q / A(x) with A under the expected level, and z_out - h / 2 <= z <= z_highest + h / 2, see `_highest`.
 
     Q and z_out within 95 % of their priors. A of `slowest` lies under a surface parallel to the floor, or that of the
     outlet where it is higher; A of `fastest` under the lower one that smooth walls leave, see `_shallowest`. Where
@@ -75,7 +76,7 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
         slowest=slowest,
         fastest=fastest,
         lowest=np.full(site.grid.x.size, level[0] - CRITICAL_HEAD * depth),
-        highest=_highest(site, deep, level[1], most),
+        highest=_highest(site, deep, level[1], most) + CRITICAL_HEAD * depth,
         floor=floor,
         discharge=(least, most),
         depth=depth,

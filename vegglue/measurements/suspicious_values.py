@@ -34,7 +34,7 @@ LEVEL_UNITS = {"ft": 0.3048, "cm": 0.01, "mm": 0.001}  # m
 # Depth over width of the grid [-] that no channel has: flumes reach 1.
 DEEPEST_CHANNEL = 2.0
 # Numbers that loggers write for a missing value, beside those of nines only; and what is larger than any measurement.
-MARKS, LARGEST_NUMBER = (7777.0, 8888.0, 32767.0, 32768.0), 1e6
+MISSING_MARKS, LARGEST_NUMBER = (7777.0, 8888.0, 32767.0, 32768.0), 1e6
 # Standard errors of a velocity over Q / A [-]. Smaller: the mean of an hour at 5 % turbulence is known to 0.2 %, and no
 # probe is calibrated better than that. Larger: it tells nothing about the flow.
 VELOCITY_ERRORS = (1e-3, 1.0)
@@ -171,6 +171,6 @@ def _unit_of(ratio: float, units: dict[str, Bounds]) -> str:
 def is_mark(value: float) -> bool:
     """Whether a number is one that stands for a missing value: of nines only (-999, 99.9, 9999), 1e30 and the like."""
     size = abs(value)
-    if size >= LARGEST_NUMBER or size in MARKS:
+    if size >= LARGEST_NUMBER or size in MISSING_MARKS:
         return True
     return size >= 9.0 and set(f"{size:g}") <= set("9.")
