@@ -133,6 +133,20 @@ def test_an_odd_station_is_said(tmp_path, row, expected):
     assert [sentence for sentence in odd(tmp_path, rows=ROWS + row + "\n") if sentence.startswith(expected)]
 
 
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        (ROWS + "low,A,12,-1.1,-999,0.01\n", "The velocity -999 m/s at x = 12, y = -1.1 m (section A of exp"),
+        (ROWS.replace(",0.3,", ",30,").replace(",0.5,", ",50,"), "3 values of velocity (all there are; the first 30 "),
+        (ROWS.replace("0.01", "1"), "3 values of velocity (all there are; the first 0.3 m/s at x = 12, y = 0.7 m): "),
+    ],
+)
+def test_values_that_no_flow_can_have_are_said_first(tmp_path, rows, expected):
+    said = odd(tmp_path, rows=rows)
+    assert len(said) == 1
+    assert said[0].startswith(expected)
+
+
 def test_stations_without_error_cannot_be_weighed_by_it(tmp_path):
     text = SOUND.replace("members: 1024}", "members: 1024}\ninfer: {sigma: known}")
     said = odd(tmp_path, text, ROWS.replace(",u_se", "").replace(",0.01\n", "\n"))
