@@ -10,8 +10,8 @@ from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
     Diagnosis,
-    DragLocation,
-    DragMap,
+    Location,
+    PlaceMap,
     EstimatedErrors,
     FirstScreening,
     Misfit,
@@ -24,7 +24,7 @@ from vegglue.results.diagnosis import (
 )
 
 STATIONS = 6
-PARTS = ("verdict", "misfit", "errors", "first_screening", "parameters", "predictions", "drag_map")
+PARTS = ("verdict", "misfit", "errors", "first_screening", "parameters", "predictions", "place_map")
 PARTS_OF_SUSPECT = ("amplitude", "test", "detectability")
 
 
@@ -79,7 +79,7 @@ def a_diagnosis(
         steps=(step,) if steps is None else steps,
         verdict=Verdict(
             "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
-            DragLocation(33.0, -0.6, ("low", "high"), 0.4, 12.0), not_excluded=(),
+            Location(33.0, -0.6, ("low", "high"), 0.4, 12.0), not_excluded=(),
         ),
         misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
         errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),
@@ -87,7 +87,7 @@ def a_diagnosis(
             station, first=random.random(STATIONS), last=random.random(STATIONS),
             error=np.array([0.01, 0.01, 0.002, 0.01, 0.01, np.nan]),
         ),
-        drag_map=DragMap(np.repeat([30.0, 33.0, 36.0], 2), np.tile([-0.6, 0.6], 3), random.normal(size=6)),
+        place_map=PlaceMap(np.repeat([30.0, 33.0, 36.0], 2), np.tile([-0.6, 0.6], 3), random.normal(size=6)),
         first_screening=FirstScreening(
             3.4, {"eddies": 45.2, "mixing[D3]": 43.0, "wind": 0.3, "turning": -1.0}, ("eddies", "mixing[D3]", "wind"),
             cosine=np.array([[1, 0.96, 0.1], [0.96, 1, 0.2], [0.1, 0.2, 1]]),
@@ -101,6 +101,6 @@ NOTHING = a_diagnosis(
     suspects=(), steps=(), verdict={"kind": "nothing-missing", "location": None, "remarks": ()},
     misfit={"zones": pd.DataFrame(), "p": np.nan}, errors={"flagged": ()}, parameters={"first": {}, "last": {}},
     first_screening={"scores": {}, "compared": (), "cosine": np.zeros((0, 0))},
-    drag_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
+    place_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
 )  # fmt: skip
 NO_LOCATION = a_diagnosis(verdict={"location": None})

@@ -7,7 +7,7 @@ from diagnoses import a_suspect
 
 from vegglue.diagnosis.conclusion import chance_of_misfit
 from vegglue.diagnosis.verdict import judged
-from vegglue.results.diagnosis import DragLocation, EstimatedErrors, Misfit, Step, Suspect
+from vegglue.results.diagnosis import Location, EstimatedErrors, Misfit, Step, Suspect
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
 FITS, MISSES = (Misfit(chi2, chi2, 5, chance_of_misfit(chi2, 5), pd.DataFrame()) for chi2 in (5.0, 80.0))
@@ -25,7 +25,7 @@ Groups = tuple[tuple[str, ...], ...]
 def said(
     steps: list[Step],
     suspects: list[Suspect],
-    location: DragLocation | None,
+    location: Location | None,
     misfit: Misfit,
     still: Groups = (),
     alone: str = "",
@@ -85,7 +85,7 @@ def test_an_implausible_size_is_remarked() -> None:
 
 
 def test_a_place_wins_over_steps() -> None:
-    location = DragLocation(33.0, -0.6, ("low",), 0.4, 12.0)
+    location = Location(33.0, -0.6, ("low",), 0.4, 12.0)
     verdict, sentence, _ = said([step("a")], [a_suspect("a")], location, MISSES)
     assert verdict == "none-of-these"
     assert "after a: the misfit points at x = 33.0, y = -0.6 m" in sentence

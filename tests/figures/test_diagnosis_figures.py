@@ -108,7 +108,7 @@ def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
 
 
 def test_places_mark_what_was_found() -> None:
-    drag = a_diagnosis().drag_map
+    drag = a_diagnosis().place_map
     axes = draw_places(drag.x, drag.y, drag.score, (33.0, -0.6), [], np.zeros((1, 2))).axes[0]
     assert "x = 33.0, y = −0.6 m" in texts(axes)
     assert any(line.get_marker() == "*" and list(line.get_xdata()) == [33.0] for line in axes.lines)
@@ -116,7 +116,7 @@ def test_places_mark_what_was_found() -> None:
 
 @pytest.mark.parametrize("places", [1, 2])
 def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
-    drag = a_diagnosis().drag_map
+    drag = a_diagnosis().place_map
     part = drag.x[:places], drag.y[:places], drag.score[:places]
     (axes,) = draw_places(*part, None, [], np.array([[31.0, 0.5]])).axes
     assert points(axes, ".") == [(31.0, 0.5)]
@@ -125,7 +125,7 @@ def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
 
 
 def test_places_draw_contours_patches_and_stations() -> None:
-    drag = a_diagnosis().drag_map
+    drag = a_diagnosis().place_map
     corners = np.array([[30.0, 0.0], [34.0, 0.0], [34.0, 0.5], [30.0, 0.5]])
     spots = np.array([[31.0, 0.5], [35.0, -0.5]])
     figure = draw_places(drag.x, drag.y, 9.0 * drag.score, None, [Outline("p1", corners)], spots)
@@ -225,7 +225,7 @@ SCREENS = {
 def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
     figure = draw_diagnosis(diagnosis, [])
     assert off_the_sheet(figure) == []
-    verdict, zones, drag = diagnosis.verdict, diagnosis.misfit.zones, diagnosis.drag_map
+    verdict, zones, drag = diagnosis.verdict, diagnosis.misfit.zones, diagnosis.place_map
     assert figure.get_suptitle() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
     scores, visible, alike, *rest = figure.axes
     assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {

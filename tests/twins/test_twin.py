@@ -15,7 +15,7 @@ from vegglue.cli.main import main
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import DragLocation, Step
+from vegglue.results.diagnosis import Location, Step
 from vegglue.screening.candidates import with_effect
 from vegglue.screening.score_test import project
 from vegglue.storage.result_files import write_diagnosis
@@ -166,7 +166,7 @@ def test_marks_of_every_kind() -> None:
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].amplitude is False
-    location = DragLocation(30.0, 0.4, ("low",), 1.0, 5.0)
+    location = Location(30.0, 0.4, ("low",), 1.0, 5.0)
     nowhere = a_diagnosis(verdict={"kind": "none-of-these", "location": location})
     assert marks(an_answer(thing), nowhere)[0].found
 

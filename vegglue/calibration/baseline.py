@@ -6,7 +6,14 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, fit, objective
-from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_independent_grid_errors
+from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.noise import (
+    Noise,
+    noise_of,
+    with_grid_error,
+    with_independent_grid_errors,
+    with_model_error,
+)
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -74,11 +81,24 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         raise InputError(f"{model.case.name}: the model finds no steady flow at its best point; widen the priors.")
     fitted = fit(model, noise, start)
     if coarse is None:
-        return Baseline(model, noise, fitted, None, None)
+        return with_own_error(Baseline(model, noise, fitted, None, None))
     on_coarse = linearise(coarse, fitted.point.z, near) or linearise(coarse, fitted.point.z)
     noise = with_grid_error(noise, grid_difference(fitted.point, on_coarse))
     fitted = fit(model, noise, fitted.point)
-    return Baseline(model, noise, fitted, coarse, on_coarse)
+    # The model's own error moves the best place, and is another there.
+    return with_own_error(with_own_error(Baseline(model, noise, fitted, coarse, on_coarse)))
+
+
+def with_own_error(base: Baseline) -> Baseline:
+    """The baseline with the model's own error as the case allows it, computed at its point, and calibrated under it."""
+    allowed = base.model.case.model_error
+    if not (allowed.friction or allowed.bed):
+        return base
+    search = search_model(base)
+    noise = with_model_error(base.noise, model_error_columns(search.model, search.point, allowed))
+    fitted = fit(base.model, noise, base.fitted.point)
+    on_coarse = None if base.coarse is None else linearise(base.coarse, fitted.point.z, base.on_coarse)
+    return replace(base, noise=noise, fitted=fitted, on_coarse=on_coarse)
 
 
 def for_prediction(base: Baseline) -> Baseline:

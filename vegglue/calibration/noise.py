@@ -1,10 +1,11 @@
-"""The covariance of the errors: those of the measurements, correlated along a section, and those of the grid.
+"""The covariance of the errors: those of the measurements, correlated along a section, of the grid and of the model.
 
-    cov = s^2 D R D + E,   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
+    cov = s^2 D R D + E + M + O O',   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
 
 D are the standard errors of the measurements and s their scale. rho is the correlation of neighbours in a section, d
 their usual spacing and d_ij the distance between stations i and j. R_ij is 0 between sections, experiments and kinds.
-g is the error of discretisation and c its correlation between two stations.
+g is the error of discretisation and c its correlation between two stations. M is the model's own error, see
+`model_error`. A column of O is an instrument found to be off: what all its readings share counts for nothing.
 """
 
 import itertools
@@ -33,6 +34,9 @@ SCALE_EVIDENCE = 6.6
 # Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
 # Chosen, not measured: more pairs cost time and guard against a local maximum.
 START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
+# Offset of an instrument that is off, over the largest standard error of its readings [-]: so large that it is free,
+# and the covariance can still be factored.
+UNKNOWN_OFFSET = 1e3
 # Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
 # decide between some correlation and none. Chosen, not measured: closer levels only cost time.
 CORRELATION_LEVELS, UNCORRELATED_CHANCE = np.linspace(0.05, 0.95, 19), 0.5
@@ -52,6 +56,8 @@ class Noise:
     scale: float  # s [-]
     lower: Array  # lower Cholesky factor of the covariance (n, n)
     correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
+    model_error: Array  # M (n, n), zero when the model is taken to be right
+    offsets: Array  # O (n, k), instruments that are off by an unknown amount
 
     def used(self, values: Array) -> Array:
         """The rows of the used stations (n, ...) of values of all stations (station, ...)."""
@@ -100,7 +106,20 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     value = used["value"].to_numpy(float)
     certain = np.array([[0.0], [1.0]])
     return _with_cholesky(
-        Noise(rows, value, error, _separation(used), zero, GRID_ERROR_CORRELATION, 0.0, 1.0, np.diag(error), certain)
+        Noise(
+            rows=rows,
+            value=value,
+            error=error,
+            separation=_separation(used),
+            grid_error=zero,
+            grid_correlation=GRID_ERROR_CORRELATION,
+            correlation=0.0,
+            scale=1.0,
+            lower=np.diag(error),
+            correlation_chances=certain,
+            model_error=np.zeros((len(used), len(used))),
+            offsets=np.zeros((len(used), 0)),
+        )
     )
 
 
@@ -123,11 +142,19 @@ def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
     return _with_cholesky(replace(noise, correlation=correlation, scale=scale, correlation_chances=certain))
 
 
-def downweight_outliers(noise: Noise, outliers: np.ndarray) -> Noise:
-    """The noise with standard errors 1,000 times as large at `outliers`, indices among the used stations."""
-    error = noise.error.copy()
-    error[outliers] = 1e3 * noise.error[outliers]
-    return _with_cholesky(replace(noise, error=error))
+def with_model_error(noise: Noise, columns: Array) -> Noise:
+    """The noise with M = columns columns' (station, k), see `model_error_columns`."""
+    used = noise.used(columns)
+    return _with_cholesky(replace(noise, model_error=used @ used.T))
+
+
+def with_offset(noise: Noise, readings: np.ndarray) -> Noise:
+    """The noise with one instrument off by an unknown amount, of which all `readings` (indices of used stations) have
+    their share: a single one counts for nothing any more, of several only what differs between them.
+    """
+    column = np.zeros(noise.rows.size)
+    column[readings] = UNKNOWN_OFFSET * noise.error[readings].max()
+    return _with_cholesky(replace(noise, offsets=np.column_stack([noise.offsets, column])))
 
 
 def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
@@ -201,12 +228,13 @@ def _with_cholesky(noise: Noise) -> Noise:
 
 
 def covariance_of(noise: Noise) -> Array:
-    """s^2 D R D + E of the used stations (n, n)."""
+    """s^2 D R D + E + M + O O' of the used stations (n, n)."""
     rho, size = noise.correlation, noise.rows.size
     correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
     covariance = noise.scale**2 * correlations * np.outer(noise.error, noise.error)
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
-    return np.asarray(covariance + shared + np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2))
+    own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
+    return np.asarray(covariance + shared + own + noise.model_error + noise.offsets @ noise.offsets.T)
 
 
 def _separation(used: pd.DataFrame) -> Array:

@@ -129,6 +129,13 @@ class Infer(Part):
     behavioural: Number | None = Field(default=None, description="threshold of an informal likelihood [-]")
 
 
+class ModelError(Part):
+    """By how much the model itself may be wrong everywhere, the same in all experiments; 0 where nothing is said."""
+
+    friction: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="relative error of friction [-]")
+    bed: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="error of the surveyed bed [m]")
+
+
 class Validation(Part):
     """Measurements that no calibration sees: for judging a finished model only."""
 
@@ -171,6 +178,7 @@ class Case(Part):
     numerics: Numerics = Field(default_factory=Numerics, description="choices of the solver")
     simulate: Simulate = Field(default_factory=Simulate, description="size and seed of the ensemble")
     infer: Infer = Field(default_factory=Infer, description="likelihood")
+    model_error: ModelError = Field(default_factory=ModelError, description="by how much the model itself is wrong")
     validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
     reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")

@@ -108,7 +108,15 @@ def _standing(problem: Problem) -> dict[str, Array]:
     speed = np.geomspace(0.001, 3.0, 40)[:, None] * np.ones(problem.members)
     one = np.ones_like(speed)
     plants = PlantCells(
-        2.0 * one, 0.5 * one, 0.3 * one, speed, one[:, :1], -0.1 * one[:, :1], one[:, :1], 0.0 * one[:, :1]
+        phi=2.0 * one,
+        canopy_height=0.5 * one,
+        depth=0.3 * one,
+        speed=speed,
+        front=one[:, :1],
+        edge=-0.1 * one[:, :1],
+        x=one[:, :1],
+        y=0.0 * one[:, :1],
+        patch=0.0 * one[:, :1],
     )
     return applied(problem.effects, "plants", plants, {"phi": plants.phi, "canopy_height": plants.canopy_height})
 

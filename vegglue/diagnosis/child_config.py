@@ -11,9 +11,18 @@ from vegglue.case.messages import nearest
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
+from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.screening.candidates import Candidate, effect_entry, prior_of, where_it_may_act
+from vegglue.screening.candidates import (
+    Candidate,
+    acting_in,
+    effect_entry,
+    patch_candidate,
+    place_candidate,
+    prior_of,
+    where_it_may_act,
+)
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -27,6 +36,8 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
         raise InputError(f"--add: `{name}` is not an effect of the library: {nearest(name.split('[')[0], known)}")
     effect = known[found[1]]
     where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
+    if where and "search" in effect.tags:
+        return _named_place(effect, where)
     places = where_it_may_act(case, station)
     kind = next((kind for kind, names in places.items() if where and set(where) <= set(names)), None)
     if where and (kind is None or (kind in ("section", "device") and effect.stage != "sensor")):
@@ -35,10 +46,29 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
             + (f" or sections ({', '.join(places['section'])})" if effect.stage == "sensor" else "")
             + f", got {', '.join(where)}; correct them."
         )
-    candidate = Candidate(effect, **{f"{kind}s": where}) if kind else Candidate(effect)
+    candidate = _acting_in(case, effect, kind, where)
     if candidate.key in case.effects:
         raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
     return candidate
+
+
+def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, ...]) -> Candidate:
+    """The effect where it acts: one patch, or some experiments, sections or devices; everywhere without a kind."""
+    if kind == "patch":
+        return patch_candidate(effect, [patch.name for patch in case.plants.patches].index(where[0]), case)
+    return acting_in(effect, kind, where) if kind else Candidate(effect)
+
+
+def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
+    """Something unlisted at `x47.3,y-0.5`, of the default size."""
+    found = [re.fullmatch(rf"{axis}(-?[\d.]+)", part) for axis, part in zip("xy", where, strict=False)]
+    if len(where) != 2 or None in found:
+        raise InputError(
+            f"--add: `{effect.name}[{','.join(where)}]`: expected a place such as [x47.3,y-0.5]; correct it."
+        )
+    x, y = (float(one[1]) for one in found if one is not None)
+    shapes = {shape.name: shape.default for shape in effect.shapes} | {"x": x, "y": y}
+    return place_candidate(effect, shapes)
 
 
 def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Tree:
@@ -57,7 +87,7 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
             raise InputError(f"--shape: `{min(unknown)}` is not a shape of {candidate.name}: it has {names or 'none'}.")
         working = effect_entry(candidate, candidate.parameter, shapes)
         tree["effects"][candidate.key] = working.model_dump(mode="json", exclude_defaults=True)
-        prior = prior_of(candidate.effect).model_dump(exclude_none=True, exclude={"symbol"})
+        prior = prior_of(candidate).model_dump(exclude_none=True, exclude={"symbol"})
         tree["parameters"][candidate.parameter] = prior
     return tree
 

@@ -1,59 +1,74 @@
 """What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
+import scipy.linalg
 import scipy.stats
 
 from vegglue.calibration.fit import chi2, interval95
-from vegglue.diagnosis.detection import FALSE_ALARMS_OF_EFFECTS, MOST_OUTLIERS, Detected, detected
+from vegglue.calibration.noise import covariance_of
+from vegglue.diagnosis.competition import tempering
+from vegglue.diagnosis.field_scan import best_field, map_of_field
+from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
-from vegglue.diagnosis.suspects import not_excluded
-from vegglue.diagnosis.verdict import judged
+from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
+from vegglue.diagnosis.unseen import unseen_ratio
+from vegglue.diagnosis.verdict import POOR, Grounds, judged
+from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.results.diagnosis import (
     Diagnosis,
-    DragLocation,
-    DragMap,
     EstimatedErrors,
+    FieldFound,
     FirstScreening,
     Misfit,
+    ModelErrorUsed,
     ParameterEstimates,
+    PlaceMap,
     Predictions,
-    Step,
     Suspect,
 )
 from vegglue.screening import score_test
 from vegglue.screening.residual_screening import Screening
+from vegglue.site.channel_geometry import half_width
 from vegglue.version import VERSION
 
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
-# Share of the squared fingerprint of a spot of drag above which an experiment is said to point at it.
-POINTS_AT_IT = 0.1
+# Odds by which a field must beat all that was accepted: 10 to 1, as a place an effect.
+LEAST_ODDS = 10.0
+# Shares of the allowed model error of which the likelihood is computed [-].
+ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
 
-def concluded(first: Screening, last: Screening, steps: Sequence[Step], suspects: Mapping[str, Suspect]) -> Diagnosis:
-    """The diagnosis; steps: what was accepted between both screenings; suspects: of every effect by its name."""
-    still = detected(last, steps)
+def concluded(
+    first: Screening, last: Screening, found: Findings, suspects: Mapping[str, Suspect], unseen: Model | None
+) -> Diagnosis:
+    """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
-    misfit, errors = _misfit(first, last), _errors(last)
-    verdict = judged(
-        errors,
-        misfit,
-        steps,
-        ranked,
-        location=_drag_location(last) if still == "drag" else None,
-        not_excluded=not_excluded(last) if still == "nothing" and not steps else (),
-        unexplained="" if steps else _unexplained(last, still),
+    misfit, errors, model_error = _misfit(first, last, found), _errors(last, found), _model_error(last)
+    field = _field(first, last, found, misfit)
+    silent = not (found.steps or found.places or found.undecided)
+    grounds = Grounds(
+        errors=errors,
+        misfit=misfit,
+        findings=found,
+        field=field,
+        model_error=model_error,
+        not_excluded=not_excluded(last) if silent and not found.instruments else (),
+        unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
+        neighbours=_neighbours_aside(last, found),
+        strained=_strained(last),
     )
     base, before = last.base, first.base
     return Diagnosis(
         name=before.model.case.name,
         version=VERSION,
-        verdict=verdict,
+        verdict=judged(grounds, ranked),
         suspects=ranked,
-        steps=tuple(steps),
+        steps=found.steps,
         misfit=misfit,
         errors=errors,
         first_screening=_first_screening(first),
@@ -67,7 +82,11 @@ def concluded(first: Screening, last: Screening, steps: Sequence[Step], suspects
             last=base.fitted.point.prediction,
             error=base.noise.among_all(base.noise.data_error, len(base.model.station)),
         ),
-        drag_map=_drag_map(last if still == "drag" else first),  # a location is found in what the steps leave
+        place_map=_place_map(first, found),
+        places=found.places,
+        instruments=found.instruments,
+        field=field,
+        model_error=model_error,
     )
 
 
@@ -76,10 +95,10 @@ def chance_of_misfit(misfit: float, freedom: int) -> float:
     return float(scipy.stats.chi2.sf(misfit, max(freedom, 1)))
 
 
-def _misfit(first: Screening, last: Screening) -> Misfit:
+def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    freedom = after.noise.rows.size - after.fitted.point.z.size - len(last.flagged)
+    freedom = after.noise.rows.size - after.fitted.point.z.size - len(found.instruments)
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
         chi2=misfit,
@@ -89,10 +108,75 @@ def _misfit(first: Screening, last: Screening) -> Misfit:
     )
 
 
-def _errors(screening: Screening) -> EstimatedErrors:
+def _errors(screening: Screening, found: Findings) -> EstimatedErrors:
     noise = screening.base.noise
-    flagged = tuple(int(noise.rows[row]) for row in screening.flagged)
+    flagged = tuple(int(noise.rows[row]) for row in found.flagged)
     return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid_error), flagged)
+
+
+def _model_error(screening: Screening) -> ModelErrorUsed | None:
+    """By how much the model may be wrong, and the share of it that the residual makes likeliest; None where none is
+    allowed.
+    """
+    noise, allowed, search = screening.search.noise, screening.base.model.case.model_error, screening.search
+    if not noise.model_error.any():
+        return None
+    slope = noise.used(search.point.slope)
+    residual = noise.residual(search.point.prediction) + slope @ search.point.z
+    without = covariance_of(replace(noise, model_error=np.zeros_like(noise.model_error))) + slope @ slope.T
+    logs = []
+    for share in ERROR_SHARES:
+        factor = scipy.linalg.cho_factor(without + share**2 * noise.model_error, lower=True)
+        misfit = residual @ scipy.linalg.cho_solve(factor, residual)
+        logs.append(-0.5 * misfit - np.log(np.diag(factor[0])).sum())
+    best = int(np.argmax(logs))
+    gained = float(logs[best] - logs[ERROR_SHARES.index(1.0)])
+    return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
+
+
+def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -> FieldFound | None:
+    """A smooth field of one term, where it explains the misfit of the first model better than all that was accepted, or
+    closes a misfit in which nothing was; None where there is nothing to explain.
+    """
+    if not (found.accepted or found.undecided) and misfit.p >= POOR:
+        return None
+    screening = first if found.accepted else last
+    best, responses = best_field(screening.search, half_width(screening.base.model.site))
+    ahead = (best.log_factor - found.log_evidence) / tempering(np.array(best.log_factor))
+    if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS):
+        return None
+    mapped, grid = map_of_field(screening.search, responses, best), responses.grid
+    i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)
+    return FieldFound(
+        term=best.term,
+        size=best.size,
+        length=best.over.length,
+        width=best.over.width,
+        log_factor=best.log_factor,
+        value=float(mapped.value[i, j]),
+        error=float(mapped.error[i, j]),
+        x=float(grid.x[i]),
+        y=float(grid.y[j]),
+    )
+
+
+def _neighbours_aside(screening: Screening, found: Findings) -> bool:
+    """Whether two single readings were set aside that stand side by side in one section."""
+    single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
+    noise = screening.base.noise
+    rows = [int(np.flatnonzero(noise.rows == station)[0]) for station in single]
+    return any(0.0 < noise.separation[a, b] < 1.5 for a in rows for b in rows)
+
+
+def _strained(screening: Screening) -> tuple[str, float]:
+    """The calibrated parameter, other than the amplitude of an effect, that lies furthest from the middle of its prior,
+    and how far [standard deviations].
+    """
+    model, z = screening.base.model, screening.base.fitted.point.z
+    amplitudes = {value for entry in model.case.effects.values() for value in entry.values.values()}
+    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in amplitudes]
+    far, name = max(own, default=(0.0, ""))
+    return name, far
 
 
 def _first_screening(screening: Screening) -> FirstScreening:
@@ -106,26 +190,9 @@ def _first_screening(screening: Screening) -> FirstScreening:
     )
 
 
-def _drag_location(screening: Screening) -> DragLocation:
-    """Where the spot of drag lies that explains most."""
-    family, spots, noise = screening.spots, screening.fingerprints.spots, screening.base.noise
-    best = family.best
-    drag = float(family.scores[best] / max(family.length[best], 1e-300))
-    white = noise.whiten(noise.used(spots.fingerprints[:, best : best + 1]))[:, 0] ** 2
-    names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
-    share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
-    pointing = tuple(name for name, part in share.items() if part > POINTS_AT_IT)
-    return DragLocation(float(spots.x[best]), float(spots.y[best]), pointing, drag, float(family.scores[best]))
-
-
-def _drag_map(screening: Screening) -> DragMap:
-    spots = screening.fingerprints.spots
-    return DragMap(spots.x, spots.y, screening.spots.scores)
-
-
-def _unexplained(screening: Screening, still: Detected) -> str:
-    """What is detected although nothing came of it, '' if nothing is."""
-    if still == "effect":
-        strongest = screening.fingerprints.candidates[screening.ranking[0]].name
-        return f"{strongest} stands out, but no calibrated flow with it fits better"
-    return f"more than {MOST_OUTLIERS} stations stand alone" if still == "outlier" else ""
+def _place_map(screening: Screening, found: Findings) -> PlaceMap:
+    """Scores of the term of the first place that was found, else of drag, before anything was accepted."""
+    term = found.places[0].term if found.places else "drag"
+    places = next(one for one in screening.fingerprints.places if one.term == term)
+    scores = next(one for one in screening.kinds if one.name == term).scores
+    return PlaceMap(term, places.x, places.y, scores)

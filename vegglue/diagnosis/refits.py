@@ -1,151 +1,131 @@
-"""Suspects calibrated: the best of them, the rivals that may be it instead, and the model that follows; then backward
-elimination, of effects accepted earlier that a later one has made superfluous."""
+"""Hypotheses calibrated in earnest: the search model with one effect more, from one start or two, and its evidence.
 
-from collections.abc import Callable, Sequence
+    ln B = -1/2 (F - F_0) - 1/2 ln(|H| / |H_0|),   F = |W (y - f)|^2 + |z|^2,   H = J' W' W J + 1
+
+This is Laplace's approximation of the Bayes factor against nothing missing (0), at the best place of each: on the scale
+of z priors are standard normal, so that their widths are charged by |H|.
+Source: Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not checked against it.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
-import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, grid_difference
-from vegglue.calibration.fit import MapEstimate, chi2, fit, interval95, objective
+from vegglue.calibration.baseline import Baseline, SearchModel, grid_difference, with_own_error
+from vegglue.calibration.fit import MapEstimate, fit, interval95
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
-from vegglue.diagnosis.verdict import MOST_GROUPS
+from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise
 from vegglue.parallel import in_threads
-from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, candidates_in_case, with_effect
-from vegglue.screening.residual_screening import Screening, refit_start
+from vegglue.progress import Say
+from vegglue.results.diagnosis import Suspect
+from vegglue.screening.candidates import Candidate, candidates_in_case, start_amplitude, with_effect
 
-# Suspects that are refitted in one round, and steps each of them may take.
-REFITTED, REFIT_STEPS = 6, 8
-# Scores this much below the best one's (in squares, and as a share of it) are not refitted, nor is one below 2 standard
-# errors: errors alone make every twentieth effect as strong.
-BEHIND, BEHIND_SHARE, LEAST_SQUARE = 15.0, 0.45, 4.0
-# Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
-# others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
-IN_SET, HARDLY = 0.95, 0.05
+# Steps that a refit may take. Chosen, not measured: most need four.
+REFIT_STEPS = 10
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is to be refitted: a candidate with values of its shapes, and z (k, p + 1) of the places to start from."""
+
+    candidate: Candidate
+    shapes: Mapping[str, float]
+    starts: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
 class Refit:
-    """The search model with one effect more at its best place; column: its fingerprint; amplitude with its 95 %
-    interval.
+    """The search model with one effect more at its best place; log_factor: ln B against nothing missing [-]; amplitude
+    with its 95 % interval.
     """
 
     candidate: Candidate
-    column: int
+    shapes: Mapping[str, float]
     fitted: MapEstimate
+    log_factor: float
     amplitude: float
     interval95: tuple[float, float]
 
     def of(self, suspect: Suspect) -> Suspect:
         """The suspect with the amplitude of its refit."""
-        first_order = replace(suspect.amplitude, value=self.amplitude, interval95=self.interval95)
-        return replace(suspect, amplitude=replace(first_order, refitted=True, objective=self.fitted.objective))
+        own = replace(suspect.amplitude, value=self.amplitude, interval95=self.interval95)
+        amplitude = replace(own, refitted=True, objective=self.fitted.objective)
+        return replace(suspect, shapes=dict(self.shapes), amplitude=amplitude)
 
 
-def refits_of(screening: Screening, say: Callable[[str], None]) -> list[Refit]:
-    """The most suspect effects refitted, the best first; those that find no flow are left out."""
-    tried = _worth_refitting(screening)
-    say(f"refitting with {', '.join(screening.fingerprints.candidates[j].name for j in tried)}")
-    found = in_threads(partial(_refit, screening), [(j,) for j in tried])
-    return sorted((one for one in found if one is not None), key=lambda one: one.fitted.objective)
+def refits_of(search: SearchModel, trials: Sequence[Trial]) -> list[Refit | None]:
+    """Each trial refitted, side by side; None where no flow is found."""
+    nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
+    tasks = [(search, trial, start) for trial in trials for start in trial.starts]
+    ends = iter(in_threads(_refitted, tasks))
+    found: list[Refit | None] = []
+    for trial in trials:
+        fits = [end for end in [next(ends) for _ in trial.starts] if end is not None]
+        best = min(fits, key=lambda one: one.objective, default=None)
+        found.append(None if best is None else _refit(search, trial, best, nothing))
+    return found
 
 
-def accepted(
-    screening: Screening, refits: list[Refit], later: bool, say: Callable[[str], None]
-) -> tuple[Step, Baseline] | None:
-    """The best refit as a step, with the rivals that may be it instead, and the baseline it leads to.
+def changed_case(case: Case, trial: Trial) -> Case:
+    """The case with what is tried."""
+    return with_effect(case, trial.candidate, trial.shapes)
 
-    None when one parameter more would lower the misfit as much (5 %), when a later effect has so many rivals that they
-    say nothing, or when no flow is found with it.
+
+def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z: Array, gain: float) -> Array:
+    """z (p + 1,) of the changed case: z (p,) and the amplitude of that gain."""
+    changed = with_effect(case, candidate, shapes)
+    amplitude = start_amplitude(candidate.amplitude, gain)
+    return np.append(z, z_of(changed.parameters[candidate.parameter], amplitude))
+
+
+def log_evidence(fitted: MapEstimate) -> float:
+    """-1/2 F - 1/2 ln|H| of a calibrated model, up to what all models of the same data share [-]."""
+    return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
+
+
+def _refitted(search: SearchModel, trial: Trial, start: Array) -> MapEstimate | None:
+    model = replace(search.model, case=changed_case(search.model.case, trial))
+    point = linearise(model, start, search.point) or linearise(model, start)
+    return None if point is None else fit(model, search.noise, point, REFIT_STEPS)
+
+
+def _refit(search: SearchModel, trial: Trial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
+    model = replace(search.model, case=changed_case(search.model.case, trial))
+    amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
+    gained = log_evidence(fitted) - log_evidence(nothing)
+    return Refit(trial.candidate, trial.shapes, fitted, gained, amplitude, (low, high))
+
+
+def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
+    """The model with an accepted hypothesis as the next baseline, the error of its grid and its own looked at again;
+    None where it finds no flow.
     """
-    search = screening.search
-    fall = [objective(search.noise, search.point) - one.fitted.objective for one in refits]
-    if not refits or fall[0] < scipy.stats.chi2.ppf(0.95, 1):
-        return None
-    best, chance, groups = refits[0], *rivals_among(refits, np.array(fall), score_test.cosines(screening.projected))
-    if later and len(groups) > MOST_GROUPS:
-        return None
-    say(f"calibrating with {best.candidate.name}")
-    further = _calibrated_with(screening, best)
-    if further is None:
-        return None
-    base, p_family = screening.base, float(np.exp(screening.effects.log_p()))
-    before = chi2(base.noise, base.fitted.point)
-    rivals, chances = tuple(chance), tuple(chance.values())
-    return Step(best.candidate.name, rivals, chances, groups, before, further.fitted.chi2, p_family), further
-
-
-def rivals_among(
-    refits: Sequence[Refit], fall: Array, cosine: Array
-) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """The chance of each refit in the fewest groups that hold IN_SET of it, the likeliest first, and these groups.
-
-    fall (k,): by how much each lowers the objective; cosine (c, c): between projected fingerprints.
-    """
-    columns, names = [one.column for one in refits], [one.candidate.name for one in refits]
-    chance = score_test.chances_of_rivals(fall)
-    near = chance >= HARDLY * chance.max()
-    alike = np.where(near & near[:, None], cosine[np.ix_(columns, columns)], 0.0)
-    kept = score_test.fewest_groups(score_test.alike_groups(range(len(refits)), alike), chance, IN_SET)
-    likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
-    return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
-
-
-def _calibrated_with(screening: Screening, best: Refit) -> Baseline | None:
-    """The model with the accepted effect as the next baseline, the error of its grid looked at again; None where it
-    finds no flow.
-    """
-    base, place = screening.base, best.fitted.point
-    model = _with(base.model, screening, best)
+    place = best.fitted.point
+    model = _with(base.model, best)
     if base.coarse is None:
-        return Baseline(model, base.noise, best.fitted, None, None)
-    on_own_grid = screening.search.model is base.model
-    start = place if on_own_grid else linearise(model, place.z, place) or linearise(model, place.z)
+        return with_own_error(Baseline(model, base.noise, best.fitted, None, None))
+    start = linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
         return None
-    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, screening, best)
+    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, best)
     on_coarse = linearise(coarse, fitted.point.z, base.on_coarse)
     noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
-    return Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse)
+    return with_own_error(Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse))
 
 
-def _with(model: Model, screening: Screening, one: Refit) -> Model:
-    return replace(model, case=with_effect(model.case, one.candidate, screening.fingerprints.settings[one.column]))
-
-
-def _worth_refitting(screening: Screening) -> list[int]:
-    """Candidates whose score is not far behind the best one's, the best first."""
-    ranking = screening.ranking
-    squares = {j: screening.best_score(j) ** 2 for j in ranking}
-    most = max(squares.values())
-    least = min(most - BEHIND, BEHIND_SHARE * most)
-    return [j for j in ranking[:REFITTED] if squares[j] >= max(least, LEAST_SQUARE)] or ranking[:1]
-
-
-def _refit(screening: Screening, candidate: int) -> Refit | None:
-    one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
-    search = screening.search
-    model = replace(search.model, case=with_effect(search.model.case, one, screening.fingerprints.settings[column]))
-    start = linearise(model, refit_start(screening, candidate, model.case), search.point)
-    if start is None:
-        return None
-    fitted = fit(model, search.noise, start, REFIT_STEPS)
-    amplitude, low, high = interval95(model, fitted, one.parameter)
-    return Refit(one, column, fitted, amplitude, (low, high))
+def _with(model: Model, best: Refit) -> Model:
+    return replace(model, case=with_effect(model.case, best.candidate, best.shapes))
 
 
 # An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
 NEEDED = 2.0
 
 
-def pruned(base: Baseline, earlier: list[str], say: Callable[[str], None]) -> tuple[Baseline, list[str]]:
+def pruned(base: Baseline, earlier: list[str], say: Say) -> tuple[Baseline, list[str]]:
     """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
     unneeded: list[str] = []
     for name in earlier:

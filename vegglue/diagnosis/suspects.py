@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from vegglue.diagnosis.detection import FALSE_ALARMS_OF_EFFECTS
 from vegglue.results.diagnosis import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 from vegglue.screening import score_test
 from vegglue.screening.residual_screening import Screening
 
+# Rate at which errors alone make some listed effect score higher than what counts as detectable.
+FALSE_ALARMS_OF_EFFECTS = 0.04
 # Length of a fingerprint, in standard errors, that is missed more often than not: thresholds are near a score of 3.2.
 UNDETECTED_LENGTH = 3.0
 # Share of the chances that the effects listed as not excluded hold together.
@@ -65,6 +66,7 @@ def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimat
         off=amplitude.off,
         scale=amplitude.scale,
         refitted=False,
+        support=(amplitude.low, amplitude.high),
         objective=screening.base.fitted.objective - float(score**2),
     )
 

@@ -1,8 +1,26 @@
-"""What was found, in words: one verdict in one sentence, remarks, and where the model misses."""
+"""What was found, in words: one verdict in one sentence, remarks, and where the model misses.
+
+Silence has to be earned, and so has a name: see DECISIONS.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from vegglue.results.diagnosis import DragLocation, EstimatedErrors, Misfit, Step, Suspect, Verdict, VerdictKind
+import numpy as np
+
+from vegglue.diagnosis.findings import Findings
+from vegglue.results.diagnosis import (
+    EstimatedErrors,
+    FaultyInstrument,
+    FieldFound,
+    Location,
+    Misfit,
+    ModelErrorUsed,
+    Step,
+    Suspect,
+    Verdict,
+    VerdictKind,
+)
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -18,57 +36,167 @@ IMPLAUSIBLE = 3.0
 CONFOUNDED = 0.8
 # Names that a remark holds at most.
 NAMES_SHOWN = 8
+# Scale and correlation of the errors above which they, and not the model, would explain the misfit: nothing is then
+# said to be missing or not. Stated errors are good to a quarter; probes side by side that err alike by more than 0.8
+# are a model that errs. Chosen, not measured.
+LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
+# ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
+# degree of freedom; and errors at what was not seen, over those expected, above which it disagrees.
+NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
+# chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
+# Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
+ABSURD, FAR_OFF = 4.0, 4.0
+# Share of the support of an amplitude within which it lies at a bound.
+AT_BOUND = 0.01
 
 
-def judged(
-    errors: EstimatedErrors,
-    misfit: Misfit,
-    steps: Sequence[Step],
-    suspects: Sequence[Suspect],
-    location: DragLocation | None,
-    not_excluded: tuple[tuple[str, ...], ...],
-    unexplained: str,
-) -> Verdict:
-    """The verdict, its sentence, and what else should be known. unexplained: what stands out and nothing came of."""
-    open_still = _open(not_excluded) if misfit.p >= POOR else []
-    remarks = [*_implausible(steps, suspects), *open_still, *_remarks(errors, suspects)]
-    kind, sentence = _sentence(misfit, steps, suspects, location, unexplained)
-    if kind in ("identified", "one-of") and misfit.p < POOR:
+@dataclass(frozen=True)
+class Grounds:
+    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; neighbours:
+    whether readings side by side were set aside; strained: the parameter furthest off its prior, and how far.
+    """
+
+    errors: EstimatedErrors
+    misfit: Misfit
+    findings: Findings
+    field: FieldFound | None
+    model_error: ModelErrorUsed | None
+    not_excluded: tuple[tuple[str, ...], ...]
+    unseen: float
+    neighbours: bool
+    strained: tuple[str, float]
+
+
+def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
+    """The verdict, its sentence, and what else should be known."""
+    found, misfit = grounds.findings, grounds.misfit
+    open_still = _open(grounds.not_excluded) if misfit.p >= POOR else []
+    kind, sentence = _sentence(grounds, suspects)
+    remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects)]
+    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR:
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."
         )
-    return Verdict(kind, sentence, tuple(remarks), location, not_excluded)
+    location = found.places[0] if found.places else None
+    return Verdict(kind, sentence, tuple(remarks), location, grounds.not_excluded)
 
 
-def _sentence(
-    misfit: Misfit, steps: Sequence[Step], suspects: Sequence[Suspect], location: DragLocation | None, unexplained: str
-) -> tuple[VerdictKind, str]:
-    if location is not None:
-        before = f", after {_names(steps)}" if steps else ""
+def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
+    found, misfit = grounds.findings, grounds.misfit
+    doubt = _doubt(grounds, suspects)
+    named = _named(found, suspects)
+    if grounds.field is not None:
+        words = _field_words(grounds.field) + (f", rather than {named}" if named else "")
+        return "none-of-these", f"None of the known effects: {words} ({_told(misfit)} without it)."
+    if found.places or found.steps:
+        if doubt:
+            return "cannot-tell", f"These data cannot tell: {doubt}. What explains most of the misfit: {named}."
+        if found.places:
+            return "none-of-these", f"None of the known effects: {named}; {_told(misfit)} with it."
+        if len(found.steps[0].groups) > MOST_GROUPS:
+            names = ", ".join(_likely(found.steps[0], found.steps[0].rivals))
+            which = f"which of {names} it is (chances among those calibrated)"
+            return "cannot-tell", f"Something is missing, but these data cannot tell {which}."
+        single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
+        also = f" {_instruments(found.instruments)}" if found.instruments else ""
+        return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with it.{also}"
+    if found.undecided:
+        names = " or ".join(one.name for one in found.undecided[:3])
+        return "cannot-tell", f"These data cannot tell: {names} stands out, but none of them surely ({_told(misfit)})."
+    return _without_findings(grounds, suspects)
+
+
+def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
+    """Why no name can be believed, '' when it can."""
+    misfit, (parameter, far) = grounds.misfit, grounds.strained
+    ratio = misfit.chi2 / max(misfit.freedom, 1)
+    if ratio > ABSURD:
         return (
-            "none-of-these",
-            f"None of the known effects{before}: the misfit points at x = {location.x:.1f}, y = {location.y:.1f} m, "
-            f"where something holds the flow back or lets it pass that the model does not have ({_told(misfit)} "
-            "without it).",
+            f"with all that was found the model still misses by {np.sqrt(ratio):.1f} times the errors that are allowed "
+            f"for ({_told(misfit)}); check units, datum, bed and boundaries first"
         )
-    if unexplained:
-        return "cannot-tell", f"These data cannot tell: {unexplained} ({_told(misfit)})."
-    if not steps:
-        return _without_steps(suspects, misfit)
-    if len(steps[0].groups) > MOST_GROUPS:
-        names = ", ".join(_likely(steps[0], steps[0].rivals))
-        which = f"which of {names} it is (chances among those calibrated)"
-        return "cannot-tell", f"Something is missing, but these data cannot tell {which}."
-    sentences = "; and ".join(_step_words(step, suspects) for step in steps)
-    single = all(len(step.rivals) == 1 for step in steps)
-    return ("identified" if single else "one-of"), f"Missing: {sentences}; {_told(misfit)} with it."
+    if far > FAR_OFF:
+        return f"{parameter} would have to lie {far:.1f} standard deviations from the middle of its prior"
+    at_bound = [one.name for one in suspects if one.name in _accepted(grounds.findings) and _is_at_bound(one)]
+    if at_bound:
+        return f"{' and '.join(at_bound)} would have to be as large as can be, and stands in for something else"
+    return ""
+
+
+def _accepted(found: Findings) -> list[str]:
+    return [step.accepted for step in found.steps]
+
+
+def _is_at_bound(suspect: Suspect) -> bool:
+    low, high = suspect.amplitude.support
+    margin = AT_BOUND * (high - low)
+    value = suspect.amplitude.value
+    off_is_bound = suspect.amplitude.off in (low, high)
+    return bool((value < low + margin and not (off_is_bound and suspect.amplitude.off == low)) or value > high - margin)
+
+
+def _named(found: Findings, suspects: Sequence[Suspect]) -> str:
+    places = [_place_words(one) for one in found.places]
+    return "; and ".join([*places, *(_step_words(step, suspects) for step in found.steps)])
+
+
+def _place_words(place: Location) -> str:
+    what = {
+        "drag": "something holds the flow back" if place.amplitude > 0 else "something lets the flow pass",
+        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
+        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
+        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
+    }[place.term]
+    rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
+    against = [
+        f"{_odds(odds)} to 1 against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]
+    ]
+    low, high = place.interval95
+    unit = f" {place.unit}"
+    return (
+        f"at x = {place.x:.1f}, y = {place.y:.1f} m it acts as if {what} ({place.amplitude:.3g}{unit}, {low:.3g} to "
+        f"{high:.3g}{'; ' if against else ''}{''.join(against)})"
+    )
+
+
+def _odds(odds: float) -> str:
+    return "over 1,000" if odds > 1000 else f"{odds:.0f}"
+
+
+def _field_words(field: FieldFound) -> str:
+    what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
+    value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNITS[field.term]}"
+    return (
+        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.0f} m along "
+        f"and {2 * field.width:.1f} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
+    )
+
+
+UNITS = {"bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
+
+
+def _instruments(instruments: Sequence[FaultyInstrument]) -> str:
+    return " ".join(f"{_instrument_words(one)}." for one in instruments)
+
+
+def _instrument_words(one: FaultyInstrument) -> str:
+    where = ", ".join(f"{name} = {value:.4g}" for name, value in (("x", one.x), ("y", one.y)) if np.isfinite(value))
+    what = {
+        "reading": f"One reading at {where} m is off",
+        "position": f"The probe at {where} m is off in all experiments",
+        "probe": f"The probe at {where} m is off in all sections",
+        "gauge": f"The gauge at {where} m is off in all experiments",
+    }[one.kind]
+    low, high = one.interval95
+    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}); it was set aside"
 
 
 def _told(misfit: Misfit) -> str:
     return f"chi2 is {misfit.chi2:.0f} for {misfit.freedom} degrees of freedom"
 
 
-def _without_steps(suspects: Sequence[Suspect], misfit: Misfit) -> tuple[VerdictKind, str]:
+def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
+    misfit = grounds.misfit
     testable = [suspect for suspect in suspects if suspect.detectability.testable]
     if misfit.p < POOR:
         return (
@@ -76,21 +204,44 @@ def _without_steps(suspects: Sequence[Suspect], misfit: Misfit) -> tuple[Verdict
             f"The misfit is larger than the errors allow ({_told(misfit)}), but no known effect and no place stands "
             "out.",
         )
+    unearned = _unearned(grounds)
+    if unearned:
+        return "cannot-tell", f"Nothing stands out ({_told(misfit)}), but {unearned}."
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
         return (
             "cannot-tell",
             f"Nothing stands out ({_told(misfit)}), but only {len(testable)} of {len(suspects)} effects would be seen "
             "in these data if they were there at twice a plausible size.",
         )
-    return (
-        "nothing-missing",
-        f"Nothing is missing that these data could show: {_told(misfit)}, and none of {len(suspects)} effects stands "
-        f"out ({len(testable)} of them would be seen at twice a plausible size).",
+    nothing = (
+        f"{_told(misfit)}, and none of {len(suspects)} effects stands out ({len(testable)} of them would be seen at "
+        "twice a plausible size)."
     )
+    if grounds.findings.instruments:
+        return "instrument", f"{_instruments(grounds.findings.instruments)} Nothing else is missing: {nothing}"
+    return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
 
 
-def _names(steps: Sequence[Step]) -> str:
-    return " and ".join(step.accepted for step in steps)
+def _unearned(grounds: Grounds) -> str:
+    """Why it cannot be said that nothing is missing, '' when it can."""
+    errors, used = grounds.errors, grounds.model_error
+    if errors.scale > LARGEST_SCALE:
+        return f"only with errors {errors.scale:.1f} times as large as stated: they, or the model, are wrong"
+    if errors.correlation > LARGEST_CORRELATION:
+        return (
+            f"only with errors of neighbours correlated by {errors.correlation:.2f}: the model misses in the same way "
+            "over whole sections"
+        )
+    if grounds.neighbours:
+        return "readings side by side had to be set aside, which one bad probe does not explain"
+    if used is not None and used.needed > 1.0 and used.log_ratio > NEEDS_MORE:
+        return (
+            f"the model needs an error of its own of {used.needed * used.friction:.0%} in friction where "
+            f"{used.friction:.0%} is allowed"
+        )
+    if grounds.unseen > UNSEEN_RATIO:
+        return f"measurements that were not calibrated to are missed by {grounds.unseen:.1f} times what is expected"
+    return ""
 
 
 def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
@@ -106,8 +257,9 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     if same:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
     if rest or own < STATED_BELOW:
-        words += f", {'together ' if same else ''}with a chance of {own:.0%} among those calibrated"
-    return words + (f", or else {' or '.join(_likely(step, rest))}" if rest else "")
+        words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
+    others = [f"{name} ({chance:.0%})" for name, chance in step.others.items()]
+    return words + (f", or else {' or '.join([*_likely(step, rest), *others])}" if rest or others else "")
 
 
 def _likely(step: Step, names: Sequence[str]) -> list[str]:
@@ -115,21 +267,32 @@ def _likely(step: Step, names: Sequence[str]) -> list[str]:
     return [f"{name} ({step.chance[name]:.0%})" for name in names]
 
 
-def _remarks(errors: EstimatedErrors, suspects: Sequence[Suspect]) -> list[str]:
-    remarks = []
+def _remarks(grounds: Grounds, suspects: Sequence[Suspect]) -> list[str]:
+    errors, remarks = grounds.errors, []
+    if grounds.model_error is not None:
+        remarks.append(_model_error_words(grounds.model_error))
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
-    if errors.flagged:
-        number = len(errors.flagged)
-        many = "1 station stands" if number == 1 else f"{number} stations stand"
-        remarks.append(f"{many} alone against every effect and every place; no effect is judged by it.")
+    if grounds.findings.instruments and (grounds.findings.places or grounds.field is not None):
+        remarks.append(_instruments(grounds.findings.instruments))
     hidden = [suspect for suspect in suspects if not suspect.detectability.testable]
     if hidden:
         names = ", ".join(_untestable(suspect) for suspect in hidden)
         remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
     return remarks
+
+
+def _model_error_words(used: ModelErrorUsed) -> str:
+    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 3 %."""
+    allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
+    needs = (
+        "none of it"
+        if used.needed == 0.0
+        else f"{used.needed * used.friction:.1%} and {100 * used.needed * used.bed:.2g} cm"
+    )
+    return f"The model is allowed to be wrong {allowed}; it needs {needs}."
 
 
 def _open(groups: Sequence[Sequence[str]]) -> list[str]:

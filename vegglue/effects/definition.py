@@ -3,7 +3,7 @@
 Each effect acts at one stage. Its function gets what is to be seen there (`surroundings`) and its parameters, (m,)
 each, and returns what it changes, by name:
 
-    site        act(geometry, ...)  -> {"bed"}                                   added to the bed level [m]
+    site        act(geometry, ...)  -> {"bed"} [m], {"inflow"} [m/s]                      added
     boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}        takes their place
     plants      act(plants, ...)    -> {"phi", "canopy_height"}                           takes their place
     resistance  act(cells, ...)     -> {"rate"}                                           takes its place [1/m]
@@ -25,7 +25,7 @@ from vegglue.arrays import Array
 Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage hands on, and whether an effect adds to it or takes its place.
-ADDED = {"site": ("bed",), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
+ADDED = {"site": ("bed", "inflow"), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
 REPLACED = {
     "boundary": ("discharge", "level", "spread", "lateral"),
     "plants": ("phi", "canopy_height"),
@@ -100,7 +100,8 @@ class Shape:
 class Effect:
     """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`.
 
-    each: whether it is one cause for the whole case, or a cause of its own in each experiment, section or device.
+    each: whether it is one cause for the whole case, or a cause of its own in each experiment, section, device
+    or patch (a shape `patch` is then its number).
     mirrored: whether a mirrored flow feels the mirrored effect; if not, `equation` says what breaks the mirror.
     """
 
@@ -114,7 +115,7 @@ class Effect:
     source: str = ""
     doi: str = ""
     checked: bool = False
-    each: Literal["case", "experiment", "section", "device"] = "case"
+    each: Literal["case", "experiment", "section", "device", "patch"] = "case"
     mirrored: bool = True
     tags: tuple[str, ...] = ()
 

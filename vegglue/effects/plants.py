@@ -94,6 +94,11 @@ def edge_thinning(plants: PlantCells, share: Array, width: Array) -> dict[str, A
     return {"phi": plants.phi * (1.0 - share * np.exp(np.minimum(plants.edge, 0.0) / width))}
 
 
+def patch_density(plants: PlantCells, excess: Array, patch: Array) -> dict[str, Array]:
+    """phi -> phi (1 + a) in one patch, the first of which is number 1."""
+    return {"phi": plants.phi * (1.0 + excess * (plants.patch == patch - 1.0))}
+
+
 REFERENCE_SPEED = Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.35, 0.05, 2.0)
 EFFECTS = (
     Effect(
@@ -219,5 +224,18 @@ EFFECTS = (
         shapes=(Shape("width", "m", "width w of the thinner rim", 0.3, 0.02, 5.0, (0.2, 0.5)),),
         source="definition",
         checked=True,
+    ),
+    Effect(
+        name="patch_density",
+        stage="plants",
+        title="One patch is denser than counted",
+        equation="phi -> phi (1 + a) in one patch",
+        act=patch_density,
+        amplitude=Amplitude("excess", "-", "relative excess a of stems over those counted", 0.3, -0.95, 5.0),
+        shapes=(Shape("patch", "-", "number of the patch in the order of the config, from 1", 1.0, 1.0, 1e4),),
+        source="definition",
+        checked=True,
+        each="patch",
+        mirrored=False,
     ),
 )

@@ -26,6 +26,17 @@ def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -
     return {"rate": cells.rate * (cells.depth.clip(LEAST_DEPTH_OF_POWER) / reference_depth) ** (exponent * open_floor)}
 
 
+def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
+    """k -> k exp(a (x - x_m) / L) on the banks, x_m the middle of the grid and L its length."""
+    return {"rate": cells.rate * np.exp(trend * cells.geometry.bank * cells.geometry.share_along)}
+
+
+def bed_trend(cells: Cells, trend: Array) -> dict[str, Array]:
+    """k -> k exp(a (x - x_m) / L) on the floor where no plants stand."""
+    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
+    return {"rate": cells.rate * np.exp(trend * open_floor * cells.geometry.share_along)}
+
+
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
     """k -> k exp(+-a / 2) on the banks, + on that of larger y."""
     return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.bank * np.sign(cells.geometry.offset))}
@@ -69,6 +80,26 @@ EFFECTS = (
         act=depth_dependent_bed,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
         shapes=(REFERENCE_DEPTH,),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="bank_trend",
+        stage="resistance",
+        title="Banks grow rougher along the channel",
+        equation="k -> k exp(a (x - x_m)/L) on the banks, x_m the middle of the grid, L its length",
+        act=bank_trend,
+        amplitude=Amplitude("trend", "-", "logarithm a of k at the end over k at the beginning", 0.5, -4.0, 4.0),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="bed_trend",
+        stage="resistance",
+        title="The floor grows rougher along the channel",
+        equation="k -> k exp(a (x - x_m)/L) on the floor without plants, x_m the middle of the grid, L its length",
+        act=bed_trend,
+        amplitude=Amplitude("trend", "-", "logarithm a of k at the end over k at the beginning", 0.5, -4.0, 4.0),
         source="definition",
         checked=True,
     ),

@@ -11,6 +11,7 @@ from vegglue.arrays import Array
 class ChannelGeometry:
     """What does not move, at cell centres, (nx, ny, 1) [m] where not said otherwise.
 
+    share_along: (x - x_m) / L, x_m the middle of the grid and L its length, -1/2 .. 1/2 (nx, 1, 1) [-];
     offset: distance from the channel axis over the half width of the floor, positive towards larger y [-]; half_width:
     that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: 1 where plants stand
     in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite; edge: distance
@@ -20,6 +21,7 @@ class ChannelGeometry:
 
     x: Array
     y: Array
+    share_along: Array
     dx: float
     dy: float
     bed: Array
@@ -87,7 +89,7 @@ class Cells:
 @dataclass(frozen=True)
 class PlantCells:
     """Plants of each vegetated cell, (cell, m): phi [-], canopy height h_d [m], depth [m], speed [m/s]; and, (cell, 1),
-    front: distance from the upstream end of the patch, edge: from its nearest side, x, y [m].
+    front: distance from the upstream end of the patch, edge: from its nearest side, x, y [m]; patch: its index.
     """
 
     phi: Array
@@ -98,6 +100,7 @@ class PlantCells:
     edge: Array
     x: Array
     y: Array
+    patch: Array
 
 
 @dataclass(frozen=True)

@@ -1,31 +1,98 @@
-"""An object of no named kind at a place: what a diagnosis tries where no effect of the library fits."""
+"""Something of no named kind at one place: what a diagnosis tries where no effect of the library fits.
+
+Every one of them is a spot exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) in one term of the equations. Parameters are
+(m,); unit and meaning of each stand in EFFECTS.
+"""
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
-from vegglue.effects.surroundings import Cells
+from vegglue.effects.surroundings import Cells, ChannelGeometry
 
 
-def unlisted_object(cells: Cells, drag: Array, x: Array, y: Array, radius: Array) -> dict[str, Array]:
-    """k -> max(k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2), 0) [1/m], for an object of radius r at x_0, y_0 [m]."""
-    away = ((cells.geometry.x - x) ** 2 + (cells.geometry.y - y) ** 2) / radius**2
-    return {"rate": np.maximum(cells.rate + drag * np.exp(-away), 0.0)}
+def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Array) -> Array:
+    """exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) (nx, ny, m) [-]."""
+    return np.asarray(np.exp(-(((geometry.x - x) / length) ** 2) - ((geometry.y - y) / width) ** 2))
 
 
+def unlisted_object(cells: Cells, drag: Array, **place: Array) -> dict[str, Array]:
+    """k -> max(k + c spot, 0) [1/m]."""
+    return {"rate": np.maximum(cells.rate + drag * spot(cells.geometry, **place), 0.0)}
+
+
+def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
+    """z_b -> z_b + dz spot [m]."""
+    return {"bed": rise * spot(geometry, **place)}
+
+
+def unlisted_inflow(geometry: ChannelGeometry, discharge: Array, **place: Array) -> dict[str, Array]:
+    """q -> q + Q spot / (pi l w) [m/s], without momentum."""
+    area = np.pi * place["length"] * place["width"]
+    return {"inflow": discharge * spot(geometry, **place) / area}
+
+
+def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[str, Array]:
+    """nu -> max(nu + n spot, 0) [m2/s]."""
+    added = viscosity * spot(cells.geometry, **place)
+    return {"viscosity": np.maximum(added, -cells.viscosity)}
+
+
+PLACE = (
+    Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
+    Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
+    Shape("length", "m", "its half length l", 0.5, 0.01, 1e4),
+    Shape("width", "m", "its half width w", 0.5, 0.01, 1e4),
+)
+SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
 EFFECTS = (
     Effect(
         name="unlisted_object",
         stage="resistance",
-        title="Something stands in the flow (or is missing) at one place",
-        equation="k -> k + c exp(-((x - x_0)^2 + (y - y_0)^2) / r^2)",
+        title="Something holds the flow back (or lets it pass) at one place",
+        equation=f"k -> k + c {SPOT}",
         act=unlisted_object,
-        amplitude=Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 2.0, -5.0, 50.0),
-        shapes=(
-            Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
-            Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
-            Shape("radius", "m", "its radius r", 0.5, 0.01, 100.0),
-        ),
+        amplitude=Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0),
+        shapes=PLACE,
+        source="definition",
+        checked=True,
+        mirrored=False,
+        tags=("search",),
+    ),
+    Effect(
+        name="unlisted_bed",
+        stage="site",
+        title="The bed lies higher (or lower) than surveyed at one place",
+        equation=f"z_b -> z_b + dz {SPOT}",
+        act=unlisted_bed,
+        amplitude=Amplitude("rise", "m", "how much higher the bed lies there than surveyed", 0.1, -2.0, 2.0),
+        shapes=PLACE,
+        source="definition",
+        checked=True,
+        mirrored=False,
+        tags=("search",),
+    ),
+    Effect(
+        name="unlisted_inflow",
+        stage="site",
+        title="Water enters (or leaves) at one place",
+        equation=f"q -> q + Q/(pi l w) {SPOT}, without momentum",
+        act=unlisted_inflow,
+        amplitude=Amplitude("discharge", "m3/s", "discharge Q that enters there", 0.1, -50.0, 50.0),
+        shapes=PLACE,
+        source="definition",
+        checked=True,
+        mirrored=False,
+        tags=("search",),
+    ),
+    Effect(
+        name="unlisted_viscosity",
+        stage="exchange",
+        title="The water mixes more (or less) at one place",
+        equation=f"nu -> nu + n {SPOT}",
+        act=unlisted_viscosity,
+        amplitude=Amplitude("viscosity", "m2/s", "additional viscosity n in the middle of it", 0.03, -0.5, 5.0),
+        shapes=PLACE,
         source="definition",
         checked=True,
         mirrored=False,

@@ -15,6 +15,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.effects.definition import Amplitude
+from vegglue.flow.local_changes import Term
 from vegglue.site.gridded_site import Site
 
 
@@ -61,8 +62,8 @@ class Engine:
         to start from, of this model or of one on cells of twice the size.
     predict(model, points, z): predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
     responses(model, point, causes): d prediction / d (amplitude - off)^power at off, (n, causes).
-    force_response(model, point, experiment): d prediction / d f_x [m/s per m/s2] of the stations of an experiment, for
-        a force along x in each cell, (n, nx, ny).
+    responses_to_cells(model, point, experiment, terms): d prediction / d term of the stations of an experiment, for a
+        change in each cell of one of the TERMS of `flow/local_changes`, (n, nx, ny) by term.
     flow_at_centres(model, point, experiment): depth and velocities of a point.
     """
 
@@ -70,7 +71,7 @@ class Engine:
     linearise: Callable[["Model", Array, Point | None], Point | None]
     predict: Callable[["Model", Sequence[Point], Array], Array]
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
-    force_response: Callable[["Model", Point, str], Array]
+    responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Array]]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
 
 
@@ -113,9 +114,9 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     return model.engine.responses(model, point, causes)
 
 
-def force_response(model: Model, point: Point, experiment: str) -> Array:
-    """d prediction / d f_x (n, nx, ny) [m/s per m/s2] of an experiment's stations, for a force along x in each cell."""
-    return model.engine.force_response(model, point, experiment)
+def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:
+    """d prediction / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
+    return model.engine.responses_to_cells(model, point, experiment, terms)
 
 
 def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:

@@ -5,20 +5,17 @@ Slow: for tests, on small channels.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import theta_at
-from vegglue.effects.active_effect import ActiveEffect
-from vegglue.effects.definition import Amplitude, Effect, Shape
-from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import Problem, take
+from vegglue.flow.local_changes import Term, with_changed_term
+from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import read_sensors
 from vegglue.site.channel_geometry import channel_geometry
@@ -27,8 +24,10 @@ from vegglue.solver.march import march
 # A flow rests when no level or velocity changes faster than this [m/s, m/s2]; this is
 # checked every so many steps. Chosen, not measured: a smaller rate marches for longer.
 REST_RATE, STEPS_BETWEEN_CHECKS = 1e-9, 100
-# Central differences in z; the force [m/s2] of a response, a hundredth of what drives water down a slope of 1 in 1,000.
-MARCHED_DIFFERENCE_STEP, SMALL_FORCE = 0.02, 1e-4
+# Step of central differences in z [standard deviations of the prior].
+MARCHED_DIFFERENCE_STEP = 0.02
+# Small changes of a term in one cell, in its unit: large against what is left of the march when it ends.
+MARCHED_CHANGE: dict[Term, float] = {"friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-5, "viscosity": 1e-3}
 
 
 def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
@@ -38,7 +37,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
         linearise=partial(_linearised, time_step=time_step, longest=longest),
         predict=partial(_predicted, time_step=time_step, longest=longest),
         responses=partial(_responses, time_step=time_step, longest=longest),
-        force_response=partial(_force_response, time_step=time_step, longest=longest),
+        responses_to_cells=partial(_responses_to_cells, time_step=time_step, longest=longest),
         flow_at_centres=_flow_at_centres,
     )
 
@@ -84,21 +83,23 @@ def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: f
     return found
 
 
-def _force_response(model: Model, point: Point, experiment: str, time_step: float, longest: float) -> Array:
-    """(f(force) - f(-force)) / (2 force) for every cell of the grid: a member each."""
-    grid = model.site.grid
-    x, y = (values.ravel() for values in np.meshgrid(grid.x, grid.y, indexing="ij"))
+def _responses_to_cells(
+    model: Model, point: Point, experiment: str, terms: Sequence[Term], time_step: float, longest: float
+) -> dict[Term, Array]:
+    """(f(change) - f(-change)) / (2 change) for every cell of the grid: a member each."""
+    nx, ny = model.site.bed.shape
     one = _problem(model, experiment, point.z[None])
-    many = take(one, np.zeros(x.size, dtype=np.int64))
-    start = np.repeat(point.flows[experiment], x.size, axis=3)
     geometry = channel_geometry(model.case, model.site, experiment)
-    predictions = []
-    for force in (SMALL_FORCE, -SMALL_FORCE):
-        pushed = ActiveEffect(POINT_FORCE, {"force": np.full(x.size, force), "x": x, "y": y})
-        problem = replace(many, effects=(*many.effects, pushed), geometry=geometry)
-        predictions.append(_read(model, experiment, problem, _rested(problem, start, time_step, longest)))
-    response = (predictions[0] - predictions[1]).T / (2.0 * SMALL_FORCE)
-    return response.reshape(-1, grid.x.size, grid.y.size)
+    start = np.repeat(point.flows[experiment], nx * ny, axis=3)
+    found: dict[Term, Array] = {}
+    for term in terms:
+        predictions = []
+        for change in (MARCHED_CHANGE[term], -MARCHED_CHANGE[term]):
+            problem = with_changed_term(one, geometry, term, change * np.eye(nx * ny).reshape(nx, ny, nx * ny))
+            predictions.append(_read(model, experiment, problem, _rested(problem, start, time_step, longest)))
+        response = (predictions[0] - predictions[1]).T / (2.0 * MARCHED_CHANGE[term])
+        found[term] = response.reshape(-1, nx, ny)
+    return found
 
 
 def _flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
@@ -131,24 +132,3 @@ def _rested(problem: Problem, state: Array, time_step: float, longest: float) ->
 
 def _read(model: Model, experiment: str, problem: Problem, state: Array) -> Array:
     return read_sensors(problem, state, model.site.grid, model.station_of(experiment), ()).prediction
-
-
-def _point_force(cells: Cells, force: Array, x: Array, y: Array) -> dict[str, Array]:
-    """f_x = force in the cell around (x, y), 0 elsewhere [m/s2]."""
-    here = (np.abs(cells.geometry.x - x) < 0.5 * cells.geometry.dx) & (
-        np.abs(cells.geometry.y - y) < 0.5 * cells.geometry.dy
-    )
-    return {"x": force * here}
-
-
-POINT_FORCE = Effect(
-    name="point_force",
-    stage="force",
-    title="A force along x in one cell",
-    equation="f_x = force in the cell around (x, y)",
-    act=_point_force,
-    amplitude=Amplitude("force", "m/s2", "force on the water", SMALL_FORCE, -1.0, 1.0),
-    shapes=(Shape("x", "m", "where along", 0.0, -1e9, 1e9), Shape("y", "m", "where across", 0.0, -1e9, 1e9)),
-    source="definition",
-    checked=True,
-)

@@ -9,16 +9,17 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point
+from vegglue.engine.newton_fields import responses_by_adjoints
 from vegglue.engine.newton_runs import predict_members
 from vegglue.flow.equations import faces, residual
-from vegglue.flow.problem import ALONG, Problem, crop
+from vegglue.flow.problem import Problem, crop
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import read_sensors, reading_weights
+from vegglue.flow.sensor import read_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.jacobian import Factors
 from vegglue.solver.prolongation import on_grid
 from vegglue.solver.reference_member import settled
-from vegglue.solver.tangent import adjoints, tangents
+from vegglue.solver.tangent import tangents
 from vegglue.solver.wet_band import chord_in_band, widen
 
 # Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
@@ -111,22 +112,6 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     return found
 
 
-def response_by_adjoints(model: Model, point: Point, experiment: str) -> Array:
-    """See `Engine.force_response`; in single precision, one solve for each station."""
-    flow = point.flows[experiment]
-    rows = model.rows[experiment]
-    problem, state = problem_at(model, experiment, point.z), widen(flow.state, flow.rows, flow.band)
-    weights = reading_weights(problem, state, model.site.grid, model.station_of(experiment))
-    sensitivity = adjoints(flow.factors, weights[:, :, slice(*flow.band)])[:, ALONG]
-    of_faces = np.moveaxis(sensitivity, -1, 0)
-    # A force in a cell pushes the faces on both sides of it by half; R_u falls by what pushes.
-    cells = 0.5 * of_faces
-    cells[:, 1:] += 0.5 * of_faces[:, :-1]
-    wide = np.zeros((rows.size, model.site.grid.x.size, model.site.grid.y.size))
-    wide[:, :, flow.band[0] : flow.band[1]] = cells
-    return wide
-
-
 def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
     """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
     flow = point.flows[experiment]
@@ -191,6 +176,6 @@ NEWTON = Engine(
     linearise=linearised,
     predict=partial(predict_members, predict_near),
     responses=responses_by_tangents,
-    force_response=response_by_adjoints,
+    responses_to_cells=responses_by_adjoints,
     flow_at_centres=centre_flow,
 )

@@ -103,6 +103,7 @@ def _plants_after_effects(
         edge=geometry.edge[column, row],
         x=geometry.x[column, 0],
         y=geometry.y[0, row],
+        patch=geometry.patch[column, row],
     )
     now = applied(problem.effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
     return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])

@@ -53,9 +53,9 @@ def residual_of(
     )
     _join(problem, out, state[:, ALONG], depth)
     if boundaries.lateral_inflow.size:
-        # What enters from above or below has to be brought to speed.
+        # What enters from above or below has to be brought to speed; what leaves takes its own along.
         out[:, LEVEL] -= boundaries.lateral_inflow
-        out[:, ALONG] += boundaries.lateral_inflow / depth * state[:, ALONG]
+        out[:, ALONG] += np.maximum(boundaries.lateral_inflow, 0.0) / depth * state[:, ALONG]
     if closed.momentum:
         push_momentum(out, closed.momentum, depth, problem.film, problem.dx, problem.dy)
     return out

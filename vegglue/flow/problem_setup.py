@@ -1,5 +1,7 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from vegglue.arrays import Array
@@ -26,6 +28,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     setting = case.experiments[experiment]
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
+    added = _added_to_site(effects, geometry) if geometry else {}
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
@@ -34,10 +37,10 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         friction=_bed_friction(case, site, theta, members),
         plants=_plants(case, site, experiment, theta, members),
         viscosity=value_of(case.eddy_viscosity, theta, members),
-        boundaries=_boundaries(case, site, values, geometry),
+        boundaries=_boundaries(case, site, values, _entering(values.lateral, added, geometry) if geometry else EMPTY),
         film=case.numerics.film_depth,
         smallest_shear_depth=case.numerics.shear_depth == "smallest",
-        bed_rise=bed_rise(effects, geometry) if geometry else EMPTY,
+        bed_rise=added.get("bed", EMPTY),
         effects=effects,
         geometry=geometry,
     )
@@ -54,13 +57,13 @@ def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFric
     )
 
 
-def _boundaries(case: Case, site: Site, values: BoundaryValues, geometry: ChannelGeometry | None) -> Boundaries:
+def _boundaries(case: Case, site: Site, values: BoundaryValues, entering: Array) -> Boundaries:
     inflows = zip(case.inflows.values(), values.discharge, values.spread, strict=True)
     return Boundaries(
         inflows=tuple(_inflow(inflow, site, discharge, spread) for inflow, discharge, spread in inflows),
         outlet=centres_within(case.outlet.range, site.grid.y),
         outlet_level=values.level,
-        lateral_inflow=_lateral_inflow(values.lateral, geometry) if geometry else EMPTY,
+        lateral_inflow=entering,
     )
 
 
@@ -79,12 +82,14 @@ def _boundary_values(case: Case, site: Site, setting: Experiment, theta: Theta, 
     )
 
 
-def _lateral_inflow(lateral: Array, geometry: ChannelGeometry) -> Array:
-    """Q_lateral / (area of the floor) on the floor, (nx, ny, m) [m/s]; empty without one."""
+def _entering(lateral: Array, added: Mapping[str, Array], geometry: ChannelGeometry) -> Array:
+    """Q_lateral / (area of the floor) on the floor, and what effects on the site add, (nx, ny, m) [m/s], or empty."""
+    entering = added.get("inflow", EMPTY)
     if not lateral.any():
-        return EMPTY
+        return entering
     floor = 1.0 - geometry.bank
-    return np.ascontiguousarray(floor * lateral / (floor.sum() * geometry.dx * geometry.dy))
+    spread = floor * lateral / (floor.sum() * geometry.dx * geometry.dy)
+    return np.ascontiguousarray(spread + entering if entering.size else spread)
 
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
@@ -121,13 +126,14 @@ def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> Infl
     )
 
 
-def bed_rise(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> Array:
-    """By how much members' beds lie higher, (nx, ny, m) [m]; empty when no effect says so."""
-    if not any(active.effect.stage == "site" and active.on.any() for active in effects):
-        return EMPTY
-    members = len(next(iter(effects[0].values.values())))
-    change = applied(effects, "site", geometry, {"bed": np.zeros((*geometry.bed.shape[:2], members))})
-    return np.ascontiguousarray(change["bed"])
+def _added_to_site(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> dict[str, Array]:
+    """By how much members' beds lie higher [m] and what enters there [m/s], (nx, ny, m), as far as effects say so."""
+    here = [active for active in effects if active.effect.stage == "site" and active.on.any()]
+    if not here:
+        return {}
+    zero = np.zeros((*geometry.bed.shape[:2], len(next(iter(here[0].values.values())))))
+    change = applied(effects, "site", geometry, {"bed": zero, "inflow": zero})
+    return {name: np.ascontiguousarray(value) for name, value in change.items() if value is not zero}
 
 
 def boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:

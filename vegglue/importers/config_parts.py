@@ -6,8 +6,12 @@ from vegglue.case.resolved_config import Tree
 
 # One bed of Manning's law, whose coefficient is the parameter n_b.
 MANNING_BED = {"law": "manning", "n": "n_b"}
+# By how much the model itself may be wrong everywhere: friction by some per cent, as between two codes with the same
+# laws or one patch of stones and the next, the bed by what a levelled survey is off. Chosen before the sets that it is
+# judged by; the diagnosis says how much of it is needed.
+MODEL_ERROR: Tree = {"model_error": {"friction": 0.05, "bed": 0.01}}
 # 256 members show within a minute or two what a case is like; all errors are those stated with the data.
-FIRST_LOOK: Tree = {"simulate": {"members": 256, "seed": 1}, "infer": {"sigma": "known"}}
+FIRST_LOOK: Tree = {"simulate": {"members": 256, "seed": 1}, "infer": {"sigma": "known"}, **MODEL_ERROR}
 
 
 def normal_prior(mean: float, sd: float, unit: str, symbol: str, meaning: str, **cut: float) -> Tree:

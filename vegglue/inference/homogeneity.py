@@ -123,6 +123,8 @@ def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, 
         separation=noise.separation[np.ix_(kept, kept)],
         grid_error=noise.grid_error[kept],
         lower=np.asarray(lower),
+        model_error=noise.model_error[np.ix_(kept, kept)],
+        offsets=noise.offsets[kept],
     )
     return replace(model, case=case, station=model.station[here].reset_index(drop=True)), part
 

@@ -69,9 +69,9 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
     if len(diagnosis.misfit.zones):
         paint_zones(zones.subplots(), diagnosis.misfit.zones)
-    if diagnosis.drag_map.x.size:
+    if diagnosis.place_map.x.size:
         place = lower.subplots()
-        paint_places(place, *_drag_map(diagnosis), patches, _stations(diagnosis))
+        paint_places(place, *_place_map(diagnosis), patches, _stations(diagnosis))
     return figure
 
 
@@ -95,8 +95,8 @@ def _stations(diagnosis: Diagnosis) -> np.ndarray:
     return diagnosis.predictions.station[["x", "y"]].drop_duplicates().to_numpy(float)
 
 
-def _drag_map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
-    location, drag = diagnosis.verdict.location, diagnosis.drag_map
+def _place_map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
+    location, drag = diagnosis.verdict.location, diagnosis.place_map
     found = None if location is None else (location.x, location.y)
     return drag.x, drag.y, drag.score, found
 
@@ -169,7 +169,7 @@ def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
 
 
 def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    if not diagnosis.drag_map.x.size:
+    if not diagnosis.place_map.x.size:
         return
     location = diagnosis.verdict.location
     if location is not None:
@@ -187,7 +187,7 @@ def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         f"<b>Where a spot of drag would help</b>, y stretched. {finding}. Green: patches; dots: stations; full lines: "
         "more drag would help, dashed: less."
     )
-    figure = draw_places(*_drag_map(diagnosis), _outlines(run.case), _stations(diagnosis))
+    figure = draw_places(*_place_map(diagnosis), _outlines(run.case), _stations(diagnosis))
     yield published_picture(run, figure, "missing-places", caption, f"Plan of the channel. {finding}.")
 
 

@@ -3,14 +3,16 @@
 How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
 
-VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "cannot-tell"]
+# instrument: nothing is missing but that some readings are off.
+VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
 
 
 @dataclass(frozen=True)
@@ -18,8 +20,8 @@ class AmplitudeEstimate:
     """How large an effect is, in the unit of its amplitude.
 
     value, interval95: from its own refit when there was one (refitted), else to first order. off, scale: where the
-    amplitude does nothing, and how far from there is plausible. objective: the least sum of squares with the effect,
-    |W (y - f)|^2 + |z|^2 [-], predicted where it was not refitted.
+    amplitude does nothing, and how far from there is plausible; support: within which it must lie. objective: the least
+    sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where it was not refitted.
     """
 
     value: float
@@ -29,6 +31,7 @@ class AmplitudeEstimate:
     scale: float
     refitted: bool
     objective: float
+    support: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def relative_size(self) -> float:
@@ -80,8 +83,8 @@ class Step:
     """One round of the search: what was accepted, what it may be instead, chi2 before and after.
 
     rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
-    one of those that were refitted. p_family: chance that errors alone make any effect score as high as the best one
-    [-], the value that was decided by; see `score_test.log_family_p`.
+    one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
+    negligible. p_family: chance that errors alone sound the alarm as loudly [-], counted, see `evidence.alarm_p`.
     """
 
     accepted: str
@@ -91,6 +94,7 @@ class Step:
     chi2_before: float
     chi2_after: float
     p_family: float
+    others: dict[str, float] = field(default_factory=dict)
 
     @property
     def chance(self) -> dict[str, float]:
@@ -99,16 +103,79 @@ class Step:
 
 
 @dataclass(frozen=True)
-class DragLocation:
-    """Where [m] more or less drag than the model has would explain most: how much [1/m], its score [standard errors],
-    and the experiments that point at it.
+class Location:
+    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot.
+
+    effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
+    [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
+    other kind, by its name.
     """
 
     x: float
     y: float
-    experiments: tuple[str, ...]
-    drag: float
+    length: float
+    width: float
+    term: str
+    effect: str
+    amplitude: float
+    interval95: tuple[float, float]
+    unit: str
     score: float
+    experiments: tuple[str, ...]
+    odds: dict[str, float]
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """The shapes of the effect there."""
+        return {"x": self.x, "y": self.y, "length": self.length, "width": self.width}
+
+
+@dataclass(frozen=True)
+class FaultyInstrument:
+    """An instrument found to be off, whose readings were set aside: a reading, a position, a probe or a gauge.
+
+    x, y: where it stood [m], NaN where it stood at several; stations: rows of its readings; offset: what it shows too
+    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-].
+    """
+
+    kind: str
+    x: float
+    y: float
+    stations: tuple[int, ...]
+    offset: float
+    interval95: tuple[float, float]
+    unit: str
+    log_factor: float
+
+
+@dataclass(frozen=True)
+class FieldFound:
+    """A smooth field of a term that would close the misfit: its standard deviation [unit of the term], half length and
+    half width of its bumps [m], ln of its Bayes factor against none [-], and where it stands out most: value there, its
+    standard error, x and y [m].
+    """
+
+    term: str
+    size: float
+    length: float
+    width: float
+    log_factor: float
+    value: float
+    error: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class ModelErrorUsed:
+    """The model's own error: relative error of friction [-] and error of the bed [m] as allowed, and the share of both
+    that the last residual asks for most [-], with the ln of its likelihood ratio against what is allowed.
+    """
+
+    friction: float
+    bed: float
+    needed: float
+    log_ratio: float
 
 
 @dataclass(frozen=True)
@@ -120,7 +187,7 @@ class Verdict:
     kind: VerdictKind
     sentence: str
     remarks: tuple[str, ...]
-    location: DragLocation | None
+    location: Location | None
     not_excluded: tuple[tuple[str, ...], ...]
 
 
@@ -187,11 +254,12 @@ class Predictions:
 
 
 @dataclass(frozen=True)
-class DragMap:
-    """Scores [standard errors] of a spot of drag at x, y [m], (spot,) each: of the model in which a location was
-    found, else of the first.
+class PlaceMap:
+    """Scores [standard errors] of a spot of one term at x, y [m], (spot,) each: of the model in which a location was
+    found, else of drag in the first.
     """
 
+    term: str
     x: Array
     y: Array
     score: Array
@@ -211,7 +279,11 @@ class Diagnosis:
     first_screening: FirstScreening
     parameters: ParameterEstimates
     predictions: Predictions
-    drag_map: DragMap
+    place_map: PlaceMap
+    places: tuple[Location, ...] = ()
+    instruments: tuple[FaultyInstrument, ...] = ()
+    field: FieldFound | None = None
+    model_error: ModelErrorUsed | None = None
 
     @property
     def set(self) -> list[str]:

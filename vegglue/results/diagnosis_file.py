@@ -6,7 +6,7 @@ Lists and values of several parts are attributes as well, as JSON.
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import pandas as pd
@@ -15,12 +15,15 @@ from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
     Diagnosis,
-    DragLocation,
-    DragMap,
     EstimatedErrors,
+    FaultyInstrument,
+    FieldFound,
     FirstScreening,
+    Location,
     Misfit,
+    ModelErrorUsed,
     ParameterEstimates,
+    PlaceMap,
     Predictions,
     ScoreTest,
     Step,
@@ -32,6 +35,7 @@ from vegglue.results.diagnosis_json import flat_suspect
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.layout import Group, Variable, table_group
 
+T = TypeVar("T")
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")
 
@@ -45,7 +49,7 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
     arrays = zip(AT_STATIONS, (at_stations.first, at_stations.last, at_stations.error), strict=True)
     values = {name: Variable(("station",), array, VALUE_UNIT) for name, array in arrays}
     suspects = pd.DataFrame([_row(suspect) for suspect in diagnosis.suspects])
-    drag = diagnosis.drag_map
+    drag = diagnosis.place_map
     spots = {
         "x": Variable(("place",), drag.x, "m"),
         "y": Variable(("place",), drag.y, "m"),
@@ -78,6 +82,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "grid_error": errors.grid_error,
         "threshold": diagnosis.first_screening.threshold,
         "version": diagnosis.version,
+        "mapped_term": diagnosis.place_map.term,
     }
     composed = {
         "steps": [asdict(step) for step in diagnosis.steps],
@@ -88,6 +93,10 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "first_scores": diagnosis.first_screening.scores,
         "first_parameters": diagnosis.parameters.first,
         "parameters": diagnosis.parameters.last,
+        "locations": [asdict(one) for one in diagnosis.places],
+        "instruments": [asdict(one) for one in diagnosis.instruments],
+        "field": None if diagnosis.field is None else asdict(diagnosis.field),
+        "model_error": None if diagnosis.model_error is None else asdict(diagnosis.model_error),
     }
     return plain | {name: json.dumps(value) for name, value in composed.items()}
 
@@ -120,13 +129,21 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         predictions=Predictions(
             _table_from(stations, "station", *AT_STATIONS), *(stations[name] for name in AT_STATIONS)
         ),
-        drag_map=DragMap(drag["x"], drag["y"], drag["score"]),
+        place_map=PlaceMap(str(attributes["mapped_term"]), drag["x"], drag["y"], drag["score"]),
+        places=tuple(_location_from(one) for one in json.loads(attributes["locations"])),
+        instruments=tuple(_instrument_from(one) for one in json.loads(attributes["instruments"])),
+        field=_optional(FieldFound, json.loads(attributes["field"])),
+        model_error=_optional(ModelErrorUsed, json.loads(attributes["model_error"])),
     )
+
+
+def _optional(kind: type[T], tree: Mapping[str, Any] | None) -> T | None:
+    return None if tree is None else kind(**tree)
 
 
 def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
     where = json.loads(attributes["where"])
-    location = None if where is None else DragLocation(**where | {"experiments": tuple(where["experiments"])})
+    location = None if where is None else _location_from(where)
     return Verdict(
         kind=cast(VerdictKind, str(attributes["verdict"])),
         sentence=str(attributes["sentence"]),
@@ -134,6 +151,17 @@ def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
         location=location,
         not_excluded=tuple(tuple(group) for group in json.loads(attributes["not_excluded"])),
     )
+
+
+def _location_from(tree: Mapping[str, Any]) -> Location:
+    lists = {name: tuple(tree[name]) for name in ("interval95", "experiments")}
+    return Location(**{**tree, **lists})
+
+
+def _instrument_from(tree: Mapping[str, Any]) -> FaultyInstrument:
+    place = {name: float("nan") if tree[name] is None else tree[name] for name in ("x", "y")}
+    lists = {name: tuple(tree[name]) for name in ("stations", "interval95")}
+    return FaultyInstrument(**{**tree, **place, **lists})
 
 
 def _first_screening_from(alike: Mapping[str, Any], attributes: Mapping[str, Any]) -> FirstScreening:

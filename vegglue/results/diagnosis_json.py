@@ -28,6 +28,10 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "flagged": [_flagged(diagnosis, row) for row in errors.flagged],
         "parameters": diagnosis.parameters.last,
         "first_parameters": diagnosis.parameters.first,
+        "places": [asdict(one) for one in diagnosis.places],
+        "instruments": [asdict(one) for one in diagnosis.instruments],
+        "field": None if diagnosis.field is None else asdict(diagnosis.field),
+        "model_error": None if diagnosis.model_error is None else asdict(diagnosis.model_error),
         "zones": misfit.zones.to_dict("records"),
     }
     return {name: _plain(value) for name, value in tree.items()}

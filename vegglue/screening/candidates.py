@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ import pandas as pd
 from vegglue.case.case_effects import effect_of
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
-from vegglue.effects.definition import Effect
+from vegglue.effects.definition import Amplitude, Effect
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
 from vegglue.measurements.kinds import velocity_rows
@@ -22,30 +22,49 @@ MOST_SETTINGS = 12
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect and where it would act; empty tuples mean everywhere. shapes: values a search tries, by name."""
+    """An effect and where it would act; empty tuples mean everywhere.
+
+    at: its patch, or its place, in words; fixed: the shapes that say so; scale: a plausible size in this case, where
+    that of the effect is not meant.
+    """
 
     effect: Effect
     experiments: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     devices: tuple[str, ...] = ()
+    at: str = ""
+    fixed: tuple[tuple[str, float], ...] = ()
+    scale: float | None = None
 
     @property
     def name(self) -> str:
         """discharge_error[high]: the effect, and where it acts if not everywhere."""
-        where = (*self.experiments, *self.sections, *self.devices)
+        where = (*self.experiments, *self.sections, *self.devices, *filter(None, [self.at]))
         return f"{self.effect.name}[{','.join(where)}]" if where else self.effect.name
 
     @property
     def key(self) -> str:
         """The same as a word, for a config, where a parameter is named after it."""
-        return re.sub(r"\W", "_", "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices]))
+        return re.sub(
+            r"\W",
+            "_",
+            "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices, *filter(None, [self.at])]),
+        )
+
+    @property
+    def amplitude(self) -> Amplitude:
+        """That of the effect, with a plausible size in this case."""
+        own = self.effect.amplitude
+        return own if self.scale is None else replace(own, scale=self.scale)
 
     @property
     def parameter(self) -> str:
         return f"{self.key}_{self.effect.amplitude.name}"
 
     def settings(self) -> list[dict[str, float]]:
-        """Values of the shapes to try: their grids, or their defaults."""
+        """Values of the shapes to try: those that are fixed, else their grids, or their defaults."""
+        if self.fixed:
+            return [dict(self.fixed)]
         grids = [shape.grid or (shape.default,) for shape in self.effect.shapes]
         names = [shape.name for shape in self.effect.shapes]
         combinations = [dict(zip(names, values, strict=True)) for values in itertools.product(*grids)]
@@ -63,33 +82,58 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
         if effect.each == "case":
             found.append(Candidate(effect))
             continue
-        for name in possible[effect.each]:
-            found.append(Candidate(effect, **{f"{effect.each}s": (name,)}))
+        if effect.each == "patch":
+            found += [patch_candidate(effect, index, case) for index in range(len(case.plants.patches))]
+            continue
+        found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
     return [one for one in found if one.key not in case.effects]
 
 
+def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
+    """An effect in some experiments, sections or devices, as `kind` says."""
+    where = {f"{one}s": names if one == kind else () for one in ("experiment", "section", "device")}
+    return Candidate(effect, where["experiments"], where["sections"], where["devices"])
+
+
 def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
-    """Experiments, sections with used velocities, and used devices: an effect may act in one of them alone."""
+    """Experiments, sections with used velocities, used devices, and patches: an effect may act in one of them alone."""
     used = station[station["used"].to_numpy(bool)]
     velocity = used[velocity_rows(used)]
     return {
         "experiment": list(case.experiments),
         "section": [str(name) for name in velocity["section"].unique()],
         "device": [str(name) for name in used["device"].unique() if str(name)],
+        "patch": [patch.name for patch in case.plants.patches],
     }
 
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
     """The effects of a case as candidates, by their keys."""
-    return {
-        key: Candidate(effect_of(case, key), entry.experiments or (), entry.sections, entry.devices)
-        for key, entry in case.effects.items()
-    }
+    return {key: _candidate_of(case, key, entry) for key, entry in case.effects.items()}
+
+
+def _candidate_of(case: Case, key: str, entry: EffectEntry) -> Candidate:
+    effect = effect_of(case, key)
+    if effect.each == "patch":
+        return patch_candidate(effect, int(float(entry.values["patch"])) - 1, case)
+    if "search" in effect.tags and key != effect.name:
+        return place_candidate(effect, {shape.name: float(entry.values[shape.name]) for shape in effect.shapes})
+    return Candidate(effect, entry.experiments or (), entry.sections, entry.devices)
+
+
+def patch_candidate(effect: Effect, index: int, case: Case) -> Candidate:
+    """An effect on one patch of a case, the first of which has the index 0."""
+    return Candidate(effect, at=case.plants.patches[index].name, fixed=(("patch", index + 1.0),))
+
+
+def place_candidate(effect: Effect, place: Mapping[str, float], scale: float | None = None) -> Candidate:
+    """Something unlisted at a place, x and y among its shapes [m]; scale: a plausible size."""
+    return Candidate(effect, at=f"x{place['x']:g},y{place['y']:g}", fixed=tuple(place.items()), scale=scale)
 
 
 def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:
     """The entry of a candidate in a case; amplitude: a number or the name of a parameter."""
-    effect = candidate.effect
+    effect, shapes = candidate.effect, {**dict(candidate.fixed), **shapes}
     return EffectEntry(
         effect=effect.name if candidate.key != effect.name else None,
         values={effect.amplitude.name: amplitude}
@@ -106,7 +150,7 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
     return case.model_copy(
         update={
             "effects": {**case.effects, candidate.key: effect_entry(candidate, parameter, shapes)},
-            "parameters": {**case.parameters, parameter: prior_of(candidate.effect)},
+            "parameters": {**case.parameters, parameter: prior_of(candidate)},
         }
     )
 
@@ -114,12 +158,12 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
 def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
     """The case with one effect more, as a cause; the response to it is the fingerprint of the effect."""
     changed = with_effect(case, candidate, shapes)
-    return Cause(changed, candidate.parameter, candidate.effect.amplitude, candidate.experiments)
+    return Cause(changed, candidate.parameter, candidate.amplitude, candidate.experiments)
 
 
-def prior_of(effect: Effect) -> Parameter:
+def prior_of(candidate: Candidate) -> Parameter:
     """The prior of an amplitude: normal around off, its standard deviation the plausible size, within the support."""
-    amplitude = effect.amplitude
+    amplitude = candidate.amplitude
     return Parameter(
         distribution="normal",
         mean=amplitude.off,
@@ -132,8 +176,7 @@ def prior_of(effect: Effect) -> Parameter:
     )
 
 
-def start_amplitude(effect: Effect, gain: float) -> float:
+def start_amplitude(amplitude: Amplitude, gain: float) -> float:
     """The amplitude of that gain, kept off the ends of its support."""
-    amplitude = effect.amplitude
     margin = 0.01 * min(amplitude.scale, amplitude.high - amplitude.low)
     return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))

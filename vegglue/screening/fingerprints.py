@@ -1,4 +1,4 @@
-"""Fingerprints at one point: how predictions change with every candidate effect, and with a drag spot anywhere."""
+"""Fingerprints at one point: how predictions change with every candidate effect, and with a spot anywhere."""
 
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -10,7 +10,7 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Point, responses
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of
-from vegglue.screening.spatial_scan import DragSpots, drag_spots
+from vegglue.screening.places import Places, places_of
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Fingerprints:
     settings: list[dict[str, float]]
     amplitudes: list[Amplitude]
     values: Array
-    spots: DragSpots
+    places: tuple[Places, ...]
 
     @property
     def one_sided(self) -> np.ndarray:
@@ -50,7 +50,7 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
         candidates=candidates,
         columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
         settings=[shapes for _, shapes in every],
-        amplitudes=[one.effect.amplitude for one, _ in every],
+        amplitudes=[one.amplitude for one, _ in every],
         values=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
-        spots=drag_spots(model, point, half_width),
+        places=places_of(model, point, half_width),
     )

@@ -1,5 +1,6 @@
-"""Score tests of a calibrated model: which effect, drag spot or single station explains its residual best."""
+"""Score tests of a calibrated model: which effect, place or instrument explains its residual best."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,31 +9,41 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.case.parameter_space import z_of
-from vegglue.case.schema import Case
 from vegglue.engine.interface import Point
+from vegglue.flow.local_changes import Term
 from vegglue.screening import score_test
-from vegglue.screening.candidates import start_amplitude
+from vegglue.screening.candidates import start_amplitude, with_effect
+from vegglue.screening.evidence import Kind, kind_of_hypotheses
 from vegglue.screening.family_wise_p import Family, family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
+from vegglue.screening.instruments import (
+    PLAUSIBLE_OFFSET,
+    Instrument,
+    InstrumentKind,
+    instruments_of,
+    offset_columns,
+)
 from vegglue.site.channel_geometry import half_width
 
-# Drag [1/m] of a spot that counts as plausible when the noise is estimated: twenty times the friction of a bed of
-# n = 0.04 under 1 m of water. Chosen, not measured; from 0.1 to 1 the verdicts on open-a to open-f are the same.
-SPOT_DRAG = 0.3
 # Size [standard errors] given to the fingerprint with the best score when the noise is estimated again. So large that
 # its amplitude is free, else a missing effect passes for correlated errors (a floor 2 cm too high did, and its score
 # fell from 7.2 to 4.2). From 100 on verdicts are the same; with 1e6 the covariance can no longer be factored.
 FREE_SIZE = 1e4
 
 
+# Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
+GROUPS = 4
+
+
 @dataclass(frozen=True)
 class Screening:
-    """Score tests of the residual of a calibrated model against all effects that could be missing.
+    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
 
-    base: with the noise as estimated here; search: its model that is fitted again and again; flagged: stations rejected
-    as outliers, indices among the used ones.
+    base: with the noise as estimated here; search: its model that is fitted again and again; flagged: readings of
+    instruments found to be off, indices among the used ones.
     whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
-    projected out. effects, spots, stations: score tests of candidates, of drag spots and of single stations.
+    projected out. effects, spots: score tests of candidates and of drag anywhere. kinds: evidence of all kinds, that of
+    listed effects first, then of places by term, then of `instruments`; errors (draws, n): whitened errors alone.
     """
 
     base: Baseline
@@ -44,7 +55,9 @@ class Screening:
     projected: score_test.Projected
     effects: Family
     spots: Family
-    stations: Family
+    kinds: tuple[Kind, ...]
+    instruments: dict[str, tuple[Instrument, ...]]
+    errors: Array
 
     def best_column(self, candidate: int) -> int:
         """Column of the fingerprint of a candidate with the largest |T|, among the settings of its shapes."""
@@ -70,7 +83,7 @@ class Screening:
 
 
 def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | None = None, seed: int = 1) -> Screening:
-    """Score tests of the residual against all candidates, drag spots everywhere and single stations.
+    """Score tests of the residual against all candidates, places everywhere and instruments.
 
     The correlation of the errors is estimated first. before: an earlier screening, whose fingerprints are used again if
     they belong to the same point; seed: of the draws of errors alone.
@@ -78,19 +91,19 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     search = search_model(base)
     point = search.point
     fingerprints = _earlier(before, point) or fingerprints_of(search, half_width(base.model.site))
-    changes = point.slope, fingerprints.values, fingerprints.spots.fingerprints
-    slope, of_effects, spots = (base.noise.used(values) for values in changes)
+    slope, of_effects = (base.noise.used(values) for values in (point.slope, fingerprints.values))
     residual, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
-    noise = _estimated_noise(base.noise, fingerprints, (slope, of_effects, spots), residual, z)
+    instruments = instruments_of(base.model.station.iloc[base.noise.rows])
+    noise = _estimated_noise(base.noise, (slope, _plausible(base.noise, fingerprints, instruments)), residual, z)
     errors = draw_whitened_errors(noise, score_test.NULL_DRAWS, np.random.default_rng((seed, 1)))
 
     def against(values: Array) -> score_test.Projected:
         return score_test.project(noise.whiten(slope), noise.whiten(residual), z, noise.whiten(values))
 
-    def of_either_sign(values: Array) -> Family:
-        return family_of(against(values), np.zeros(values.shape[1], bool), errors, seed)
-
     projected, with_noise = against(of_effects), replace(base, noise=noise)
+    in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
+    of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
+    drag = in_places["drag"]
     return Screening(
         base=with_noise,
         search=search_model(with_noise),
@@ -100,9 +113,65 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
         whitened_fingerprints=noise.whiten(of_effects),
         projected=projected,
         effects=family_of(projected, fingerprints.one_sided, errors, seed),
-        spots=of_either_sign(spots),
-        stations=of_either_sign(np.eye(residual.size)).without(flagged),
+        spots=family_of(drag, np.zeros(drag.length.size, bool), errors, seed),
+        kinds=(
+            _kind_of_effects(fingerprints, projected),
+            *_kinds_of_places(fingerprints, in_places),
+            *_kinds_of_instruments(base.noise, instruments, of_instruments, flagged),
+        ),
+        instruments={str(name): some for name, some in instruments.items()},
+        errors=errors,
     )
+
+
+def _kind_of_effects(fingerprints: Fingerprints, projected: score_test.Projected) -> Kind:
+    """Listed effects: as likely before, and so are the settings of one."""
+    plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
+    prior = np.empty(plausible.size)
+    for columns in fingerprints.columns:
+        prior[columns] = 1.0 / (GROUPS * len(fingerprints.columns) * columns.size)
+    return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.one_sided)
+
+
+def _kinds_of_places(fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]) -> list[Kind]:
+    """A kind for each term: all its spots are as likely before, and all terms."""
+    kinds = []
+    for one in fingerprints.places:
+        spots = np.ones(one.x.size)
+        prior = spots / (GROUPS * len(fingerprints.places) * spots.size)
+        kinds.append(kind_of_hypotheses(one.term, in_places[one.term], one.plausible * spots, prior))
+    return kinds
+
+
+def _kinds_of_instruments(
+    noise: Noise,
+    instruments: Mapping[InstrumentKind, tuple[Instrument, ...]],
+    projected: Mapping[InstrumentKind, score_test.Projected],
+    flagged: tuple[int, ...],
+) -> list[Kind]:
+    """A kind each for single readings, probes and gauges, without those that are known to be off."""
+    kinds = []
+    for name, of_kind in projected.items():
+        plausible = PLAUSIBLE_OFFSET[name] * np.array(
+            [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
+        )
+        known = np.array([set(i.readings) <= set(flagged) for i in instruments[name]])
+        prior = np.full(plausible.size, 1.0 / (GROUPS * len(projected) * plausible.size))
+        kinds.append(kind_of_hypotheses(name, of_kind, np.where(known, 0.0, plausible), prior))
+    return kinds
+
+
+def _plausible(
+    noise: Noise, fingerprints: Fingerprints, instruments: Mapping[InstrumentKind, tuple[Instrument, ...]]
+) -> Array:
+    """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c)."""
+    sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
+    parts = [noise.used(fingerprints.values) * sizes]
+    parts += [noise.used(one.fingerprints) * one.plausible for one in fingerprints.places]
+    for name in ("position", "probe", "gauge"):
+        columns = offset_columns(instruments[name], noise.rows.size)
+        parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))
+    return np.hstack(parts)
 
 
 def _earlier(before: Screening | None, point: Point) -> Fingerprints | None:
@@ -110,16 +179,13 @@ def _earlier(before: Screening | None, point: Point) -> Fingerprints | None:
     return before.fingerprints if before is not None and before.fingerprints.point is point else None
 
 
-def _estimated_noise(
-    noise: Noise, fingerprints: Fingerprints, used: tuple[Array, Array, Array], residual: Array, z: Array
-) -> Noise:
-    """The noise of a residual (n,); used: slopes and fingerprints of effects and spots (n, ...), at used stations.
+def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:
+    """The noise of a residual (n,); used: slopes, and changes by all that could be missing (n, ...), at used stations.
 
-    Estimated twice: the second time the amplitude of the fingerprint with the best score is free.
+    Estimated twice: the second time the amplitude of the change with the best score is free.
     """
-    slope, of_effects, spots = used
-    sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
-    systematic = np.hstack([slope, of_effects * sizes, spots * SPOT_DRAG])
+    slope, changes = used
+    systematic = np.hstack([slope, changes])
     first = estimate_noise(noise, residual, systematic)
     projected = score_test.project(first.whiten(slope), first.whiten(residual), z, first.whiten(systematic))
     best = int(np.argmax((projected.units.T @ projected.residual) ** 2))
@@ -127,13 +193,14 @@ def _estimated_noise(
     return estimate_noise(first, residual, np.hstack([systematic, free]))
 
 
-def refit_start(screening: Screening, candidate: int, changed: Case) -> Array:
+def refit_start(screening: Screening, candidate: int, column: int) -> Array:
     """z (p + 1,) to start the refit with a candidate from: the joint linear step of all parameters."""
-    column, one = screening.best_column(candidate), screening.fingerprints.candidates[candidate]
+    one, shapes = screening.fingerprints.candidates[candidate], screening.fingerprints.settings[column]
     gain = float(screening.effects.scores[column] / max(screening.projected.length[column], 1e-300))
     point, slope, noise = screening.base.fitted.point, screening.whitened_slopes, screening.base.noise
     remaining = noise.whiten(noise.residual(point.prediction)) - screening.whitened_fingerprints[:, column] * gain
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ remaining - point.z)
     step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
-    return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_amplitude(one.effect, gain)))
+    changed = with_effect(screening.base.model.case, one, shapes)
+    return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_amplitude(one.amplitude, gain)))

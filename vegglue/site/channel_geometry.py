@@ -52,6 +52,7 @@ def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
     return ChannelGeometry(
         x=grid.x[:, None, None],
         y=grid.y[None, :, None],
+        share_along=((np.arange(grid.x.size) + 0.5) / grid.x.size - 0.5)[:, None, None],
         dx=grid.dx,
         dy=grid.dy,
         bed=bed[..., None],
@@ -78,7 +79,8 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
         name: getattr(geometry, name)[columns, rows]
         for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
     }
-    return ChannelGeometry(x=geometry.x[columns], y=geometry.y[:, rows], dx=geometry.dx, dy=geometry.dy, **cut)
+    along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
+    return ChannelGeometry(y=geometry.y[:, rows], dx=geometry.dx, dy=geometry.dy, **along, **cut)
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_f
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
-from vegglue.workflow.run_folder import calibrated, folder_of, known_place, model_in, remember_place
+from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remember_place, validation_of
 
 
 @one_thread()
@@ -34,7 +34,7 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say 
     if kept is not None:
         return kept
     with at_most(jobs):
-        found = diagnose_model(model_in(case), known_place(case, folder), say)
+        found = diagnose_model(model_in(case), say, validation_of(case))
     write_diagnosis(path, found, resolved_yaml(case), wanted)
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.parameters.first)

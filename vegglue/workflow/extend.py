@@ -124,7 +124,7 @@ def _start_child(child: Case, folder: Path, found: Diagnosis, added: Sequence[Ad
     """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
     theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
     for one, _ in added:
-        theta.setdefault(one.parameter, start_amplitude(one.effect, one.effect.amplitude.plausible_gain))
+        theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
     remember_place(child, folder, theta)
 
 

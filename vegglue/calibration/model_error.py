@@ -1,0 +1,104 @@
+"""The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
+
+    M = sum_k s_f^2 T_k T_k' + sum_k s_b^2 B_k B_k'
+
+T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
+exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
+deviation s_f [-] or s_b [m]. Weak-constraint data assimilation gives a model its error in the same way (Tremolet 2006,
+doi:10.1256/qj.05.224; not checked against it).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.case.schema import ModelError
+from vegglue.engine.interface import Model, Point, responses_to_cells
+from vegglue.flow.local_changes import Term
+from vegglue.parallel import in_threads
+from vegglue.site.channel_geometry import half_width
+from vegglue.site.grid import Grid
+
+# Radius of a bump over the half width of the floor [-]: friction differs from one stone, tuft or stem count to the
+# next, a survey from one line of points to the next, about half a width. Chosen, not measured.
+FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
+# Least radius in cells: below, a bump falls between the centres of cells.
+FEWEST_CELLS = 1.5
+
+
+@dataclass(frozen=True)
+class CellResponses:
+    """How predictions of all stations answer to a term changed in each cell of a grid, (station, nx, ny) by term."""
+
+    grid: Grid
+    of: dict[Term, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Bumps:
+    """Bumps exp(-((x - x_k) / l)^2 - ((y - y_j) / w)^2) over a grid: along (k, nx) and across (j, ny) [-], their
+    middles x, y [m], l and w [m].
+    """
+
+    x: Array
+    y: Array
+    length: float
+    width: float
+    along: Array
+    across: Array
+
+
+def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
+    """Those of all experiments, side by side."""
+    shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
+    found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
+    tasks = [(model, point, experiment, terms) for experiment in point.flows]
+    for experiment, of in zip(point.flows, in_threads(responses_to_cells, tasks), strict=True):
+        for term in terms:
+            found[term][model.rows[experiment]] = of[term]
+    return CellResponses(model.site.grid, found)
+
+
+def bumps(grid: Grid, length: float, width: float) -> Bumps:
+    """Bumps of half length l and half width w [m], as far apart; on a coarse grid they are larger."""
+    length, width = max(length, FEWEST_CELLS * grid.dx), max(width, FEWEST_CELLS * grid.dy)
+    x, y = _raster(grid.x, length), _raster(grid.y, width)
+    along = np.exp(-(((grid.x[None] - x[:, None]) / length) ** 2))
+    across = np.exp(-(((grid.y[None] - y[:, None]) / width) ** 2))
+    return Bumps(x, y, length, width, along, across)
+
+
+def responses_to_bumps(responses: CellResponses, term: Term, over: Bumps) -> Array:
+    """d prediction / d size of each bump (station, k, j) [unit of a station per that of the term]."""
+    return np.asarray(
+        np.einsum("ai,nij,bj->nab", over.along, responses.of[term], over.across, optimize=True), dtype=float
+    )
+
+
+def field_columns(responses: CellResponses, term: Term, over: Bumps) -> Array:
+    """Columns F (station, k j) with F F' the covariance of predictions under a field of the bumps of variance one."""
+    variance = (over.along**2).sum(axis=0).mean() * (over.across**2).sum(axis=0).mean()
+    return responses_to_bumps(responses, term, over).reshape(len(responses.of[term]), -1) / np.sqrt(variance)
+
+
+def model_error_columns(model: Model, point: Point, error: ModelError) -> Array:
+    """Columns (station, k) with M = columns columns', see the head of this file; none where no error is allowed."""
+    terms: tuple[Term, ...] = ("friction", "bed")
+    if not (error.friction or error.bed):
+        return np.zeros((len(model.station), 0))
+    responses, half = cell_responses(model, point, terms), half_width(model.site)
+    friction = bumps(model.site.grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
+    bed = bumps(model.site.grid, BED_RADIUS * half, BED_RADIUS * half)
+    return np.hstack(
+        [
+            error.friction * field_columns(responses, "friction", friction),
+            error.bed * field_columns(responses, "bed", bed),
+        ]
+    )
+
+
+def _raster(centres: Array, spacing: float) -> Array:
+    count = max(round((centres[-1] - centres[0]) / spacing), 1)
+    return np.linspace(centres[0], centres[-1], count + 1)

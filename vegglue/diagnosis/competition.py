@@ -1,0 +1,148 @@
+"""One competition of everything that could explain a misfit: listed effects, places and instruments.
+
+    p_j ~ exp((E_j - max E) / w_j),   E_j = ln B_j + ln prior_j,   w_j = 1 + FINGERPRINT_ERROR^2 2 E_j
+
+Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
+those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
+no flow: to first order is exact for them but for the parameters. All kinds are as likely before, see `evidence`. The
+fingerprint of an effect in nature differs from the model's, whose cells and laws are not nature's: where much is
+explained, errors count as w^(1/2) times as large.
+
+Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
+with a single cause, but with all that was accepted in the end.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.diagnosis.refits import Refit, Trial, refits_of, start_with
+from vegglue.effects.library import library
+from vegglue.progress import Say
+from vegglue.screening.candidates import place_candidate
+from vegglue.screening.evidence import Kind, log_factors
+from vegglue.screening.instruments import Instrument
+from vegglue.screening.places import EFFECT_AT_PLACE, Places
+from vegglue.screening.residual_screening import Screening, refit_start
+from vegglue.screening.score_test import FINGERPRINT_ERROR
+from vegglue.screening.second_look import SecondLook, second_look
+
+# Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
+# to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
+MOST_REFITTED, REACH = 8, 6.0
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
+    fingerprint among those of its kind; what: its refit, or the instrument.
+    """
+
+    kind: str
+    name: str
+    log_evidence: float
+    column: int
+    what: Refit | Instrument
+
+
+def contenders_of(screening: Screening, say: Say) -> list[Contender]:
+    """Everything that was tried, most evidence first."""
+    by_name, second = {kind.name: kind for kind in screening.kinds}, second_look(screening)
+    linear = _linear_evidence(by_name["effect"], second)
+    best = max(*(kind.total for kind in screening.kinds), float(linear.max()))
+    effects = _worth_refitting(screening, linear, best)
+    places = [one for one in screening.fingerprints.places if _within_reach(by_name[one.term].total, best)]
+    spots = [by_name[one.term].best for one in places]
+    candidates = screening.fingerprints.candidates
+    names = [candidates[j].name for j in effects] + [f"{one.term} at a place" for one in places]
+    say(f"refitting with {', '.join(names)}")
+    trials = [_effect_trial(screening, j, linear, second) for j in effects]
+    trials += [_place_trial(screening, one, spot) for one, spot in zip(places, spots, strict=True)]
+    refits = refits_of(screening.search, trials)
+    found = _instrument_contenders(screening)
+    for j, refit in zip(effects, refits, strict=False):
+        if refit is not None:
+            column = _column_of(screening, j, linear)
+            evidence = refit.log_factor + _settings_charge(screening, by_name["effect"], j, column)
+            found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
+    for one, spot, refit in zip(places, spots, refits[len(effects) :], strict=True):
+        if refit is not None:
+            kind = by_name[one.term]
+            corrected = kind.total + refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
+            found.append(Contender(one.term, refit.candidate.name, corrected, spot, refit))
+    return sorted(found, key=lambda one: -one.log_evidence)
+
+
+def chances_of(contenders: Sequence[Contender]) -> Array:
+    """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
+    evidence = np.array([one.log_evidence for one in contenders])
+    weight = np.exp((evidence - evidence.max()) / tempering(evidence))
+    return np.asarray(weight / weight.sum())
+
+
+def tempering(evidence: Array) -> Array:
+    """w = 1 + FINGERPRINT_ERROR^2 2 E, at least 1."""
+    return np.asarray(1.0 + FINGERPRINT_ERROR**2 * 2.0 * np.maximum(evidence, 0.0))
+
+
+def _within_reach(evidence: float, best: float) -> bool:
+    return bool((best - evidence) / tempering(np.array(best)) < REACH)
+
+
+def _linear_evidence(kind: Kind, second: SecondLook | None) -> Array:
+    """E of every column of the listed effects (c,), from the place that promises more."""
+    at_best = kind.log_evidence
+    return at_best if second is None else np.maximum(at_best, second.log_factor + kind.log_prior)
+
+
+def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[int]:
+    """Listed effects whose evidence is not far behind the best, the best first, one of them at least."""
+    of_each = np.array([linear[columns].max() for columns in screening.fingerprints.columns])
+    ranked = [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
+    return [j for j in ranked if _within_reach(float(of_each[j]), best)] or ranked[:1]
+
+
+def _column_of(screening: Screening, candidate: int, linear: Array) -> int:
+    columns = screening.fingerprints.columns[candidate]
+    return int(columns[np.argmax(linear[columns])])
+
+
+def _effect_trial(screening: Screening, candidate: int, linear: Array, second: SecondLook | None) -> Trial:
+    """A listed effect at its best setting, from the best place, and from the second one where that promises more."""
+    column, one = _column_of(screening, candidate, linear), screening.fingerprints.candidates[candidate]
+    shapes, case = screening.fingerprints.settings[column], screening.search.model.case
+    starts = [refit_start(screening, candidate, column)]
+    by_score = screening.kinds[0].log_evidence[column] - screening.kinds[0].log_prior[column]
+    if second is not None and second.log_factor[column] > by_score:
+        starts.append(start_with(case, one, shapes, second.point.z, float(second.gain[column])))
+    return Trial(one, shapes, tuple(starts))
+
+
+def _place_trial(screening: Screening, places: Places, spot: int) -> Trial:
+    """Something unlisted at one spot, from the best place and the size of its score."""
+    case, search = screening.search.model.case, screening.search
+    kind = next(kind for kind in screening.kinds if kind.name == places.term)
+    shapes = places.shapes(spot)
+    candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[places.term]], shapes, places.plausible)
+    size = kind.size[spot]
+    gain = kind.scores[spot] * places.plausible / max(size, 1e-300) * size**2 / (1.0 + size**2)
+    return Trial(candidate, shapes, (start_with(case, candidate, shapes, search.point.z, float(gain)),))
+
+
+def _settings_charge(screening: Screening, kind: Kind, candidate: int, column: int) -> float:
+    """ln prior of an effect whose setting `column` was refitted, and what its other settings add to first order."""
+    columns = screening.fingerprints.columns[candidate]
+    evidence = kind.log_evidence
+    others = float(np.logaddexp.reduce(evidence[columns]) - evidence[columns].max())
+    return float(kind.log_prior[column]) + others
+
+
+def _instrument_contenders(screening: Screening) -> list[Contender]:
+    """The best instrument of each kind, with the evidence of its kind."""
+    return [
+        Contender(kind.name, kind.name, kind.total, kind.best, screening.instruments[kind.name][kind.best])
+        for kind in screening.kinds
+        if kind.name in screening.instruments
+    ]

@@ -1,0 +1,113 @@
+"""Field inversion: the smoothest field of one term that closes the misfit, and its evidence.
+
+    ln p(r) = ln N(r; 0, C + J J' + s^2 F F'),    a = s^2 F' (C + J J' + s^2 F F')^-1 r
+
+r is the residual at the middle of the prior, J the slopes of the parameters, F how predictions answer to bumps of the
+field, and s its standard deviation. Long bumps make a smooth field, short ones a rough one; both, and s, are charged by
+the evidence. a are the sizes of the bumps, with their covariance.
+Source: Parish and Duraisamy (2016), doi:10.1016/j.jcp.2015.11.012, for the idea; not checked against it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import SearchModel
+from vegglue.calibration.model_error import Bumps, CellResponses, bumps, cell_responses, field_columns
+from vegglue.calibration.noise import covariance_of
+from vegglue.flow.local_changes import Term
+from vegglue.screening.residual_screening import GROUPS
+
+# Half lengths and half widths of bumps over the half width of the floor [-], from those of the model's own error to a
+# trend along the channel. Chosen, not measured.
+FIELD_SHAPES = ((0.3, 0.3), (1.2, 0.3), (1.2, 1.2), (5.0, 0.3), (5.0, 1.0), (20.0, 1.0))
+# Standard deviations of fields that are tried: of friction [-], of a bed [m], of viscosity [m2/s], of water that enters
+# [m/s]. Chosen, not measured.
+FIELD_SIZES: Mapping[Term, tuple[float, ...]] = {
+    "friction": (0.1, 0.2, 0.4, 0.8),
+    "bed": (0.03, 0.06, 0.12),
+    "viscosity": (0.005, 0.01, 0.02, 0.04),
+    "inflow": (1e-4, 3e-4, 1e-3),
+}
+
+
+@dataclass(frozen=True)
+class FieldHypothesis:
+    """A field of one term with bumps `over` and standard deviation `size` [unit of the term]; log_factor: ln B against
+    none [-].
+    """
+
+    term: Term
+    over: Bumps
+    size: float
+    log_factor: float
+
+
+@dataclass(frozen=True)
+class FieldMap:
+    """The field (nx, ny) [unit of its term] at cell centres, and its standard error."""
+
+    value: Array
+    error: Array
+
+
+def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
+    """Every field that is tried, the one with the most evidence first, and the responses that they were made of."""
+    responses = cell_responses(search.model, search.point, tuple(FIELD_SIZES))
+    whole, residual = _without_field(search)
+    nothing = _log_density(whole, residual)
+    found = []
+    for term, sizes in FIELD_SIZES.items():
+        for length, width in FIELD_SHAPES:
+            over = bumps(responses.grid, length * half_width, width * half_width)
+            columns = search.noise.used(field_columns(responses, term, over))
+            gram = columns @ columns.T
+            for size in sizes:
+                gained = _log_density(whole + size**2 * gram, residual) - nothing
+                found.append(FieldHypothesis(term, over, size, gained))
+    return sorted(found, key=lambda one: -one.log_factor), responses
+
+
+def best_field(search: SearchModel, half_width: float) -> tuple[FieldHypothesis, CellResponses]:
+    """The field with the most evidence, log_factor that of all fields of its term with their prior: all terms, shapes
+    and sizes are as likely before; and the responses that it was made of.
+    """
+    fields, responses = scanned_fields(search, half_width)
+    found = []
+    for term, sizes in FIELD_SIZES.items():
+        of_term = [one for one in fields if one.term == term]
+        prior = -np.log(GROUPS * len(FIELD_SIZES) * len(FIELD_SHAPES) * len(sizes))
+        total = float(np.logaddexp.reduce([one.log_factor for one in of_term])) + prior
+        found.append(replace(of_term[0], log_factor=total))
+    return max(found, key=lambda one: one.log_factor), responses
+
+
+def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypothesis) -> FieldMap:
+    """The likeliest field and how well it is known."""
+    whole, residual = _without_field(search)
+    scale = np.sqrt((one.over.along**2).sum(axis=0).mean() * (one.over.across**2).sum(axis=0).mean())
+    columns = search.noise.used(field_columns(responses, one.term, one.over)) * one.size
+    factor = scipy.linalg.cho_factor(whole + columns @ columns.T, lower=True)
+    shape = (one.over.x.size, one.over.y.size)
+    sizes = (columns.T @ scipy.linalg.cho_solve(factor, residual)).reshape(shape)
+    white = scipy.linalg.solve_triangular(factor[0], columns, lower=True)
+    spread = np.maximum(1.0 - (white**2).sum(axis=0), 0.0).reshape(shape)
+    along, across = one.over.along, one.over.across
+    unit = one.size / scale
+    return FieldMap(unit * (along.T @ sizes @ across), unit * np.sqrt((along**2).T @ spread @ across**2))
+
+
+def _without_field(search: SearchModel) -> tuple[Array, Array]:
+    """C + J J' (n, n), and the residual at the middle of the prior to first order (n,)."""
+    noise, point = search.noise, search.point
+    slope = noise.used(point.slope)
+    return covariance_of(noise) + slope @ slope.T, noise.residual(point.prediction) + slope @ point.z
+
+
+def _log_density(covariance: Array, residual: Array) -> float:
+    factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
+    misfit = float(residual @ scipy.linalg.cho_solve((factor, lower), residual))
+    return -0.5 * misfit - float(np.log(np.diag(factor)).sum())

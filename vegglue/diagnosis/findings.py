@@ -1,0 +1,33 @@
+"""What a search has found so far: effects, places and instruments, in the order in which they were accepted."""
+
+from dataclasses import dataclass
+
+from vegglue.diagnosis.competition import Contender
+from vegglue.results.diagnosis import FaultyInstrument, Location, Step
+
+
+@dataclass(frozen=True)
+class Findings:
+    """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places, and
+    log_evidence: the sum of theirs [-]. p: of the last alarm, and the rate below which it
+    is sounded. undecided: what competed last and led to nothing, most evidence first.
+    """
+
+    steps: tuple[Step, ...] = ()
+    places: tuple[Location, ...] = ()
+    instruments: tuple[FaultyInstrument, ...] = ()
+    flagged: tuple[int, ...] = ()
+    explained: float = 0.0
+    log_evidence: float = 0.0
+    p: float = 1.0
+    rate: float = 0.0
+    undecided: tuple[Contender, ...] = ()
+
+    @property
+    def alarmed(self) -> bool:
+        return self.p < self.rate
+
+    @property
+    def accepted(self) -> int:
+        """Effects and places."""
+        return len(self.steps) + len(self.places)

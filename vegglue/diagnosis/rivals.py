@@ -1,0 +1,118 @@
+"""The winner of a competition as a finding, with what may be it instead and how likely that is."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import chi2
+from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.refits import Refit
+from vegglue.measurements.kinds import kind_of
+from vegglue.results.diagnosis import FaultyInstrument, Location, Step
+from vegglue.screening import score_test
+from vegglue.screening.instruments import Instrument
+from vegglue.screening.residual_screening import Screening
+
+# Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
+# others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
+IN_SET, HARDLY = 0.95, 0.05
+# Share of the squared fingerprint of a spot above which an experiment is said to point at it.
+POINTS_AT_IT = 0.1
+# Odds beyond e^this are told as this: larger numbers say no more.
+LARGEST_LOG_ODDS = 100.0
+# Standard errors on either side of a 95 % interval.
+NORMAL95 = 1.96
+
+
+def step_found(
+    screening: Screening, contenders: Sequence[Contender], chance: Array, further: Baseline, p: float
+) -> Step:
+    """The best contender, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    listed = [j for j, one in enumerate(contenders) if one.kind == "effect"]
+    names = [contenders[j].name for j in listed]
+    columns = [contenders[j].column for j in listed]
+    cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
+    found, groups = rivals_among(names, chance[listed], cosine)
+    base = screening.base
+    return Step(
+        accepted=contenders[0].name,
+        rivals=tuple(found),
+        chances=tuple(found.values()),
+        groups=groups,
+        chi2_before=chi2(base.noise, base.fitted.point),
+        chi2_after=further.fitted.chi2,
+        p_family=p,
+        others=_others(contenders, chance, "effect"),
+    )
+
+
+def location_found(screening: Screening, contenders: Sequence[Contender], refit: Refit) -> Location:
+    """The best contender, something at a place, as a location."""
+    best = contenders[0]
+    places = next(one for one in screening.fingerprints.places if one.term == best.kind)
+    kind = next(one for one in screening.kinds if one.name == best.kind)
+    noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]
+    white = noise.whiten(noise.used(column))[:, 0] ** 2
+    names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
+    share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
+    evidence = {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
+    ahead = {name: best.log_evidence - other for name, other in evidence.items() if name != best.kind}
+    return Location(
+        **places.shapes(best.column),
+        term=best.kind,
+        effect=refit.candidate.effect.name,
+        amplitude=refit.amplitude,
+        interval95=refit.interval95,
+        unit=refit.candidate.amplitude.unit,
+        score=float(kind.scores[best.column]),
+        experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
+        odds={name: float(np.exp(min(gained, LARGEST_LOG_ODDS))) for name, gained in ahead.items()},
+    )
+
+
+def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:
+    """The best contender, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
+    noise = screening.base.noise
+    kind = next(of for of in screening.kinds if of.name == best.kind)
+    length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
+    shrunk = kind.size[best.column] ** 2 / (1.0 + kind.size[best.column] ** 2)
+    offset, spread = shrunk * score / length, np.sqrt(shrunk) / length
+    station = screening.base.model.station.iloc[noise.rows[one.readings[0]]]
+    return FaultyInstrument(
+        kind=one.kind,
+        x=one.x,
+        y=one.y,
+        stations=tuple(int(noise.rows[row]) for row in one.readings),
+        offset=offset,
+        interval95=(offset - NORMAL95 * spread, offset + NORMAL95 * spread),
+        unit=kind_of(str(station["kind"])).unit,
+        log_factor=best.log_evidence,
+    )
+
+
+def rivals_among(
+    names: Sequence[str], chance: Array, cosine: Array
+) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """The chance of each effect in the fewest groups that hold IN_SET of what listed effects have together, the
+    likeliest first, and these groups.
+
+    chance (k,); cosine (k, k): between projected fingerprints.
+    """
+    near = chance >= HARDLY * chance.max()
+    alike = np.where(near & near[:, None], cosine, 0.0)
+    kept = score_test.fewest_groups(
+        score_test.alike_groups(range(len(names)), alike), chance, IN_SET * float(chance.sum())
+    )
+    likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
+    return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
+
+
+def _others(contenders: Sequence[Contender], chance: Array, kind: str) -> dict[str, float]:
+    """Chance of the contenders of other kinds, where it is not negligible against the best."""
+    return {
+        one.name: float(p)
+        for one, p in zip(contenders, chance, strict=True)
+        if one.kind != kind and p >= HARDLY * chance.max()
+    }

@@ -1,0 +1,79 @@
+"""How predictions answer to a term of the equations changed in each cell, by adjoints.
+
+    d prediction_n / d a_c = - l_n . dR/da_c,    J' l_n = d prediction_n / d state
+
+A change in a cell reaches the residual of its neighbours only, so that every STRIDE-th cell along and across is changed
+at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974, doi:10.1093/imamat/13.1.117;
+not checked against it). Beside the inflow, where a bed changes how water is spread over the whole inflow, this is not
+so: there an answer is that of the cells around it together.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vegglue.arrays import Array, Single
+from vegglue.case.parameter_space import theta_at
+from vegglue.engine.interface import Model, Point
+from vegglue.flow.equations import residual
+from vegglue.flow.local_changes import Term, with_changed_term
+from vegglue.flow.problem import crop
+from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.sensor import reading_weights
+from vegglue.site.channel_geometry import channel_geometry, rows_of
+from vegglue.solver.tangent import adjoints
+from vegglue.solver.wet_band import widen
+
+# Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
+STRIDE = 5
+# Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
+SMALL_CHANGE: dict[Term, float] = {"friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4}
+
+
+def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:
+    """See `Engine.responses_to_cells`; in single precision, one solve for each station."""
+    flow, grid = point.flows[experiment], model.site.grid
+    problem = build_problem(model.case, model.site, experiment, theta_at(model.case, point.z[None]))
+    state = widen(flow.state, flow.rows, flow.band)
+    weights = reading_weights(problem, state, grid, model.station_of(experiment))
+    part = crop(problem, *flow.band)
+    geometry = rows_of(channel_geometry(model.case, model.site, experiment), *flow.band)
+    sensitivity = adjoints(flow.factors, weights[:, :, slice(*flow.band)]).astype(np.float32)
+    without = residual(part, flow.state)
+    lattice = _lattice(*part.shape)
+    found: dict[Term, Array] = {}
+    for term in terms:
+        small = SMALL_CHANGE[term]
+        many = with_changed_term(part, geometry, term, small * lattice)
+        change = (residual(many, np.repeat(flow.state, STRIDE**2, axis=3)) - without) / small
+        wide = np.zeros((weights.shape[3], grid.x.size, grid.y.size))
+        wide[:, :, slice(*flow.band)] = _told_apart(sensitivity, change.astype(np.float32))
+        found[term] = wide
+    return found
+
+
+def _lattice(nx: int, ny: int) -> Array:
+    """1 in the cells that are changed in member m, (nx, ny, STRIDE^2): those with i % STRIDE, j % STRIDE its own."""
+    i, j = np.arange(nx)[:, None, None] % STRIDE, np.arange(ny)[None, :, None] % STRIDE
+    member = np.arange(STRIDE**2)
+    return ((i == member // STRIDE) & (j == member % STRIDE)).astype(float)
+
+
+def _told_apart(sensitivity: Single, change: Single) -> Array:
+    """-l . dR of every cell (n, nx, ny), summed over the window of STRIDE cells around it.
+
+    sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, STRIDE^2).
+    """
+    nx, _, ny, n = sensitivity.shape
+    half = STRIDE // 2
+    found = np.zeros((n, nx, ny))
+    for member in range(STRIDE**2):
+        product = np.einsum("ikjn,ikj->nij", sensitivity, change[..., member])
+        first = member // STRIDE, member % STRIDE
+        i, j = np.arange(first[0], nx, STRIDE), np.arange(first[1], ny, STRIDE)
+        total = np.pad(product, ((0, 0), (half, half), (half, half))).cumsum(1).cumsum(2)
+        total = np.pad(total, ((0, 0), (1, 0), (1, 0)))
+        a, b = i[:, None], j[None]
+        window = total[:, a + STRIDE, b + STRIDE] - total[:, a, b + STRIDE] - total[:, a + STRIDE, b] + total[:, a, b]
+        found[:, a, b] = -window
+    return found

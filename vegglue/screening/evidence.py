@@ -1,0 +1,96 @@
+"""The evidence for hypotheses of every kind, to first order in their size, and the alarm that any of them stands out.
+
+    ln B = -1/2 ln(1 + a^2) + 1/2 T^2 a^2 / (1 + a^2),   a = s |S_perp|
+
+B is the Bayes factor of a hypothesis of size N(0, s^2) against nothing, T its score and |S_perp| the length of its
+fingerprint per unit of size, both in standard errors (see `score_test`): the width of its prior is charged (Occam's
+factor). Of a kind, all hypotheses are as likely before, and all kinds are; of one hypothesis, all settings. What is
+missing is one of them or nothing. The alarm is sounded by the sum over all, against the same sum in draws of errors
+alone.
+Source: Kass and Raftery (1995), doi:10.2307/2291091, for Bayes factors; not checked against it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from vegglue.arrays import Array, Single
+from vegglue.screening import score_test
+
+# Draws of errors alone that are worked on together: what lies between them then fits the memory.
+DRAWS_TOGETHER = 250
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Hypotheses of one kind, whitened and projected.
+
+    log_prior (c,): ln of the chance of each column before the data; size (c,): a = s |S_perp| [-]; scores T (c,);
+    possible (c,): whether the sign of the score is one that its amplitude can have.
+    """
+
+    name: str
+    projected: score_test.Projected
+    log_prior: Array
+    size: Array
+    one_sided: np.ndarray
+    scores: Array
+
+    @property
+    def log_evidence(self) -> Array:
+        """ln B + ln prior of each column (c,)."""
+        return log_factors(self.scores, self.size) + self.log_prior
+
+    @property
+    def total(self) -> float:
+        """ln of the sum over all columns."""
+        return float(logsumexp(self.log_evidence))
+
+    @property
+    def best(self) -> int:
+        """The column with the most evidence."""
+        return int(np.argmax(self.log_evidence))
+
+
+def kind_of_hypotheses(
+    name: str, projected: score_test.Projected, plausible: Array, prior: Array, one_sided: np.ndarray | None = None
+) -> Kind:
+    """plausible (c,): s [unit of the size]; prior (c,): chance of each column before the data."""
+    if one_sided is None:
+        one_sided = np.zeros(plausible.size, dtype=bool)
+    scores = score_test.scores(projected, one_sided)
+    return Kind(name, projected, np.log(prior), plausible * projected.length, one_sided, scores)
+
+
+def log_factors(scores: Array, size: Array) -> Array:
+    """ln B (..., c) of scores (..., c) and sizes a (c,)."""
+    square = size**2
+    return np.asarray(0.5 * scores**2 * (square / (1.0 + square)) - 0.5 * np.log1p(square))
+
+
+def alarm_p(kinds: Sequence[Kind], errors: Array, seed: int, slack: float = 0.0) -> float:
+    """P(errors alone give as large a sum of Bayes factors over all kinds), counted, (1 + count) / (1 + draws).
+
+    errors (draws, n): whitened; slack: by how much scores are made smaller first [standard errors].
+    """
+    found = logsumexp([logsumexp(_of_scores(kind, np.maximum(np.abs(kind.scores) - slack, 0.0))) for kind in kinds])
+    rows = kinds[0].projected.residual.size
+    of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
+    drawn = np.hstack([errors, of_prior]).astype(np.float32)
+    count = 0
+    for first in range(0, len(drawn), DRAWS_TOGETHER):
+        part = drawn[first : first + DRAWS_TOGETHER]
+        sums = [logsumexp(_of_scores(kind, _drawn_scores(kind, part)), axis=1) for kind in kinds]
+        count += int(np.sum(logsumexp(sums, axis=0) >= found))
+    return (1 + count) / (1 + len(errors))
+
+
+def _of_scores(kind: Kind, scores: Array) -> Array:
+    return log_factors(scores, kind.size) + kind.log_prior
+
+
+def _drawn_scores(kind: Kind, drawn: Single) -> Array:
+    scores = drawn @ kind.projected.units.astype(np.float32)
+    return np.where(kind.one_sided & (scores < 0), 0.0, scores)

@@ -1,0 +1,100 @@
+"""Fingerprints of something unlisted at any place in the water: of drag, of bed level, of inflow, of viscosity.
+
+    S(x_0, y_0) = sum_cells  d prediction / d term  exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)
+
+A place has one fingerprint for all experiments: what lies there stays where it is.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.model_error import CellResponses, bumps, cell_responses, responses_to_bumps
+from vegglue.case.parameter_space import middle_value
+from vegglue.case.schema import Case
+from vegglue.engine.interface import Model, Point, flow_at_centres
+from vegglue.flow.local_changes import Term
+
+# Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
+# and a stretch of bank, as in open-m, after which the longest was added. Smaller ones tell places apart more closely,
+# and are more tests.
+SPOT_WIDTH = 0.3
+SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
+    "drag": (1.0, 4.0, 12.0),
+    "bed": (1.0, 4.0, 12.0),
+    "inflow": (1.0, 4.0, 12.0),
+    "viscosity": (4.0, 12.0),
+}
+# Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
+# discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
+SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
+# Depth [m] above which a place counts as under water in some experiment.
+LEAST_DEPTH = 0.05
+# The effect of the library that stands for a term at a place.
+EFFECT_AT_PLACE: Mapping[Term, str] = {
+    "drag": "unlisted_object",
+    "bed": "unlisted_bed",
+    "inflow": "unlisted_inflow",
+    "viscosity": "unlisted_viscosity",
+}
+
+
+@dataclass(frozen=True)
+class Places:
+    """Spots of one term: middles x, y, half lengths and half widths (spot,) [m]; plausible: size of one [unit of the
+    effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect].
+    """
+
+    term: Term
+    x: Array
+    y: Array
+    length: Array
+    width: Array
+    plausible: float
+    fingerprints: Array
+
+    def shapes(self, spot: int) -> dict[str, float]:
+        """The shapes of the effect at one of them, rounded to a centimetre."""
+        return {name: round(float(getattr(self, name)[spot]), 2) for name in ("x", "y", "length", "width")}
+
+
+def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
+    """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
+    responses = cell_responses(model, point, tuple(EFFECT_AT_PLACE))
+    wet = _wet(model, point)
+    return tuple(_places_of_term(model.case, responses, term, half_width, wet) for term in EFFECT_AT_PLACE)
+
+
+def plausible_size(case: Case, term: Term) -> float:
+    """Of the effect that stands for a term at a place, in its unit."""
+    if term != "inflow":
+        return {"drag": SPOT_DRAG, "bed": SPOT_RISE, "viscosity": SPOT_VISCOSITY}[term]
+    totals = [
+        sum(middle_value(case, value) for value in experiment.discharge.values())
+        for experiment in case.experiments.values()
+    ]
+    return SPOT_SHARE * float(np.mean(totals))
+
+
+def _places_of_term(case: Case, responses: CellResponses, term: Term, half_width: float, wet: np.ndarray) -> Places:
+    width = SPOT_WIDTH * half_width
+    parts = []
+    for length in SPOT_LENGTHS[term]:
+        over = bumps(responses.grid, length * width, width)
+        answers = responses_to_bumps(responses, term, over)
+        if term == "inflow":
+            answers = answers / (np.pi * over.length * over.width)
+        share = over.along @ wet @ over.across.T
+        within = share > 0.5 * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
+        a, b = np.nonzero(within)
+        size = np.full((2, a.size), [[over.length], [over.width]])
+        parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
+    x, y, length_of, width_of, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    return Places(term, x, y, length_of, width_of, plausible_size(case, term), fingerprints)
+
+
+def _wet(model: Model, point: Point) -> np.ndarray:
+    """Cells (nx, ny) under water in some experiment."""
+    return np.any([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows], axis=0)
