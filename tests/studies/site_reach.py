@@ -1,0 +1,173 @@
+"""A site as the second solver sees it: the paper's channel, 100 m long, with what may be hidden in it.
+
+Floor 3 m, banks 1:1.5, slope 0.001, seven alternating patches. `SETTINGS` says what may be hidden.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from second_kernels import BANK, BED, DRY, PLANTS
+from second_solver import STEADY, Ends, Field, Flow, Reach, steady
+
+LENGTH, HALF, RISE, SLOPE = 100.0, 1.5, 2.0 / 3.0, 0.001
+FINE = (0.25, 0.1875)
+# Water may rise so much over the level at the outlet [m] before it meets the wall of the grid.
+MARGIN = 0.35
+STEMS = (22.0, 22.0, 22.0, 22.0, 7.3, 7.3, 7.3)
+PATCHES = tuple(((40 + 8 * n, 44 + 8 * n), (0, 1.5) if n % 2 == 0 else (-1.5, 0)) for n in range(7))
+EDDY_VISCOSITY = 0.01
+SETTINGS = {
+    "chi": "phi (|U|/0.35)^chi with |U| the local depth-averaged speed (at least 0.02 m/s)",
+    "exp": "experiment whose true discharge is factor times the reported one (low, mid, high)",
+    "factor": "true over reported discharge",
+    "mixk": "nu_t = nu + l^2 |du/dy|, l = mixk in metres",
+    "ervine": "force per unit mass -(1/h) d(K h u^2)/dy with K(y) = ervine sin(pi y/1.5) exp(-(y/2.2)^4)",
+    "pier": "[x, y, s]: extra drag c |U| u per unit mass, c = s exp(-((X-x)/0.35)^2-((Y-y)/0.3)^2)",
+    "scour": "[x, y, depth, lx, ly]: the bed is lower by depth exp(-((X-x)/lx)^2-((Y-y)/ly)^2), a bar if negative",
+    "station": "y of the probe that reads too much by bias in all experiments [m]",
+    "bias": "m/s",
+    "gauge": "x of the gauge that reads too high by shift in all experiments [m]",
+    "shift": "m",
+    "seep": "[x0, x1, y0, y1, Q]: water that enters over this part of the bed, without momentum",
+    "skew": "the inflow is spread by h^(5/3) (1 + skew y/1.5), at least 0.1 h^(5/3)",
+    "banktrend": "drag in 1/m, added on |y| > 1.5 m: banktrend (x/100 - 0.5) + |banktrend|/2",
+}
+# Error of the survey of the bed [m], and over what it is the same [m].
+BED_ERROR, BED_LENGTHS = 0.01, (2.0, 0.5)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is so on a site: parameters, hidden settings, and imperfections (stems and discharges as factors)."""
+
+    nb: float
+    ks: float
+    phi: float
+    hd: float
+    settings: dict[str, Any]
+    nu: float = EDDY_VISCOSITY
+    stems: tuple[float, ...] = (1.0,) * 7
+    discharges: tuple[float, ...] = (1.0,) * 4
+    bed_seed: int | None = None
+
+
+def bed_level(x: Field, y: Field, truth: Truth) -> Field:
+    """z at places [m]."""
+    bed = np.maximum(np.abs(y) - HALF, 0.0) * RISE - SLOPE * x
+    if "scour" in truth.settings:
+        px, py, depth, lx, ly = truth.settings["scour"]
+        bed = bed - depth * np.exp(-(((x - px) / lx) ** 2) - ((y - py) / ly) ** 2)
+    return bed + _survey_error(x, y, truth.bed_seed)
+
+
+def _survey_error(x: Field, y: Field, seed: int | None) -> Field:
+    """Smooth noise of one site, the same at every place whatever the grid [m]."""
+    if seed is None:
+        return np.zeros(np.broadcast(x, y).shape)
+    step = 0.125
+    noise = np.random.default_rng(seed).standard_normal((int(LENGTH / step) + 1, 81))
+    # a Gaussian filter of width s correlates over exp(-d^2/(4 s^2)): 1/e at the stated lengths
+    smooth = gaussian_filter(noise, [0.5 * length / step for length in BED_LENGTHS], mode="nearest")
+    smooth *= BED_ERROR / smooth.std()
+    i = np.clip(np.rint(x / step).astype(int), 0, smooth.shape[0] - 1)
+    j = np.clip(np.rint((y + 5.0) / step).astype(int), 0, smooth.shape[1] - 1)
+    return smooth[i, j]
+
+
+def centres(cells: tuple[float, float], level: float) -> tuple[Field, Field]:
+    """x (nx, 1) and y (1, ny) of the cells that may become wet [m]."""
+    dx, dy = cells
+    side = int(np.ceil((HALF + (level + SLOPE * LENGTH + MARGIN) / RISE) / 0.75)) * round(0.75 / dy)
+    x = (np.arange(round(LENGTH / dx)) + 0.5) * dx
+    y = (np.arange(-side, side) + 0.5) * dy
+    return x[:, None], y[None, :]
+
+
+def reach_of(truth: Truth, cells: tuple[float, float], level: float) -> Reach:
+    """The site on cells of this size [m]."""
+    (dx, dy), (x, y) = cells, centres(cells, level)
+    settings = truth.settings
+    kind = np.where(np.abs(y) < HALF, BED, BANK) + np.zeros(x.shape, dtype=int)
+    phi = np.zeros(kind.shape)
+    for (along, across), stems, factor in zip(PATCHES, STEMS, truth.stems, strict=True):
+        inside = (x > along[0]) & (x < along[1]) & (y > across[0]) & (y < across[1])
+        kind[inside] = PLANTS
+        phi[inside] = truth.phi * factor * stems / STEMS[0]
+    x_faces, y_faces = np.arange(len(x) + 1)[:, None] * dx, np.append(y[0] - dy / 2, y[0, -1] + dy / 2)[None, :]
+    edges = y_faces[0]
+    return Reach(
+        dx=dx, dy=dy, z=bed_level(x, y, truth), zx=bed_level(x_faces, y, truth), zy=bed_level(x, y_faces, truth),
+        kind=kind, phi=phi,
+        extra=_extra_drag(x, y, settings), source=_source(x, y, cells, settings),
+        twist=settings.get("ervine", 0.0) * np.sin(np.pi * edges / 1.5) * np.exp(-((edges / 2.2) ** 4)),
+        nb=truth.nb, ks=truth.ks, hd=truth.hd, chi=float(settings.get("chi", 0.0)), nu=truth.nu,
+        mixing=float(settings.get("mixk", 0.0)),
+    )  # fmt: skip
+
+
+def _extra_drag(x: Field, y: Field, settings: dict[str, Any]) -> Field:
+    extra = np.zeros(np.broadcast(x, y).shape)
+    if "pier" in settings:
+        px, py, strength = settings["pier"]
+        extra += strength * np.exp(-(((x - px) / 0.35) ** 2) - ((y - py) / 0.3) ** 2)
+    trend = settings.get("banktrend", 0.0)
+    return extra + np.where(np.abs(y) > HALF, trend * (x / LENGTH - 0.5) + abs(trend) / 2, 0.0)
+
+
+def _source(x: Field, y: Field, cells: tuple[float, float], settings: dict[str, Any]) -> Field:
+    if "seep" not in settings:
+        return np.zeros(np.broadcast(x, y).shape)
+    x0, x1, y0, y1, discharge = settings["seep"]
+    inside = ((x > x0) & (x < x1) & (y > y0) & (y < y1)).astype(float)
+    return inside * discharge / (inside.sum() * cells[0] * cells[1])
+
+
+def steady_flow(truth: Truth, discharge: float, level: float, cells: tuple[float, float] = FINE) -> Flow:
+    """The steady flow on cells of this size, by way of cells that are larger in x and y, and in x."""
+    dx, dy = cells
+    sizes = ((2 * dx, 2 * dy), (2 * dx, dy), cells)
+    reach, ends = _problem(truth, discharge, level, sizes[0])
+    flow = _first_guess(reach, discharge, level + SLOPE * (LENGTH - centres(sizes[0], level)[0]))
+    for size in sizes:
+        before, (reach, ends) = reach, _problem(truth, discharge, level, size)
+        # the flows on larger cells are only starts
+        flow = steady(reach, ends, _on_cells_of(reach, before, flow), STEADY if size == cells else 10 * STEADY)
+    if flow.h[:, [0, -1]].max() > DRY:
+        raise RuntimeError("the water stands at the wall of the grid: a larger MARGIN is needed")
+    return flow
+
+
+def _first_guess(reach: Reach, discharge: float, surface: Field) -> Flow:
+    """Water up to a surface (nx, 1) [m], fast where it is deep."""
+    h = np.maximum(surface - reach.z, 0.0)
+    u = h ** (2 / 3)
+    return Flow(h, u * discharge / ((h * u).sum(axis=1, keepdims=True) * reach.dy), np.zeros_like(h))
+
+
+def _on_cells_of(finer: Reach, coarse: Reach, flow: Flow) -> Flow:
+    """A flow on the cells of another reach, a whole number to one."""
+    along, across = (fine // old for fine, old in zip(finer.z.shape, coarse.z.shape, strict=True))
+    middle = coarse.z.shape[1] // 2
+    surface = (flow.h + coarse.z)[:, middle, None].repeat(along, axis=0)
+    h = np.maximum(surface - finer.z, 0.0)
+    u, v = (np.where(h > DRY, field.repeat(along, axis=0).repeat(across, axis=1), 0.0) for field in (flow.u, flow.v))
+    return Flow(h, u, v)
+
+
+def _problem(truth: Truth, discharge: float, level: float, cells: tuple[float, float]) -> tuple[Reach, Ends]:
+    y = centres(cells, level)[1][0]
+    share = np.maximum(1.0 + truth.settings.get("skew", 0.0) * y / HALF, 0.1)
+    return reach_of(truth, cells, level), Ends(discharge, level, share)
+
+
+def at(field: Field, cells: tuple[float, float], level: float, x: Field, y: Field) -> Field:
+    """A field at stations, linear in x and y between centres of cells."""
+    along, across = (axis.ravel() for axis in centres(cells, level))
+    i = np.clip(np.searchsorted(along, x) - 1, 0, along.size - 2)
+    j = np.clip(np.searchsorted(across, y) - 1, 0, across.size - 2)
+    s, t = (x - along[i]) / cells[0], (y - across[j]) / cells[1]
+    near = field[i, j] * (1 - t) + field[i, j + 1] * t
+    far = field[i + 1, j] * (1 - t) + field[i + 1, j + 1] * t
+    return near * (1 - s) + far * s
