@@ -134,6 +134,21 @@ REFUSED = [
     ("k_s: 1.0", "n: 1.0", "`friction.classes.bank` expected the key `k_s`, which keulegan needs"),
     ("k_s: 1.0", "k_s: 1.0, n: 0.1", "expected no key `n` together with keulegan"),
     ("k_s: 1.0", "k_s: 0", "`friction.classes.bank.k_s` expected a number above 0, got 0"),
+    (
+        "default: bed",
+        "default: bed\n  walls: {law: manning}",
+        "smooth when left out) expected the key `n`, which manning needs, got law: manning.",
+    ),
+    (
+        "default: bed",
+        "default: bed\n  walls: {law: manning, n: 0}",
+        "`friction.walls.n` expected a number above 0, got 0",
+    ),
+    (
+        "default: bed",
+        "default: bed\n  walls: {law: manning, n: n_w}",
+        "`friction.walls.n` names the parameter `n_w`, which is not declared: did you mean `n_b`?",
+    ),
     ("default: bed", "default: sand", "`friction.default` names the friction class `sand`, which is not declared"),
     ("class: bank", "class: bnak", "names the friction class `bnak`, which is not declared: did you mean `bank`?"),
     ("steeper_than: 0.2", "steeper_than: 0.2, x: [0, 3]", "`friction.zones[0]` expected one of `steeper_than`"),

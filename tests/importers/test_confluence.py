@@ -72,6 +72,49 @@ def test_every_second_section_is_held_out(imported: Path) -> None:
     assert set(velocity["value"]) == {SLOW, FAST}
 
 
+def test_velocities_across_are_seen_and_held_out_beside_those_along(imported: Path) -> None:
+    """All but those at y = 0.3 m, which have none; their errors have a share of the velocity along."""
+    case = load_case(imported)
+    seen = read_observations(case).table
+    along, across = (seen[seen["kind"] == kind] for kind in ("velocity", "velocity_across"))
+    assert sorted(set(along["y"]) - set(across["y"])) == [0.3]
+    assert set(across["value"]) == {0.01}
+    assert across["standard_error"].to_numpy() == pytest.approx(
+        np.sqrt(0.01**2 + 0.0002**2 + (0.05 * np.where(across["x"] <= 0.0, SLOW, FAST)) ** 2), abs=1e-5
+    )
+    unseen = validation_of(case)
+    assert unseen is not None
+    assert unseen.station["kind"].value_counts().to_dict() == {"velocity": 10, "velocity_across": 8}
+
+
+def test_a_set_without_velocities_across_is_taken_for_what_it_has(tmp_path: Path) -> None:
+    folder, target = small_set(tmp_path / "set"), tmp_path / "made.yaml"
+    lines = (folder / "depth_averaged.csv").read_text(encoding="utf-8").splitlines()
+    write(folder / "depth_averaged.csv", [",".join(np.delete(line.split(","), 4)) for line in lines])
+    import_command(folder, target)
+    case = load_case(target)
+    assert [one.kind for one in case.observations] == ["velocity", "level"]
+    assert case.inflows["side"].angle == 90.0
+
+
+def test_a_velocity_across_that_is_no_number_is_a_sentence(tmp_path: Path) -> None:
+    folder = small_set(tmp_path / "set")
+    text = (folder / "depth_averaged.csv").read_text(encoding="utf-8")
+    (folder / "depth_averaged.csv").write_text(text.replace("0.01,1", "slow,1", 1), encoding="utf-8")
+    with pytest.raises(InputError, match=r"row 2: expected a number or nothing in column V_depthavg_ms, got 'slow'"):
+        case_from_confluence(folder, tmp_path / "made.yaml")
+
+
+def test_the_side_walls_have_friction_of_their_own(imported: Path) -> None:
+    case = load_case(imported)
+    assert case.friction.walls is not None
+    assert case.friction.walls.coefficient == "n_w"
+    model = model_in(case)
+    point = linearise(model, np.zeros(len(model.names)))
+    assert point is not None
+    assert np.abs(point.slope[:, model.names.index("n_w")]).max() > 1e-3
+
+
 def test_verticals_off_the_map_or_in_the_tributary_are_no_measurements(imported: Path) -> None:
     table = read_observations(load_case(imported)).table
     assert table.loc[table["kind"] == "velocity", "y"].min() == 0.1

@@ -45,8 +45,14 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+def across(model: Model, prediction: np.ndarray) -> float:
+    """Root mean square error of all velocities across [m/s]."""
+    chosen = (model.station["kind"] == "velocity_across").to_numpy()
+    return rms((model.station["value"].to_numpy(float) - prediction)[chosen])
+
+
 def by_section(model: Model, prediction: np.ndarray) -> dict[str, float]:
-    """Root mean square error of each section [m/s], and of all velocities together."""
+    """Root mean square error of each section [m/s], and of all velocities along together."""
     velocity = (model.station["kind"] == "velocity").to_numpy()
     left = (model.station["value"].to_numpy(float) - prediction)[velocity]
     section = model.station["section"].to_numpy(str)[velocity]
@@ -65,7 +71,14 @@ def row_of(title: str, case: Case, runs: Path) -> Row:
         title,
         by_section(base.model, base.fitted.point.prediction),
         {} if there is None else by_section(unseen, there.prediction),
-        {"levels": seen.rmse["level"], "chi2": seen.chi2, "stations": seen.stations, "left out": held_out_rmse(found)},
+        {
+            "levels": seen.rmse["level"],
+            "across": across(base.model, base.fitted.point.prediction),
+            "across, unseen": np.nan if there is None else across(unseen, there.prediction),
+            "left out": held_out_rmse(found),
+            "chi2": seen.chi2,
+            "stations": seen.stations,
+        },
         found.values,
     )
 
@@ -114,12 +127,14 @@ def table(rows: list[Row]) -> list[str]:
         errors = [f"{getattr(row, which).get(name, np.nan):.3f}" for row in rows]
         lines.append(f"| {words} | {'in' if which == 'seen' else 'out'} | {' | '.join(errors)} |")
     numbers = (
-        ("levels", "levels [m]", ".4f"),
-        ("left out", "section left out, linear", ".3f"),
-        ("chi2", "chi2", ".0f"),
+        ("across", "velocity across", "in", ".3f"),
+        ("across, unseen", "velocity across", "out", ".3f"),
+        ("levels", "levels [m]", "in", ".4f"),
+        ("left out", "section left out, linear", "in", ".3f"),
+        ("chi2", "chi2", "in", ".0f"),
     )
-    for key, words, digits in numbers:
-        lines.append(f"| {words} | in | {' | '.join(format(row.numbers[key], digits) for row in rows)} |")
+    for key, words, which, digits in numbers:
+        lines.append(f"| {words} | {which} | {' | '.join(format(row.numbers[key], digits) for row in rows)} |")
     return lines
 
 
@@ -128,7 +143,8 @@ def page(rows: list[Row], said: list[str]) -> str:
     models = [f"{n}. {row.title}" for n, row in enumerate(rows, 1)]
     stations = int(rows[0].numbers["stations"])
     caption = (
-        f"Root mean square errors of depth-averaged velocity [m/s]; chi2 is of {stations} stations, errors as assumed."
+        "Root mean square errors of depth-averaged velocity [m/s], in sections of that along x; chi2 is of "
+        f"{stations} stations, errors as assumed."
     )
     values = []
     for n, row in enumerate(rows, 1):

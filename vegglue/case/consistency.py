@@ -7,7 +7,7 @@ from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
 from vegglue.case.parts import Interval, Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import COEFFICIENT_OF, Inflow, Stand, StandOverride
+from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Inflow, Stand, StandOverride
 from vegglue.effects.definition import Amplitude, Shape
 from vegglue.effects.library import library
 from vegglue.errors import shown_path
@@ -27,8 +27,9 @@ def disagreement(case: Case) -> Refusal | None:
 def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
     """Every number that may be a parameter: where it stands, what stands there, and whether it must be positive."""
     for name, friction_class in case.friction.classes.items():
-        for key in COEFFICIENT_OF.values():
-            yield ("friction", "classes", name, key), getattr(friction_class, key), True
+        yield from _coefficients(("friction", "classes", name), friction_class)
+    if case.friction.walls is not None:
+        yield from _coefficients(("friction", "walls"), case.friction.walls)
     owners: list[tuple[KeyPath, Mapping[str, Stand | StandOverride]]] = [(("plants",), case.plants.stands)]
     owners += [(("experiments", name), experiment.stands) for name, experiment in case.experiments.items()]
     for place, stands in owners:
@@ -43,6 +44,11 @@ def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
     for name, entry in case.effects.items():
         for key, value in entry.values.items():
             yield ("effects", name, "values", key), value, False
+
+
+def _coefficients(place: KeyPath, law: FrictionClass) -> Iterator[tuple[KeyPath, Value | None, bool]]:
+    for key in COEFFICIENT_OF.values():
+        yield (*place, key), getattr(law, key), True
 
 
 def _unknown(place: KeyPath, word: str, known: Iterable[str], what: str) -> Iterator[Refusal]:

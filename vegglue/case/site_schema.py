@@ -97,6 +97,9 @@ class Friction(Part):
     classes: dict[str, FrictionClass] = Field(min_length=1, description="resistance laws by name")
     default: str = Field(description="friction class where no zone applies")
     zones: tuple[Zone, ...] = Field(default=(), description="rules in order, later ones win")
+    walls: FrictionClass | None = Field(
+        default=None, description="vertical walls along the south and north side of the grid, smooth when left out"
+    )
 
 
 class Stand(Part):

@@ -11,6 +11,7 @@ from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells
 from vegglue.flow.problem import ACROSS, ALONG, EMPTY, LEVEL, Problem
+from vegglue.flow.wet_and_dry import afloat
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.site.channel_geometry import part_of
 
@@ -73,6 +74,28 @@ def drag(problem: Problem, depth: Array) -> Array:
     rate = bed_drag(problem, depth)
     _add_plant_drag(problem, rate, depth, (problem.plants.phi, problem.plants.canopy_height))
     return rate
+
+
+def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
+    """Rows beside rough walls, and k_w = sum(h c_w / dy) / sum h over both cells of their east faces, (nx, m) [1/m].
+
+    A wall of a cell's depth h takes c_w |u| u h dx from the water h dx dy of the cell, so that du/dt = -c_w |u| u / dy:
+    along the wall only, which is why it is no part of k. Faded out in the film on dry land like advection.
+    """
+    walls = problem.walls
+    if not walls.rate.size:
+        return ()
+    beside = ((0, walls.south), (-1, walls.north))
+    return tuple((row, _on_faces(stands, walls.rate, depth[:, row], problem.film)) for row, stands in beside)
+
+
+def _on_faces(stands: Array, rate: Array, depth: Array, film: float) -> Array:
+    """k_w of one row, of depths (nx, m); the last face has one cell."""
+    pulled = stands[:, None] * rate * depth * afloat(depth, 0.5 / film)
+    pulled[:-1] += pulled[1:]
+    pair = depth.copy()
+    pair[:-1] += depth[1:]
+    return pulled / pair
 
 
 def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[Array, Array]) -> None:

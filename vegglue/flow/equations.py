@@ -6,7 +6,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.flow import kernels, wet_and_dry
-from vegglue.flow.closures import Closures, closures
+from vegglue.flow.closures import Closures, closures, wall_rates
 from vegglue.flow.problem import ALONG, EMPTY, LEVEL, InflowSegment, Problem
 from vegglue.resistance.physical_constants import FILM_ON_LAND
 
@@ -52,6 +52,9 @@ def residual_of(
         problem.dy,
     )
     _join(problem, out, state[:, ALONG], depth)
+    for row, rate in wall_rates(problem, depth):
+        along = state[:, ALONG, row]
+        out[:, ALONG, row] += rate * np.sqrt(along**2 + kernels.REST_SPEED**2) * along
     if boundaries.lateral_inflow.size:
         # What enters from above or below has to be brought to speed; what leaves takes its own along.
         out[:, LEVEL] -= boundaries.lateral_inflow

@@ -23,7 +23,7 @@ from vegglue.site.channel_geometry import rows_of
 LEVEL, ACROSS, ALONG = 0, 1, 2
 # An array (nx, ny, m) of something that is not there.
 EMPTY = np.zeros((0, 0, 0))
-ProblemPart = TypeVar("ProblemPart", "BedFriction", "VegetatedCells", "InflowSegment", "Boundaries")
+ProblemPart = TypeVar("ProblemPart", "BedFriction", "VegetatedCells", "SideWalls", "InflowSegment", "Boundaries")
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,20 @@ class VegetatedCells:
     canopy_height: Array
     bare_chezy: Array
     proportional: bool
+
+
+@dataclass(frozen=True)
+class SideWalls:
+    """Rough vertical walls along the south and the north side of the grid: 1 beside each cell where one stands, else 0
+    (nx,), and c_w / dy of each member, see `wall_laws`, (m,) [1/m]; all empty without such walls.
+    """
+
+    south: Array
+    north: Array
+    rate: Array
+
+
+SMOOTH_WALLS = SideWalls(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -94,7 +108,7 @@ class Problem:
 
     film: a tenth of it stays on dry land [m]; smallest_shear_depth: whether shear acts over the smallest depth of the
     cells around a point, not the mean; bed_rise (nx, ny, m) or empty: by how much members' beds lie higher [m];
-    geometry: what effects see of the channel, none without effects.
+    geometry: what effects see of the channel, none without effects; walls: friction of the sides of the grid.
     """
 
     dx: float
@@ -109,6 +123,7 @@ class Problem:
     bed_rise: Array = field(default_factory=lambda: EMPTY)
     effects: tuple[ActiveEffect, ...] = ()
     geometry: ChannelGeometry | None = None
+    walls: SideWalls = SMOOTH_WALLS
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -144,6 +159,7 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
         viscosity=_some(problem.viscosity, members),
         boundaries=replace(boundaries, inflows=tuple(_inflow_of(one, members) for one in boundaries.inflows)),
         bed_rise=_some(problem.bed_rise, members),
+        walls=_taken(problem.walls, members, "rate"),
         effects=tuple(
             replace(active, values={name: _some(value, members) for name, value in active.values.items()})
             for active in problem.effects
@@ -169,6 +185,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
             lateral_inflow=cut(problem.boundaries.lateral_inflow),
         ),
         bed_rise=cut(problem.bed_rise),
+        walls=_walls_between(problem.walls, south == 0, north == problem.shape[1]),
         geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
     )
 
@@ -195,6 +212,15 @@ def _inflow_between(inflow: InflowSegment, south: int, north: int) -> InflowSegm
     start, stop = max(inflow.start, south), min(inflow.stop, north)
     spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
     return replace(inflow, start=start - south, stop=stop - south, spread=spread)
+
+
+def _walls_between(walls: SideWalls, south: bool, north: bool) -> SideWalls:
+    """The walls of the sides that are kept; land beside rows cut out does not drag."""
+    return replace(
+        walls,
+        south=walls.south if south else np.zeros_like(walls.south),
+        north=walls.north if north else np.zeros_like(walls.north),
+    )
 
 
 def _plants_between(plants: VegetatedCells, south: int, north: int) -> VegetatedCells:

@@ -11,8 +11,18 @@ from vegglue.case.site_schema import Inflow, Stand, StandOverride
 from vegglue.effects.active_effect import ActiveEffect, applied
 from vegglue.effects.definition import REPLACED
 from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
-from vegglue.flow.problem import EMPTY, BedFriction, Boundaries, InflowSegment, Problem, VegetatedCells
+from vegglue.flow.problem import (
+    EMPTY,
+    SMOOTH_WALLS,
+    BedFriction,
+    Boundaries,
+    InflowSegment,
+    Problem,
+    SideWalls,
+    VegetatedCells,
+)
 from vegglue.resistance import bed_laws, plant_laws
+from vegglue.resistance.wall_laws import wall_coefficient
 from vegglue.site.channel_geometry import channel_geometry, patches_present
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
@@ -43,6 +53,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         bed_rise=added.get("bed", EMPTY),
         effects=effects,
         geometry=geometry,
+        walls=_walls(case, site, theta, members),
     )
 
 
@@ -55,6 +66,19 @@ def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFric
         coefficient=np.array([value_of(item.coefficient, theta, members) for item in classes]),
         bank_argument_minimum=case.numerics.bank_argument_minimum,
     )
+
+
+def _walls(case: Case, site: Site, theta: Theta, members: int) -> SideWalls:
+    """Rough walls along both sides, none where water enters through them."""
+    walls, sides = case.friction.walls, {side: np.ones(site.grid.x.size) for side in ("south", "north")}
+    if walls is None:
+        return SMOOTH_WALLS
+    for inflow in case.inflows.values():
+        if inflow.side != "west":
+            sides[inflow.side][inflow_cells(inflow, site.grid)] = 0.0
+    law, floor = bed_laws.BED_LAWS.index(walls.law), case.numerics.bank_argument_minimum
+    drag = wall_coefficient(law, value_of(walls.coefficient, theta, members), site.grid.dy, floor)
+    return SideWalls(**sides, rate=drag / site.grid.dy)
 
 
 def _boundaries(case: Case, site: Site, values: BoundaryValues, entering: Array) -> Boundaries:

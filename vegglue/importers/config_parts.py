@@ -24,6 +24,11 @@ def loguniform_prior(low: float, high: float, unit: str, symbol: str, meaning: s
     return {"distribution": "loguniform", "low": low, "high": high, **_words(unit, symbol, meaning)}
 
 
+def lognormal_prior(median: float, log_sd: float, unit: str, symbol: str, meaning: str) -> Tree:
+    """ln N(ln median, log_sd^2); the median in the unit."""
+    return {"distribution": "lognormal", "median": median, "log_sd": log_sd, **_words(unit, symbol, meaning)}
+
+
 def bed_prior(low: float, high: float) -> Tree:
     """The prior of n_b of MANNING_BED [s m^(-1/3)]."""
     return loguniform_prior(low, high, "s m^(-1/3)", "n_b", "Manning coefficient of the bed")

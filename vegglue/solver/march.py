@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.closures import Closures, closures
+from vegglue.flow.closures import Closures, closures, wall_rates
 from vegglue.flow.equations import Faces, faces, residual, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.problem import LEVEL, Problem
@@ -99,5 +99,7 @@ def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Arr
     cell += 4.0 * closed.viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
+    for row, rate in wall_rates(problem, now.cell):
+        along[:, row] += 2.0 * rate * np.sqrt(now.u[1:, row] ** 2 + REST_SPEED**2)
     across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])
     return along, across

@@ -1,0 +1,112 @@
+"""Rough walls of a case: where they stand, that members, tangents and both engines know them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from vegglue.case.resolved_config import dumped
+from vegglue.case.schema import Case
+from vegglue.engine.interface import Model, linearise, predict
+from vegglue.engine.marching import marching
+from vegglue.engine.newton import NEWTON
+from vegglue.flow.problem_setup import build_problem
+from vegglue.site.gridded_site import build_site
+
+TREE = {
+    "source": Path("flume"),
+    "name": "flume",
+    "grid": {"x": (0.0, 6.0), "y": (0.0, 0.9), "cell": (0.25, 0.075)},
+    "bed": [{"trapezoid": {"axis": 0.45, "bottom_width": 2.0, "bank_slope": 1.0, "bed_slope": 0.002, "level": 0.0}}],
+    "inflows": {
+        "main": {"side": "west"},
+        "side": {"side": "south", "range": (2.0, 2.5), "spread": "uniform"},
+    },
+    "experiments": {"one": {"discharge": {"main": 0.04, "side": 0.004}, "level": 0.1}},
+    "eddy_viscosity": 0.002,
+    "numerics": {"film_depth": 0.002},
+}
+PRIORS = {
+    "n_b": {"distribution": "loguniform", "low": 0.01, "high": 0.03, "unit": "s m^(-1/3)"},
+    "n_w": {"distribution": "loguniform", "low": 0.005, "high": 0.03, "unit": "s m^(-1/3)"},
+}
+BED = {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"}
+Z = np.array([0.1, 0.2])
+
+
+def flume(rough: bool = True) -> Case:
+    friction = BED | ({"walls": {"law": "manning", "n": "n_w"}} if rough else {})
+    priors = PRIORS if rough else {"n_b": PRIORS["n_b"]}
+    return Case.model_validate(TREE | {"friction": friction, "parameters": priors})
+
+
+def stations() -> pd.DataFrame:
+    rows = [
+        {"experiment": "one", "kind": kind, "section": f"{kind} {x:g}", "x": x, "y": y}
+        for kind in ("velocity", "velocity_across", "level")
+        for x in (1.3, 3.0, 4.9)
+        for y in (0.05, 0.3, 0.8)
+    ]
+    given = {"value": 0.0, "standard_error": 0.01, "used": True, "reason": "", "depth": np.nan, "device": ""}
+    return pd.DataFrame(rows).assign(**given)
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model(flume(), build_site(flume()), stations(), NEWTON)
+
+
+def test_walls_stand_where_no_water_enters() -> None:
+    case = flume()
+    walls = build_problem(case, build_site(case), "one", {"n_b": np.full(2, 0.02), "n_w": np.array([0.01, 0.02])}).walls
+    assert np.flatnonzero(walls.south == 0.0).tolist() == [8, 9]
+    assert walls.north.all()
+    assert walls.rate == pytest.approx(9.81 * np.array([0.01, 0.02]) ** 2 / 0.075 ** (1.0 / 3.0) / 0.075)
+
+
+def test_a_case_that_names_no_walls_has_none_and_is_written_as_before() -> None:
+    case = flume(rough=False)
+    assert build_problem(case, build_site(case), "one", {"n_b": np.full(2, 0.02)}).walls.rate.size == 0
+    assert "walls" not in dumped(case)["friction"]
+
+
+def test_walls_hold_the_water_beside_them_and_raise_it(model: Model) -> None:
+    rough = linearise(model, Z)
+    smooth = linearise(replace(model, case=flume(rough=False)), Z[:1])
+    assert rough is not None
+    assert smooth is not None
+    change = (rough.prediction - smooth.prediction).reshape(3, 3, 3)
+    assert (change[0, 1:, [0, 2]] < -0.005).all()
+    assert (change[0, 1:, 1] > 5e-4).all()
+    assert (change[2, 0] > 1e-4).all()
+
+
+def test_slopes_are_those_of_members_solved_by_chord_steps(model: Model) -> None:
+    point = linearise(model, Z)
+    assert point is not None
+    step = 0.05 * np.eye(2)
+    found = predict(model, [point], np.concatenate([Z + step, Z - step]))
+    slope = (found[:2] - found[2:]).T / 0.1
+    assert np.abs(point.slope[:, 1]).max() > 0.01
+    assert point.slope == pytest.approx(slope, abs=0.01 * np.abs(slope[:, 1]).max())
+
+
+def test_members_far_away_are_those_newton_finds(model: Model) -> None:
+    point = linearise(model, Z)
+    assert point is not None
+    there = [np.array([-1.0, 1.5]), np.array([0.5, -1.5])]
+    found = predict(model, [point], np.array(there))
+    for z, prediction in zip(there, found, strict=True):
+        alone = linearise(model, z)
+        assert alone is not None
+        assert prediction == pytest.approx(alone.prediction, abs=1e-5)
+
+
+def test_both_engines_know_walls(model: Model) -> None:
+    exact, marched = linearise(model, Z), linearise(replace(model, engine=marching()), Z)
+    assert exact is not None
+    assert marched is not None
+    assert marched.prediction == pytest.approx(exact.prediction, abs=1e-5)
+    assert marched.slope == pytest.approx(exact.slope, abs=5e-3 * np.abs(exact.slope).max())
