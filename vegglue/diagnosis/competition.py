@@ -54,12 +54,12 @@ def contenders_of(screening: Screening, say: Say) -> list[Contender]:
     best = max(*(kind.total for kind in screening.kinds), float(linear.max()))
     effects = _worth_refitting(screening, linear, best)
     places = [one for one in screening.fingerprints.places if _within_reach(by_name[one.term].total, best)]
-    spots = [by_name[one.term].best for one in places]
+    spots = [(one, spot) for one in places for spot in _promising_spots(one, by_name[one.term], best)]
     candidates = screening.fingerprints.candidates
     names = [candidates[j].name for j in effects] + [f"{one.term} at a place" for one in places]
     say(f"refitting with {', '.join(names)}")
     trials = [_effect_trial(screening, j, linear, second) for j in effects]
-    trials += [_place_trial(screening, one, spot) for one, spot in zip(places, spots, strict=True)]
+    trials += [_place_trial(screening, one, spot) for one, spot in spots]
     refits = refits_of(screening.search, trials)
     found = _instrument_contenders(screening)
     for j, refit in zip(effects, refits, strict=False):
@@ -67,12 +67,23 @@ def contenders_of(screening: Screening, say: Say) -> list[Contender]:
             column = _column_of(screening, j, linear)
             evidence = refit.log_factor + _settings_charge(screening, by_name["effect"], j, column)
             found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
-    for one, spot, refit in zip(places, spots, refits[len(effects) :], strict=True):
-        if refit is not None:
-            kind = by_name[one.term]
-            corrected = kind.total + refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
-            found.append(Contender(one.term, refit.candidate.name, corrected, spot, refit))
+    for one in places:
+        of_term = [
+            (spot, refit) for (where, spot), refit in zip(spots, refits[len(effects) :], strict=True) if where is one
+        ]
+        found += _place_contender(by_name[one.term], [(spot, refit) for spot, refit in of_term if refit is not None])
     return sorted(found, key=lambda one: -one.log_evidence)
+
+
+def _place_contender(kind: Kind, refits: Sequence[tuple[int, Refit]]) -> list[Contender]:
+    """The best refitted spot of a term with the evidence of all its spots, corrected as that of this one; none if no
+    flow was found with any.
+    """
+    if not refits:
+        return []
+    spot, best = max(refits, key=lambda one: one[1].log_factor)
+    first_order = float(log_factors(kind.scores, kind.size)[[spot for spot, _ in refits]].max())
+    return [Contender(kind.name, best.candidate.name, kind.total + best.log_factor - first_order, spot, best)]
 
 
 def chances_of(contenders: Sequence[Contender]) -> Array:
@@ -102,6 +113,15 @@ def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[i
     of_each = np.array([linear[columns].max() for columns in screening.fingerprints.columns])
     ranked = [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
     return [j for j in ranked if _within_reach(float(of_each[j]), best)] or ranked[:1]
+
+
+def _promising_spots(places: Places, kind: Kind, best: float) -> list[int]:
+    """The best spot of each length, those within reach."""
+    evidence = kind.log_evidence
+    of_length = [np.flatnonzero(places.length == length) for length in np.unique(places.length)]
+    spots = [int(columns[np.argmax(evidence[columns])]) for columns in of_length]
+    charge = kind.total - float(evidence.max())
+    return [spot for spot in spots if _within_reach(float(evidence[spot]) + charge, best)]
 
 
 def _column_of(screening: Screening, candidate: int, linear: Array) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.case.parameter_space import theta_at
+from vegglue.compilation import compiled
 from vegglue.engine.interface import Model, Point
 from vegglue.flow.equations import residual
 from vegglue.flow.local_changes import Term, with_changed_term
@@ -59,21 +60,28 @@ def _lattice(nx: int, ny: int) -> Array:
     return ((i == member // STRIDE) & (j == member % STRIDE)).astype(float)
 
 
-def _told_apart(sensitivity: Single, change: Single) -> Array:
+def _told_apart(sensitivity: Single, change: Single) -> Single:
     """-l . dR of every cell (n, nx, ny), summed over the window of STRIDE cells around it.
 
     sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, STRIDE^2).
     """
     nx, _, ny, n = sensitivity.shape
+    found = np.zeros((nx, ny, n), dtype=np.float32)
+    _sum_windows(sensitivity, change, found)
+    return np.ascontiguousarray(np.moveaxis(found, -1, 0))
+
+
+@compiled
+def _sum_windows(sensitivity, change, found):
+    nx, equations, ny, n = sensitivity.shape
     half = STRIDE // 2
-    found = np.zeros((n, nx, ny))
-    for member in range(STRIDE**2):
-        product = np.einsum("ikjn,ikj->nij", sensitivity, change[..., member])
-        first = member // STRIDE, member % STRIDE
-        i, j = np.arange(first[0], nx, STRIDE), np.arange(first[1], ny, STRIDE)
-        total = np.pad(product, ((0, 0), (half, half), (half, half))).cumsum(1).cumsum(2)
-        total = np.pad(total, ((0, 0), (1, 0), (1, 0)))
-        a, b = i[:, None], j[None]
-        window = total[:, a + STRIDE, b + STRIDE] - total[:, a, b + STRIDE] - total[:, a + STRIDE, b] + total[:, a, b]
-        found[:, a, b] = -window
-    return found
+    for i in range(nx):
+        for j in range(ny):
+            member = (i % STRIDE) * STRIDE + j % STRIDE
+            for a in range(max(i - half, 0), min(i + half + 1, nx)):
+                for b in range(max(j - half, 0), min(j + half + 1, ny)):
+                    for k in range(equations):
+                        weight = change[a, k, b, member]
+                        if weight != 0.0:
+                            for station in range(n):
+                                found[i, j, station] -= sensitivity[a, k, b, station] * weight

@@ -30,7 +30,7 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
 # Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
 # discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
 SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
-# Depth [m] above which a place counts as under water in some experiment.
+# Depth [m] above which a cell counts as under water.
 LEAST_DEPTH = 0.05
 # The effect of the library that stands for a term at a place.
 EFFECT_AT_PLACE: Mapping[Term, str] = {
@@ -63,8 +63,10 @@ class Places:
 def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
     """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
     responses = cell_responses(model, point, tuple(EFFECT_AT_PLACE))
-    wet = _wet(model, point)
-    return tuple(_places_of_term(model.case, responses, term, half_width, wet) for term in EFFECT_AT_PLACE)
+    wet = np.array([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
+    # Water that enters over land has no steady way down in the model: it enters where there is water at all times.
+    seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in EFFECT_AT_PLACE}
+    return tuple(_places_of_term(model.case, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE)
 
 
 def plausible_size(case: Case, term: Term) -> float:
@@ -93,8 +95,3 @@ def _places_of_term(case: Case, responses: CellResponses, term: Term, half_width
         parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
     x, y, length_of, width_of, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
     return Places(term, x, y, length_of, width_of, plausible_size(case, term), fingerprints)
-
-
-def _wet(model: Model, point: Point) -> np.ndarray:
-    """Cells (nx, ny) under water in some experiment."""
-    return np.any([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows], axis=0)
