@@ -4,7 +4,8 @@
 
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
-deviation s_f [-] or s_b [m]. Weak-constraint data assimilation gives a model its error in the same way (Tremolet 2006,
+deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else in
+nature: its term may differ by SHAPE_ERROR of its size in every bump around it. Weak-constraint data assimilation gives a model its error in the same way (Tremolet 2006,
 doi:10.1256/qj.05.224; not checked against it).
 """
 
@@ -14,16 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.case.schema import ModelError
+from vegglue.case.case_effects import effect_of, value_of
+from vegglue.case.parameter_space import theta_at
+from vegglue.case.parts import Value
+from vegglue.case.schema import Case, ModelError
 from vegglue.engine.interface import Model, Point, responses_to_cells
 from vegglue.flow.local_changes import Term
 from vegglue.parallel import in_threads
 from vegglue.site.channel_geometry import half_width
 from vegglue.site.grid import Grid
 
+# The term that each unlisted effect of the library changes at its place.
+TERM_OF: dict[str, Term] = {
+    "unlisted_object": "drag",
+    "unlisted_bed": "bed",
+    "unlisted_inflow": "inflow",
+    "unlisted_viscosity": "viscosity",
+}
 # Radius of a bump over the half width of the floor [-]: friction differs from one stone, tuft or stem count to the
 # next, a survey from one line of points to the next, about half a width. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
+# What a spot leaves of an object of another shape, over the size of the spot [-], and how far around it, over its size.
+# Chosen after open-f, where a spot left 0.3 of the trace of a smaller pier in neighbouring places.
+SHAPE_ERROR, AROUND = 0.5, 2.0
 # Least radius in cells: below, a bump falls between the centres of cells.
 FEWEST_CELLS = 1.5
 
@@ -83,20 +97,56 @@ def field_columns(responses: CellResponses, term: Term, over: Bumps) -> Array:
     return responses_to_bumps(responses, term, over).reshape(len(responses.of[term]), -1) / np.sqrt(variance)
 
 
-def model_error_columns(model: Model, point: Point, error: ModelError) -> Array:
+def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Array:
     """Columns (station, k) with M = columns columns', see the head of this file; none where no error is allowed."""
-    terms: tuple[Term, ...] = ("friction", "bed")
-    if not (error.friction or error.bed):
+    if not (allowed.friction or allowed.bed):
         return np.zeros((len(model.station), 0))
-    responses, half = cell_responses(model, point, terms), half_width(model.site)
-    friction = bumps(model.site.grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
-    bed = bumps(model.site.grid, BED_RADIUS * half, BED_RADIUS * half)
+    objects = unlisted_in(model.case)
+    terms = dict.fromkeys(("friction", "bed", *(one.term for one in objects)))
+    responses, half, grid = cell_responses(model, point, tuple(terms)), half_width(model.site), model.site.grid
+    friction = bumps(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
+    bed = bumps(grid, BED_RADIUS * half, BED_RADIUS * half)
     return np.hstack(
         [
-            error.friction * field_columns(responses, "friction", friction),
-            error.bed * field_columns(responses, "bed", bed),
+            allowed.friction * field_columns(responses, "friction", friction),
+            allowed.bed * field_columns(responses, "bed", bed),
+            *(_columns_of_shape(model, point, responses, one) for one in objects),
         ]
     )
+
+
+@dataclass(frozen=True)
+class UnlistedObject:
+    """Something unlisted at a place that acts in a case: its term, the name of its amplitude or its value, its spot."""
+
+    term: Term
+    amplitude: Value
+    place: dict[str, float]
+
+
+def unlisted_in(case: Case) -> list[UnlistedObject]:
+    """Those of a case."""
+    found = []
+    for name, entry in case.effects.items():
+        effect = effect_of(case, name)
+        if effect.name in TERM_OF:
+            place = {shape.name: float(entry.values.get(shape.name, shape.default)) for shape in effect.shapes}
+            amplitude = entry.values.get(effect.amplitude.name, effect.amplitude.off)
+            found.append(UnlistedObject(TERM_OF[effect.name], amplitude, place))
+    return found
+
+
+def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one: UnlistedObject) -> Array:
+    """Bumps around a spot, each of SHAPE_ERROR of its size."""
+    place, half = one.place, FRICTION_RADIUS * half_width(model.site)
+    over = bumps(model.site.grid, half, half)
+    away = ((over.x[:, None] - place["x"]) / (place["length"] + over.length)) ** 2
+    away = away + ((over.y[None] - place["y"]) / (place["width"] + over.width)) ** 2
+    size = float(value_of(one.amplitude, theta_at(model.case, point.z[None]), 1)[0])
+    if one.term == "inflow":
+        size /= np.pi * place["length"] * place["width"]
+    near = responses_to_bumps(responses, one.term, over)[:, away < AROUND**2]
+    return np.asarray(SHAPE_ERROR * size * near)
 
 
 def _raster(centres: Array, spacing: float) -> Array:

@@ -68,10 +68,9 @@ def contenders_of(screening: Screening, say: Say) -> list[Contender]:
             evidence = refit.log_factor + _settings_charge(screening, by_name["effect"], j, column)
             found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
     for one in places:
-        of_term = [
-            (spot, refit) for (where, spot), refit in zip(spots, refits[len(effects) :], strict=True) if where is one
-        ]
-        found += _place_contender(by_name[one.term], [(spot, refit) for spot, refit in of_term if refit is not None])
+        of_term = zip(spots, refits[len(effects) :], strict=True)
+        ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
+        found += _place_contender(by_name[one.term], ended)
     return sorted(found, key=lambda one: -one.log_evidence)
 
 

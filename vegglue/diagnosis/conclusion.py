@@ -138,7 +138,7 @@ def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -
     """A smooth field of one term, where it explains the misfit of the first model better than all that was accepted, or
     closes a misfit in which nothing was; None where there is nothing to explain.
     """
-    if not (found.accepted or found.undecided) and misfit.p >= POOR:
+    if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= POOR):
         return None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))

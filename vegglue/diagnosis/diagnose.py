@@ -23,6 +23,7 @@ from vegglue.diagnosis.rivals import instrument_found, location_found, step_foun
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.interface import Model
+from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.screening.candidates import candidates_in_case
@@ -52,12 +53,12 @@ def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None)
     base = baseline(model)
     say("looking for what is missing")
     first = screening = screen(base)
-    found, suspects = Findings(), dict[str, Suspect]()
+    found, suspects = Findings(absurd=tuple(absurd_values(model.case, model.site, model.station))), dict[str, Suspect]()
     while True:
         tested = suspects_of(screening)
         suspects = tested | _kept(suspects, tested)
         found = _with_alarm(screening, found)
-        if not found.alarmed:
+        if found.absurd or not found.alarmed:
             break
         contenders = contenders_of(screening, say)
         suspects |= _calibrated(contenders, tested)

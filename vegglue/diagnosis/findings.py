@@ -10,7 +10,7 @@ from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 class Findings:
     """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places, and
     log_evidence: the sum of theirs [-]. p: of the last alarm, and the rate below which it
-    is sounded. undecided: what competed last and led to nothing, most evidence first.
+    is sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of the case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
@@ -22,6 +22,7 @@ class Findings:
     p: float = 1.0
     rate: float = 0.0
     undecided: tuple[Contender, ...] = ()
+    absurd: tuple[str, ...] = ()
 
     @property
     def alarmed(self) -> bool:

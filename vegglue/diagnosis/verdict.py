@@ -83,6 +83,8 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
 
 def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
     found, misfit = grounds.findings, grounds.misfit
+    if found.absurd:
+        return "cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}"
     doubt = _doubt(grounds, suspects)
     named = _named(found, suspects)
     if grounds.field is not None:

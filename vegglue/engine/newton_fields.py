@@ -72,7 +72,7 @@ def _told_apart(sensitivity: Single, change: Single) -> Single:
 
 
 @compiled
-def _sum_windows(sensitivity, change, found):
+def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
     nx, equations, ny, n = sensitivity.shape
     half = STRIDE // 2
     for i in range(nx):

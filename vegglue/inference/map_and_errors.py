@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, grid_difference
+from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
 from vegglue.calibration.fit import MapEstimate, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error
 from vegglue.case.parameter_space import z_at
@@ -138,8 +138,8 @@ class ModesAndErrors:
 def modes_and_errors(model: Model, ensemble: Ensemble, rule: str) -> ModesAndErrors:
     """The modes from the best members of an ensemble; then the errors, and the modes under these.
 
-    rule known: errors as stated, and the error of the grid from the difference to cells of twice the size. rule
-    best-member: errors of one size for each kind of measurement, from the residual at the best mode (which holds the
+    rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
+    model as the case allows it. rule best-member: errors of one size for each kind of measurement, from the residual at the best mode (which holds the
     error of the grid). The correlation along a section is estimated in both, see `estimate_noise`.
     Errors: InputError when a standard error is missing (known) or no flow is found.
     """
@@ -149,6 +149,7 @@ def modes_and_errors(model: Model, ensemble: Ensemble, rule: str) -> ModesAndErr
     on_coarse = None if coarse is None else linearise(coarse, fits[0].point.z)
     if rule == "known":
         noise = with_grid_error(noise, grid_difference(fits[0].point, on_coarse))
+        noise = with_own_error(Baseline(model, noise, fits[0], coarse, on_coarse)).noise
     for _ in range(SIZE_ESTIMATES if rule != "known" else 0):
         noise = _with_estimated_sizes(noise, fits[0], model.station)
         fits = _refitted(model, noise, fits)

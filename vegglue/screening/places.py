@@ -7,11 +7,12 @@ A place has one fingerprint for all experiments: what lies there stays where it 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.model_error import CellResponses, bumps, cell_responses, responses_to_bumps
+from vegglue.calibration.model_error import TERM_OF, CellResponses, bumps, cell_responses, responses_to_bumps
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
@@ -33,12 +34,7 @@ SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
 # Depth [m] above which a cell counts as under water.
 LEAST_DEPTH = 0.05
 # The effect of the library that stands for a term at a place.
-EFFECT_AT_PLACE: Mapping[Term, str] = {
-    "drag": "unlisted_object",
-    "bed": "unlisted_bed",
-    "inflow": "unlisted_inflow",
-    "viscosity": "unlisted_viscosity",
-}
+EFFECT_AT_PLACE: Mapping[Term, str] = {term: effect for effect, term in TERM_OF.items()}
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class Places:
 def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
     """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
     responses = cell_responses(model, point, tuple(EFFECT_AT_PLACE))
-    wet = np.array([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
+    wet = np.stack([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
     # Water that enters over land has no steady way down in the model: it enters where there is water at all times.
     seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in EFFECT_AT_PLACE}
     return tuple(_places_of_term(model.case, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE)
@@ -80,7 +76,7 @@ def plausible_size(case: Case, term: Term) -> float:
     return SPOT_SHARE * float(np.mean(totals))
 
 
-def _places_of_term(case: Case, responses: CellResponses, term: Term, half_width: float, wet: np.ndarray) -> Places:
+def _places_of_term(case: Case, responses: CellResponses, term: Term, half_width: float, wet: Any) -> Places:
     width = SPOT_WIDTH * half_width
     parts = []
     for length in SPOT_LENGTHS[term]:
