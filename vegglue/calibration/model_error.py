@@ -4,9 +4,10 @@
 
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
-deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else in
-nature: its term may differ by SHAPE_ERROR of its size in every bump around it. Weak-constraint data assimilation gives a model its error in the same way (Tremolet 2006,
-doi:10.1256/qj.05.224; not checked against it).
+deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else
+in nature: its term may differ by SHAPE_ERROR of its size in every bump around it.
+Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
+checked against it); the fields of bumps are a definition of this project.
 """
 
 from dataclasses import dataclass

@@ -13,6 +13,7 @@ from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
+from vegglue.diagnosis.refits import log_evidence
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
 from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged
@@ -142,7 +143,8 @@ def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -
         return None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
-    ahead = (best.log_factor - found.log_evidence) / tempering(np.array(best.log_factor))
+    gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
+    ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
     if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS):
         return None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid

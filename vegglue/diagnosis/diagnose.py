@@ -122,7 +122,7 @@ def _with_accepted(
     found = replace(
         found,
         explained=found.explained + before - further.fitted.chi2,
-        log_evidence=found.log_evidence + best.log_evidence,
+        log_prior=found.log_prior + best.log_evidence - refit.log_factor,
     )
     if best.kind != "effect":
         return replace(found, places=(*found.places, location_found(screening, contenders, refit))), further

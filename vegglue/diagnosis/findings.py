@@ -8,9 +8,10 @@ from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 
 @dataclass(frozen=True)
 class Findings:
-    """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places, and
-    log_evidence: the sum of theirs [-]. p: of the last alarm, and the rate below which it
-    is sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of the case can have, in sentences.
+    """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places;
+    log_prior: ln of the chance of all of them before the data. p: of the last alarm, and the rate below which it is
+    sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of the
+    case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
@@ -18,7 +19,7 @@ class Findings:
     instruments: tuple[FaultyInstrument, ...] = ()
     flagged: tuple[int, ...] = ()
     explained: float = 0.0
-    log_evidence: float = 0.0
+    log_prior: float = 0.0
     p: float = 1.0
     rate: float = 0.0
     undecided: tuple[Contender, ...] = ()

@@ -82,8 +82,13 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
     return np.append(z, z_of(changed.parameters[candidate.parameter], amplitude))
 
 
-def log_evidence(fitted: MapEstimate) -> float:
-    """-1/2 F - 1/2 ln|H| of a calibrated model, up to what all models of the same data share [-]."""
+def log_evidence(base: Baseline) -> float:
+    """ln p(y) = -1/2 F - 1/2 ln|H| - 1/2 ln|C| of a calibrated model, up to a constant of the data [-]."""
+    return _log_evidence(base.fitted) - float(np.log(np.diag(base.noise.lower)).sum())
+
+
+def _log_evidence(fitted: MapEstimate) -> float:
+    """The same where all models have the same covariance C of the errors."""
     return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
 
 
@@ -96,7 +101,7 @@ def _refitted(search: SearchModel, trial: Trial, start: Array) -> MapEstimate | 
 def _refit(search: SearchModel, trial: Trial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
     model = replace(search.model, case=changed_case(search.model.case, trial))
     amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
-    gained = log_evidence(fitted) - log_evidence(nothing)
+    gained = _log_evidence(fitted) - _log_evidence(nothing)
     return Refit(trial.candidate, trial.shapes, fitted, gained, amplitude, (low, high))
 
 

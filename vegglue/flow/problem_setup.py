@@ -23,9 +23,12 @@ from vegglue.flow.problem import (
 )
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.resistance.wall_laws import wall_coefficient
-from vegglue.site.channel_geometry import channel_geometry, patches_present
+from vegglue.site.channel_geometry import channel_geometry, expected_depth, patches_present
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
+
+# Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
+WHERE_WATER_ENTERS = 0.2
 
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
@@ -38,7 +41,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     setting = case.experiments[experiment]
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
-    added = _added_to_site(effects, geometry) if geometry else {}
+    added = _added_to_site(effects, geometry, share_under_water(case, site, setting)) if geometry else {}
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
@@ -150,14 +153,29 @@ def _inflow(inflow: Inflow, site: Site, discharge: Array, spread: Array) -> Infl
     )
 
 
-def _added_to_site(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> dict[str, Array]:
-    """By how much members' beds lie higher [m] and what enters there [m/s], (nx, ny, m), as far as effects say so."""
+def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
+    """How much of what enters somewhere does so in each cell, (nx, ny) [-]: 1 where water is expected to stand deeper
+    than WHERE_WATER_ENTERS, 0 on land, over which it would have no steady way down.
+    """
+    return np.clip(expected_depth(case, site, setting) / WHERE_WATER_ENTERS, 0.0, 1.0)
+
+
+def _added_to_site(
+    effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, under_water: Array
+) -> dict[str, Array]:
+    """By how much members' beds lie higher [m] and what enters there [m/s], (nx, ny, m), as far as effects say so; what
+    would enter over land enters in the water beside it.
+    """
     here = [active for active in effects if active.effect.stage == "site" and active.on.any()]
     if not here:
         return {}
     zero = np.zeros((*geometry.bed.shape[:2], len(next(iter(here[0].values.values())))))
     change = applied(effects, "site", geometry, {"bed": zero, "inflow": zero})
-    return {name: np.ascontiguousarray(value) for name, value in change.items() if value is not zero}
+    found = {name: np.ascontiguousarray(value) for name, value in change.items() if value is not zero}
+    if "inflow" in found:
+        total, wet = found["inflow"].sum(axis=(0, 1)), found["inflow"] * under_water[..., None]
+        found["inflow"] = wet * (total / np.where(wet.sum(axis=(0, 1)) == 0.0, 1.0, wet.sum(axis=(0, 1))))
+    return found
 
 
 def boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:

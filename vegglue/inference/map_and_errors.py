@@ -139,8 +139,8 @@ def modes_and_errors(model: Model, ensemble: Ensemble, rule: str) -> ModesAndErr
     """The modes from the best members of an ensemble; then the errors, and the modes under these.
 
     rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
-    model as the case allows it. rule best-member: errors of one size for each kind of measurement, from the residual at the best mode (which holds the
-    error of the grid). The correlation along a section is estimated in both, see `estimate_noise`.
+    model as the case allows it. rule best-member: errors of one size for each kind of measurement, from the residual at
+    the best mode (which holds both). The correlation along a section is estimated in both, see `estimate_noise`.
     Errors: InputError when a standard error is missing (known) or no flow is found.
     """
     noise = _initial_noise(model, ensemble, rule)

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.model_error import TERM_OF, CellResponses, bumps, cell_responses, responses_to_bumps
+from vegglue.calibration.model_error import TERM_OF, Bumps, CellResponses, bumps, cell_responses, responses_to_bumps
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.flow.local_changes import Term
+from vegglue.flow.problem_setup import share_under_water
 
 # Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
 # and a stretch of bank, as in open-m, after which the longest was added. Smaller ones tell places apart more closely,
@@ -31,6 +32,8 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
 # Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
 # discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
 SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
+# Share of a spot that has to lie under water, of water that enters in all experiments, else in one of them [-].
+LEAST_SHARE = 0.5
 # Depth [m] above which a cell counts as under water.
 LEAST_DEPTH = 0.05
 # The effect of the library that stands for a term at a place.
@@ -59,10 +62,12 @@ class Places:
 def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
     """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
     responses = cell_responses(model, point, tuple(EFFECT_AT_PLACE))
+    for experiment, rows in model.rows.items():
+        responses.of["inflow"][rows] *= _under_water(model, experiment)
     wet = np.stack([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
-    # Water that enters over land has no steady way down in the model: it enters where there is water at all times.
+    # Water that enters does so where there is water at all times.
     seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in EFFECT_AT_PLACE}
-    return tuple(_places_of_term(model.case, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE)
+    return tuple(_places_of_term(model, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE)
 
 
 def plausible_size(case: Case, term: Term) -> float:
@@ -76,18 +81,31 @@ def plausible_size(case: Case, term: Term) -> float:
     return SPOT_SHARE * float(np.mean(totals))
 
 
-def _places_of_term(case: Case, responses: CellResponses, term: Term, half_width: float, wet: Any) -> Places:
+def _places_of_term(model: Model, responses: CellResponses, term: Term, half_width: float, wet: Any) -> Places:
     width = SPOT_WIDTH * half_width
     parts = []
     for length in SPOT_LENGTHS[term]:
         over = bumps(responses.grid, length * width, width)
         answers = responses_to_bumps(responses, term, over)
         if term == "inflow":
-            answers = answers / (np.pi * over.length * over.width)
+            answers = answers / _area_under_water(model, over)
         share = over.along @ wet @ over.across.T
-        within = share > 0.5 * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
+        within = share > LEAST_SHARE * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
         a, b = np.nonzero(within)
         size = np.full((2, a.size), [[over.length], [over.width]])
         parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
     x, y, length_of, width_of, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-    return Places(term, x, y, length_of, width_of, plausible_size(case, term), fingerprints)
+    return Places(term, x, y, length_of, width_of, plausible_size(model.case, term), fingerprints)
+
+
+def _under_water(model: Model, experiment: str) -> Any:
+    return share_under_water(model.case, model.site, model.case.experiments[experiment])
+
+
+def _area_under_water(model: Model, over: Bumps) -> Array:
+    """Area [m2] over which the water of each spot enters, (station, k, j): that of the experiment of the station."""
+    cell = model.site.grid.dx * model.site.grid.dy
+    area = np.ones((len(model.station), over.x.size, over.y.size))
+    for experiment, rows in model.rows.items():
+        area[rows] = np.maximum(cell * (over.along @ _under_water(model, experiment) @ over.across.T), 0.1 * cell)
+    return area
