@@ -39,7 +39,7 @@ FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
 # What a spot leaves of an object of another shape, over the size of the spot [-], and how far around it, over its size.
 # Chosen after open-f, where a spot left 0.3 of the trace of a smaller pier in neighbouring places.
 SHAPE_ERROR, AROUND = 0.5, 2.0
-# Least radius in cells: below, a bump falls between the centres of cells.
+# Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
 FEWEST_CELLS = 1.5
 
 
@@ -76,9 +76,9 @@ def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellR
     return CellResponses(model.site.grid, found)
 
 
-def bumps(grid: Grid, length: float, width: float) -> Bumps:
-    """Bumps of half length l and half width w [m], as far apart; on a coarse grid they are larger."""
-    length, width = max(length, FEWEST_CELLS * grid.dx), max(width, FEWEST_CELLS * grid.dy)
+def bumps(grid: Grid, length: float, width: float, cells: float = FEWEST_CELLS) -> Bumps:
+    """Bumps of half length l and half width w [m], as far apart, and of at least so many cells."""
+    length, width = max(length, cells * grid.dx), max(width, cells * grid.dy)
     x, y = _raster(grid.x, length), _raster(grid.y, width)
     along = np.exp(-(((grid.x[None] - x[:, None]) / length) ** 2))
     across = np.exp(-(((grid.y[None] - y[:, None]) / width) ** 2))

@@ -15,10 +15,10 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_offset
-from vegglue.diagnosis.competition import Contender, chances_of, contenders_of
+from vegglue.diagnosis.competition import Contender, chances_of, contenders_of, tempering
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
+from vegglue.diagnosis.refits import Refit, calibrated_with, log_evidence, pruned
 from vegglue.diagnosis.rivals import instrument_found, location_found, step_found
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -38,8 +38,10 @@ FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2
 MISPLACED_SHARE = 0.1
 # Effects and places that are accepted at most, and instruments.
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
-# Odds by which a place must beat every listed effect: 10 to 1, where strong evidence begins (Jeffreys 1961, by Kass and
-# Raftery 1995, doi:10.2307/2291091); it is the vaguer answer.
+# Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
+MOST_FOLLOWED = 3
+# Odds by which the best must lead, or others are followed too, and by which a place must then beat every other: 10 to 1,
+# where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091); it is the vaguer answer.
 LEAST_ODDS = 10.0
 
 
@@ -69,7 +71,7 @@ def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None)
         found, base = following
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
-        say(f"looking for what is missing after {contenders[0].name}")
+        say("looking for what is missing with it")
         screening = screen(base, found.flagged)
     return concluded(first, screening, found, suspects, unseen)
 
@@ -83,12 +85,41 @@ def _with_alarm(screening: Screening, found: Findings) -> Findings:
 def _following(
     screening: Screening, contenders: Sequence[Contender], found: Findings, say: Say
 ) -> tuple[Findings, Baseline] | None:
-    """What is found with the best contender, and the model that follows; None when it leads to nothing."""
-    best = contenders[0]
-    if isinstance(best.what, Instrument):
+    """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
+
+    Contenders of other kinds within LEAST_ODDS are followed one step further, with the best that could come next.
+    """
+    chance = chances_of(contenders)
+    near = [j for j, p in enumerate(chance) if p * LEAST_ODDS >= chance[0]]
+    rivals = [0, *(j for j in near if contenders[j].kind != contenders[0].kind)][:MOST_FOLLOWED]
+    branches = [_branch(screening, contenders, j, found, say) for j in rivals]
+    possible = [one for one in branches if one is not None]
+    if len(rivals) == 1 or len(possible) < 2:
+        return possible[0] if possible else None
+    score = np.array([_prospect(*one, found) for one in possible])
+    best = int(np.argmax(score))
+    vague = len(possible[best][0].places) > len(found.places)
+    clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
+    return None if vague and not clear else possible[best]
+
+
+def _prospect(following: Findings, base: Baseline, found: Findings) -> float:
+    """ln evidence of a model and of the best that could come next, to first order, less that of the prior so far."""
+    screening = screen(base, following.flagged)
+    p = _with_alarm(screening, following)
+    further = max(kind.total for kind in screening.kinds) if p.alarmed else 0.0
+    return log_evidence(base) + following.log_prior - found.log_prior + max(further, 0.0)
+
+
+def _branch(
+    screening: Screening, contenders: Sequence[Contender], j: int, found: Findings, say: Say
+) -> tuple[Findings, Baseline] | None:
+    """What is found with one contender, and the model that follows; None when there are enough, or no flow with it."""
+    one = contenders[j]
+    if isinstance(one.what, Instrument):
         enough = len(found.instruments) == MOST_INSTRUMENTS
-        return None if enough else _without_instrument(screening, best, best.what, found, say)
-    return None if found.accepted == MOST_ACCEPTED else _with_accepted(screening, contenders, best.what, found, say)
+        return None if enough else _without_instrument(screening, one, one.what, found, say)
+    return None if found.accepted == MOST_ACCEPTED else _with_accepted(screening, contenders, j, one.what, found, say)
 
 
 def _without_instrument(
@@ -101,20 +132,21 @@ def _without_instrument(
     flagged = (*found.flagged, *(row for row in readings if row not in found.flagged))
     faulty = (*found.instruments, instrument_found(screening, best, instrument))
     following = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
-    return replace(found, instruments=faulty, flagged=flagged), following
+    # An offset is all but free in the covariance: its prior is charged here, as it was in the competition.
+    charge = best.log_evidence - (log_evidence(following) - log_evidence(base))
+    return replace(found, instruments=faulty, flagged=flagged, log_prior=found.log_prior + charge), following
 
 
 def _with_accepted(
-    screening: Screening, contenders: Sequence[Contender], refit: Refit, found: Findings, say: Say
+    screening: Screening, contenders: Sequence[Contender], j: int, refit: Refit, found: Findings, say: Say
 ) -> tuple[Findings, Baseline] | None:
-    """The best effect or place accepted, and the model with it; None when it does not stand out among the others, or no
-    flow is found with it.
+    """An effect or place accepted, and the model with it; None when it explains less than nothing does, has so many
+    rivals that they say nothing, or no flow is found with it.
     """
-    best, chance = contenders[0], chances_of(contenders)
-    listed = max((p for one, p in zip(contenders, chance, strict=True) if one.kind == "effect"), default=0.0)
-    if best.log_evidence < 0.0 or (best.kind != "effect" and chance[0] < LEAST_ODDS * listed):
+    one = contenders[j]
+    if one.log_evidence < 0.0:
         return None
-    say(f"calibrating with {best.name}")
+    say(f"calibrating with {one.name}")
     further = calibrated_with(screening.base, refit)
     if further is None:
         return None
@@ -122,11 +154,11 @@ def _with_accepted(
     found = replace(
         found,
         explained=found.explained + before - further.fitted.chi2,
-        log_prior=found.log_prior + best.log_evidence - refit.log_factor,
+        log_prior=found.log_prior + one.log_evidence - refit.log_factor,
     )
-    if best.kind != "effect":
-        return replace(found, places=(*found.places, location_found(screening, contenders, refit))), further
-    step = step_found(screening, contenders, chance, further, found.p)
+    if one.kind != "effect":
+        return replace(found, places=(*found.places, location_found(screening, contenders, j, refit))), further
+    step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None
     further, unneeded = pruned(further, [one.accepted for one in found.steps], say)

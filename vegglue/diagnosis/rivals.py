@@ -7,7 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2
-from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.refits import Refit
 from vegglue.measurements.kinds import kind_of
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
@@ -27,9 +27,10 @@ NORMAL95 = 1.96
 
 
 def step_found(
-    screening: Screening, contenders: Sequence[Contender], chance: Array, further: Baseline, p: float
+    screening: Screening, contenders: Sequence[Contender], accepted: int, further: Baseline, p: float
 ) -> Step:
-    """The best contender, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    """One contender, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    chance = chances_of(contenders)
     listed = [j for j, one in enumerate(contenders) if one.kind == "effect"]
     names = [contenders[j].name for j in listed]
     columns = [contenders[j].column for j in listed]
@@ -37,7 +38,7 @@ def step_found(
     found, groups = rivals_among(names, chance[listed], cosine)
     base = screening.base
     return Step(
-        accepted=contenders[0].name,
+        accepted=contenders[accepted].name,
         rivals=tuple(found),
         chances=tuple(found.values()),
         groups=groups,
@@ -48,9 +49,9 @@ def step_found(
     )
 
 
-def location_found(screening: Screening, contenders: Sequence[Contender], refit: Refit) -> Location:
-    """The best contender, something at a place, as a location."""
-    best = contenders[0]
+def location_found(screening: Screening, contenders: Sequence[Contender], accepted: int, refit: Refit) -> Location:
+    """One contender, something at a place, as a location."""
+    best = contenders[accepted]
     places = next(one for one in screening.fingerprints.places if one.term == best.kind)
     kind = next(one for one in screening.kinds if one.name == best.kind)
     noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]

@@ -29,6 +29,8 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
     "inflow": (1.0, 4.0, 12.0),
     "viscosity": (4.0, 12.0),
 }
+# Least half length and half width of a spot in cells: below, it falls between their centres.
+SPOT_CELLS = 1.0
 # Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
 # discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
 SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
@@ -85,7 +87,7 @@ def _places_of_term(model: Model, responses: CellResponses, term: Term, half_wid
     width = SPOT_WIDTH * half_width
     parts = []
     for length in SPOT_LENGTHS[term]:
-        over = bumps(responses.grid, length * width, width)
+        over = bumps(responses.grid, length * width, width, SPOT_CELLS)
         answers = responses_to_bumps(responses, term, over)
         if term == "inflow":
             answers = answers / _area_under_water(model, over)
