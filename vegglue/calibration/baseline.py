@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
@@ -22,6 +23,9 @@ from vegglue.site.channel_geometry import cells_across
 # Points of the prior that are computed on the coarse grid, and how many of them the fit starts from. Chosen, not
 # measured: more cost runs of the coarse model and guard against a local minimum.
 PRIOR_POINTS, FITTED_POINTS = 8, 2
+# Standard errors by which the model's own error has to move the best place to be computed again there. Chosen, not
+# measured: each time costs the adjoints of all stations and a fit.
+FAR_MOVED = 1.0
 # Cells across the floor of the channel below which fingerprints are not computed on a grid. Chosen, not measured: a
 # lower bound makes more searches cheap, and their fingerprints less exact.
 FEWEST_CELLS_ACROSS = 7.0
@@ -85,8 +89,10 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     on_coarse = linearise(coarse, fitted.point.z, near) or linearise(coarse, fitted.point.z)
     noise = with_grid_error(noise, grid_difference(fitted.point, on_coarse))
     fitted = fit(model, noise, fitted.point)
+    first = with_own_error(Baseline(model, noise, fitted, coarse, on_coarse))
+    moved = np.abs(first.fitted.point.z - fitted.point.z) / np.sqrt(np.diag(fitted.covariance))
     # The model's own error moves the best place, and is another there.
-    return with_own_error(with_own_error(Baseline(model, noise, fitted, coarse, on_coarse)))
+    return with_own_error(first) if moved.max(initial=0.0) > FAR_MOVED else first
 
 
 def with_own_error(base: Baseline) -> Baseline:
