@@ -95,7 +95,7 @@ def calibrated_anew(case: Case, known: Array | None, aside: pd.DataFrame) -> Bas
     From the prior it takes a quarter longer than from a known place, since its search is on coarse grids.
     """
     model = excluding(model_in(case), aside)
-    base = for_prediction(baseline(model))
+    base = for_prediction(baseline(model, None))
     if known is None or not _leads_lower(base, known):
         return base
     return for_prediction(baseline(model, known))
