@@ -26,7 +26,7 @@ from vegglue.storage.result_files import read_posterior, stored_hash
 
 # Standard errors within which a known place is the one found from the prior; and by how much the objective must be
 # lower to be that of another one [-]: ten times what a fit leaves. Chosen, not measured.
-SAME_PLACE, LOWER = 1.0, 10.0 * NEGLIGIBLE_DECREASE
+SAME_PLACE, LEADS_LOWER = 1.0, 10.0 * NEGLIGIBLE_DECREASE
 MAKE_ROOM = "make room and run it again"
 
 
@@ -113,4 +113,4 @@ def _leads_lower(base: Baseline, known: Array) -> bool:
     if away @ np.linalg.solve(fitted.covariance, away) < SAME_PLACE**2:
         return False
     start = linearise(base.model, known, fitted.point) or linearise(base.model, known)
-    return start is not None and fit(base.model, base.noise, start).objective < fitted.objective - LOWER
+    return start is not None and fit(base.model, base.noise, start).objective < fitted.objective - LEADS_LOWER
