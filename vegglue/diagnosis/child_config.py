@@ -25,7 +25,7 @@ from vegglue.screening.candidates import (
     where_it_may_act,
     with_effect,
 )
-from vegglue.screening.places import plausible_size
+from vegglue.screening.places import EFFECT_AT_PLACE, plausible_size
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -77,7 +77,8 @@ def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
 def candidate_at(case: Case, location: Location) -> Candidate:
     """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
     effect = library(case.effect_file)[location.effect]
-    return place_candidate(effect, location.shapes, plausible_size(case, location.term))
+    term = next(term for term, name in EFFECT_AT_PLACE.items() if name == effect.name)
+    return place_candidate(effect, location.shapes, plausible_size(case, term))
 
 
 def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:
