@@ -11,6 +11,7 @@ import yaml
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
+from vegglue.diagnosis.comparison import held_out_rmse
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.diagnose import diagnose
@@ -73,3 +74,13 @@ def test_something_unlisted_is_none_of_these_and_has_a_place(tmp_path: Path) -> 
     assert found.verdict.kind == "none-of-these", found.verdict.sentence
     assert location is not None
     assert ((location.x - 33.0) ** 2 + (location.y + 0.6) ** 2) ** 0.5 < 1.5
+
+
+@pytest.mark.parametrize(("name", "added"), [("open-l", 2), ("open-i", 1)])
+def test_two_effects_and_a_place_are_added(name: str, added: int, tmp_path: Path) -> None:
+    grown = extended(imported(name, tmp_path), tmp_path)
+    before, after = grown.comparison.rungs[0], grown.comparison.rungs[-1]
+    assert len(after.effects) == added, grown.reason
+    assert held_out_rmse(after) < held_out_rmse(before)
+    assert held_out_rmse(after, "experiments") < held_out_rmse(before, "experiments")
+    assert after.validation < min(before.validation, WANTED)

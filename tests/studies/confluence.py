@@ -12,17 +12,13 @@ import numpy as np
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.comparison import held_out_rmse, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
-from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.spatial_scan import SPOT_RADIUS
-from vegglue.site.channel_geometry import half_width
-from vegglue.site.gridded_site import build_site
+from vegglue.screening.candidates import candidates_in_case
 from vegglue.workflow.diagnose import diagnose
-from vegglue.workflow.extend import child_path, extend_stepwise, write_child
+from vegglue.workflow.extend import extend_stepwise
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 
 ROOT = Path(__file__).parents[2]
@@ -83,37 +79,25 @@ def row_of(title: str, case: Case, runs: Path) -> Row:
     )
 
 
-def with_object(case: Case, found: Diagnosis) -> Case:
-    """The case with something of unknown kind at the place the diagnosis points at."""
-    location = found.verdict.location
-    assert location is not None
-    site = build_site(case)
-    radius = max(SPOT_RADIUS * half_width(site), 1.5 * max(site.grid.dx, site.grid.dy))
-    candidate = candidate_named(case, found.predictions.station, "unlisted_object")
-    shapes = {"x": round(location.x, 3), "y": round(location.y, 3), "radius": round(radius, 3)}
-    return write_child(case, child_path(case.source, [candidate]), [(candidate, shapes)])
-
-
-def climb(path: Path, title: str, runs: Path, jobs: int, objects: int = 1) -> tuple[list[Row], list[str]]:
-    """Rows of a case, of all that its diagnosis adds, and of an object where it points at a place, which is diagnosed
-    in its turn; and what each diagnosis said.
+def climb(path: Path, title: str, runs: Path, jobs: int, again: int = 1) -> tuple[list[Row], list[str]]:
+    """Rows of a case and of all that its diagnosis adds, and what the diagnosis said; where it found a place, the last
+    model is diagnosed in its turn.
     """
     case = load_case(path)
     found = diagnose(case, runs=runs, jobs=jobs, say=print)
     grown = extend_stepwise(case, runs=runs, jobs=jobs, say=print)
-    cases, titles = list(grown.cases), [title]
-    for step in found.steps[: len(cases) - 1]:
-        titles.append(f"{titles[-1]}, {step.accepted}")
-    rows = [row_of(name, one, runs) for name, one in zip(titles, cases, strict=True)]
-    verdict = found.verdict
-    said = [f"**{title}** ({verdict.kind}): {verdict.sentence}"]
-    if grown.reason != verdict.sentence:
-        said.append(f"Of this, {grown.reason}".replace(verdict.sentence, "").strip())
-    if verdict.location is None or objects == 0:
+    titles = [", ".join([title, *_added(case, one)]) for one in grown.cases]
+    rows = [row_of(name, one, runs) for name, one in zip(titles, grown.cases, strict=True)]
+    said = [f"**{title}** ({found.verdict.kind}): {grown.sentence}", grown.reason]
+    if not found.places or len(grown.cases) == 1 or again == 0:
         return rows, said
-    name = f"{titles[-1]}, object at x = {verdict.location.x:.2f}, y = {verdict.location.y:.2f} m"
-    more, words = climb(with_object(cases[-1], found).source, name, runs, jobs, objects - 1)
-    return rows + more, said + words
+    more, words = climb(grown.cases[-1].source, titles[-1], runs, jobs, again - 1)
+    return rows + more[1:], said + words
+
+
+def _added(parent: Case, child: Case) -> list[str]:
+    """Names of the effects that a child has and its parent has not."""
+    return [one.name for key, one in candidates_in_case(child).items() if key not in parent.effects]
 
 
 def table(rows: list[Row]) -> list[str]:

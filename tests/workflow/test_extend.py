@@ -1,15 +1,23 @@
-"""Child configs: what they add, what is read back, what cannot be added."""
+"""Child configs: what they add, what is read back, what cannot be added; what a diagnosis asks to be added."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from diagnoses import a_diagnosis, a_suspect
 from reach import said_to
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.child_config import candidate_named
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
+from vegglue.diagnosis.stepwise_choice import Choice
+from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
+from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
-from vegglue.workflow.extend import write_child
+from vegglue.screening.places import EFFECT_AT_PLACE, plausible_size
+from vegglue.workflow.extend import Addition, found_additions, in_doubt, in_words, write_child
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,6 +41,97 @@ def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:
     for one in every:
         assert candidates_in_case(with_effect(case, one, {})) == {one.key: one}
         assert candidate_named(case, station, one.name) == one
+
+
+def a_place(term: Term, x: float = 47.29, y: float = -0.29) -> Location:
+    return Location(x, y, 1.8, 0.45, term, EFFECT_AT_PLACE[term], 0.19, (0.14, 0.24), "m", 5.0, ("low",), {})
+
+
+def at_places(case: Case, *places: Location) -> list[Addition]:
+    return [(candidate_at(case, place), place.shapes) for place in places]
+
+
+@pytest.mark.parametrize("term", EFFECT_AT_PLACE)
+def test_a_child_holds_a_place_with_numbers_and_a_plausible_prior(term: Term, tmp_path: Path) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    place = a_place(term)
+    child = write_child(case, tmp_path / "child.yaml", at_places(case, place))
+    key = f"{place.effect}_x47_29_y_0_29"
+    parameter = next(iter(set(child.parameters) - set(case.parameters)))
+    entry = child.effects[key]
+    assert entry.effect == place.effect
+    assert {name: entry.values[name] for name in place.shapes} == place.shapes
+    assert parameter in entry.values.values()
+    assert child.parameters[parameter].sd == plausible_size(case, term)
+    assert child.parameters[parameter].mean == 0.0
+
+
+def test_two_spots_of_one_kind_are_two_effects(tmp_path: Path) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    added = at_places(case, a_place("bed"), a_place("bed", x=60.0, y=0.5))
+    child = write_child(case, tmp_path / "child.yaml", added)
+    assert list(child.effects) == ["unlisted_bed_x47_29_y_0_29", "unlisted_bed_x60_y0_5"]
+    assert len(set(child.parameters) - set(case.parameters)) == 2
+
+
+def test_what_is_tried_is_the_child_that_is_written(tmp_path: Path) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    added = at_places(case, a_place("inflow"))
+    child, tried = write_child(case, tmp_path / "child.yaml", added), with_additions(case, added)
+    assert (tried.name, tried.effects, tried.parameters) == (child.name, child.effects, child.parameters)
+    assert case_hash(tried.model_copy(update={"title": child.title})) == case_hash(child)
+
+
+def found_in(case: Case, kind: str, *, order: tuple[str, ...] = (), place: bool = False) -> Diagnosis:
+    """A diagnosis of that verdict; order: parameters of its last model."""
+    step = Step("streamlining", ("streamlining",), (1.0,), (("streamlining",),), 900.0, 250.0, 0.0)
+    found = a_diagnosis(
+        suspects=(a_suspect("streamlining"),), steps=(step,) if order else (), verdict={"kind": kind},
+        parameters={"last": dict.fromkeys((*case.parameters, *order), (1.0, 0.9, 1.1))},
+        predictions={"station": read_observations(case).table},
+    )  # fmt: skip
+    return replace(found, places=(a_place("bed"),) if place else ())
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_effects_and_places_are_tried_in_the_order_found(turn: int) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    names = ["streamlining", "unlisted_bed[x47.29,y-0.29]"][::turn]
+    order = ("streamlining_vogel_exponent", "unlisted_bed_x47_29_y_0_29_rise")[::turn]
+    found = found_in(case, "none-of-these", order=order, place=True)
+    assert [candidate.parameter for candidate, _ in found_additions(case, found)] == list(order)
+    assert [candidate.name for candidate, _ in found_additions(case, found)] == names
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("nothing-missing", "the diagnosis finds nothing missing"),
+        ("instrument", "only readings are off"),
+        ("none-of-these", "no effect of the library"),
+        ("cannot-tell", "cannot tell what is missing"),
+    ],
+)
+def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    found = found_in(case, kind)
+    assert found_additions(case, found) == []
+    words = in_words(found, Choice(((),), {}))
+    assert said in words
+    assert words.startswith("Nothing is added: ")
+    assert words.count(".") == 1
+
+
+def test_doubt_is_a_verdict_that_cannot_tell() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    assert in_doubt(found_in(case, "cannot-tell"))
+    assert not in_doubt(found_in(case, "identified"))
+
+
+def test_what_is_not_kept_is_told() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    words = in_words(found_in(case, "identified"), Choice(((), ("a",)), {"b": "held-out errors did not fall"}))
+    assert words == "Added: a. b was not kept: held-out errors did not fall."
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,7 @@ def show(case: Case, runs: Path, result: Any) -> None:
             show_diagnosis(result)
         case StepwiseExtension():
             show_ladder(result.comparison)
+            console.print(result.reason)
         case list():
             show_questions(result)
         case Ensemble():

@@ -57,7 +57,9 @@ def extend_command(
         list[str] | None, typer.Option(help="Effect to add, e.g. streamlining or discharge_error[high].")
     ] = None,
     shape: Annotated[list[str] | None, typer.Option(help="Value of a shape of it, NAME=NUMBER.")] = None,
-    auto: Annotated[bool, typer.Option("--auto", help="Add what the diagnosis accepts, step by step.")] = False,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="Add what the diagnosis finds, while held-out errors fall.")
+    ] = False,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
     runs: Runs = Path("runs"),
@@ -70,6 +72,7 @@ def extend_command(
     if auto:
         extension = extend_stepwise(case, runs=runs, jobs=jobs, say=say_on())
         show_ladder(extension.comparison)
+        console.print(extension.sentence)
         console.print(extension.reason)
         console.print(f"Last config: {extension.cases[-1].source}")
         return

@@ -14,6 +14,7 @@ from vegglue.case.text_files import case_name
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
+from vegglue.results.diagnosis import Location
 from vegglue.screening.candidates import (
     Candidate,
     acting_in,
@@ -22,7 +23,9 @@ from vegglue.screening.candidates import (
     place_candidate,
     prior_of,
     where_it_may_act,
+    with_effect,
 )
+from vegglue.screening.places import EFFECT_AT_PLACE, plausible_size
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -69,6 +72,21 @@ def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
     x, y = (float(one[1]) for one in found if one is not None)
     shapes = {shape.name: shape.default for shape in effect.shapes} | {"x": x, "y": y}
     return place_candidate(effect, shapes)
+
+
+def candidate_at(case: Case, location: Location) -> Candidate:
+    """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
+    effect = library(case.effect_file)[location.effect]
+    term = next(term for term, name in EFFECT_AT_PLACE.items() if name == effect.name)
+    return place_candidate(effect, location.shapes, plausible_size(case, term))
+
+
+def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:
+    """The case that the child config would be read as, but for its title; no file is written."""
+    child = parent
+    for candidate, shapes in added:
+        child = with_effect(child, candidate, shapes)
+    return child.model_copy(update={"name": child_name(parent.name, [candidate for candidate, _ in added])})
 
 
 def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Tree:

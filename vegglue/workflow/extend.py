@@ -1,37 +1,59 @@
-"""case -> child case: a config that extends its parent by effects, named or accepted by the diagnosis one by one."""
+"""case -> child case: a config that extends its parent by effects, named, or found by the diagnosis."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vegglue.case.case_effects import amplitude_of, effect_of
+import numpy as np
+import pandas as pd
+
+from vegglue.calibration.baseline import Baseline
 from vegglue.case.config import load_case
+from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.diagnosis.child_config import candidate_named, child_tree
-from vegglue.diagnosis.comparison import Rung, improvement
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
+from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.refits import NEEDED
+from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
-from vegglue.workflow.compare import Comparison, rung_of
+from vegglue.workflow.compare import Comparison
 from vegglue.workflow.diagnose import diagnose
-from vegglue.workflow.run_folder import MAKE_ROOM, folder_of, remember_place
+from vegglue.workflow.run_folder import (
+    MAKE_ROOM,
+    best_place,
+    calibrated,
+    calibrated_anew,
+    folder_of,
+    remember_place,
+    validation_of,
+)
 
+# Why nothing is added where the diagnosis names neither an effect nor a place, by its verdict.
+NOTHING_TO_ADD = {
+    "nothing-missing": "the diagnosis finds nothing missing",
+    "instrument": "only readings are off, which every model leaves out",
+    "none-of-these": "what is missing differs from place to place, and is no effect of the library",
+    "cannot-tell": "the diagnosis cannot tell what is missing",
+}
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 
 
 @dataclass(frozen=True)
 class StepwiseExtension:
-    """How a case was extended: the cases from the first to the last, their errors, and why it ended."""
+    """How a case was extended: the cases from the first to the last, their errors, the sentence of the verdict, and
+    what was added or not, and why.
+    """
 
     cases: tuple[Case, ...]
     comparison: Comparison
+    sentence: str
     reason: str
 
 
@@ -50,8 +72,8 @@ def extend(
 
 @one_thread()
 def extend_stepwise(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> StepwiseExtension:
-    """Add what the diagnosis accepts, one effect after the other, while errors of held-out measurements fall and the
-    misfit with all others.
+    """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
+    and the misfit with all others fall; see `stepwise_choice`.
     """
     found = diagnose(case, runs=runs, jobs=jobs, say=say)
     with at_most(jobs):
@@ -59,29 +81,67 @@ def extend_stepwise(case: Case, *, runs: Path | str = "runs", jobs: int = -1, sa
 
 
 def _extended(case: Case, found: Diagnosis, runs: Path | str, say: Say) -> StepwiseExtension:
-    """Child after child, each compared with the one before."""
+    """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
-    cases, rungs = [case], [rung_of(case, runs, aside)]
-    added: list[Addition] = []
+    say(f"calibrating {case.name}")
+    parent = calibrated(case, folder_of(runs, case), aside)
+    named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
+    tried: dict[Names, Baseline | None] = {(): parent}
+    rungs: dict[Names, Rung] = {(): rung(parent)}
 
-    def ended(reason: str) -> StepwiseExtension:
-        return StepwiseExtension(tuple(cases), Comparison(tuple(rungs), aside), reason)
+    def rung_with(names: Names) -> Rung | None:
+        if names not in tried:
+            say(f"trying {' and '.join(names)}")
+            base = tried[names] = _calibrated_with(case, [named[name] for name in names], found, aside)
+            if base is not None:
+                rungs[names] = rung(base)
+        return rungs.get(names)
 
-    for step in found.steps:
-        candidate = candidate_named(case, found.predictions.station, step.accepted)
-        added.append((candidate, found.suspect(step.accepted).shapes))
-        say(f"adding {step.accepted}")
-        child = write_child(case, child_path(case.source, [one for one, _ in added]), added)
-        _start_child(child, folder_of(runs, child), found, added)
-        after = rung_of(child, runs, aside)
-        if worse := _worse(rungs[-1], after):
-            child.source.unlink()
-            return ended(f"{step.accepted} was not kept: {worse}")
-        cases.append(child)
-        rungs.append(after)
-    unneeded = [name for name in cases[-1].effects if not _needed(cases[-1], rungs[-1], name)]
-    sentence = found.verdict.sentence
-    return ended(f"{sentence} No longer needed: {', '.join(unneeded)}." if unneeded else sentence)
+    nominees = [Nominee(one.name, one.parameter, one.amplitude.off) for one, _ in named.values()]
+    choice = chosen(nominees, rung_with, in_doubt(found))
+    cases, bases = [case], [parent]
+    for names in choice.stages[1:]:
+        base = tried[names]
+        assert base is not None
+        added = [named[name] for name in names]
+        cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added))
+        remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base))
+        bases.append(base)
+    # Only now are the measurements for validation looked at.
+    ladder = [
+        rung(replace(base, model=replace(base.model, case=one)), validation_of(one))
+        for one, base in zip(cases, bases, strict=True)
+    ]
+    return StepwiseExtension(
+        tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, in_words(found, choice)
+    )
+
+
+def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
+    """Effects and places of a diagnosis in the order they were found; none that is at work in the case already."""
+    station = found.predictions.station
+    added: list[Addition] = [
+        (candidate_named(case, station, step.accepted), found.suspect(step.accepted).shapes) for step in found.steps
+    ]
+    added += [(candidate_at(case, place), place.shapes) for place in found.places]
+    # The last model of the diagnosis holds the parameters of what was found in that order.
+    order = {name: position for position, name in enumerate(found.parameters.last)}
+    added = [one for one in added if one[0].key not in case.effects]
+    return sorted(added, key=lambda one: order.get(one[0].parameter, len(order)))
+
+
+def in_doubt(found: Diagnosis) -> bool:
+    """Whether what was found may stand in for something else: then held-out errors must fall clearly."""
+    return found.verdict.kind == "cannot-tell" or found.field is not None
+
+
+def in_words(found: Diagnosis, choice: Choice) -> str:
+    """What was added, or why nothing is, and why each of the others is not."""
+    kept = choice.stages[-1]
+    if not kept and not choice.refused:
+        return f"Nothing is added: {NOTHING_TO_ADD.get(found.verdict.kind, 'all that was found is at work already')}."
+    first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
+    return " ".join([first, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
 
 
 def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, float]) -> list[Addition]:
@@ -111,27 +171,14 @@ def write_child(parent: Case, target: Path, added: Sequence[Addition]) -> Case:
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 
-def _worse(before: Rung, after: Rung) -> str:
-    """Why an effect is not kept, '' if it is."""
-    gain, _ = improvement(before, after)
-    if not gain > 0:
-        return "held-out errors did not fall"
-    # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
-    return "" if after.in_sample.chi2 < before.in_sample.chi2 else "the misfit with what was seen rose"
-
-
-def _start_child(child: Case, folder: Path, found: Diagnosis, added: Sequence[Addition]) -> None:
-    """Let the child begin where the diagnosis ended; effects still to come stay out of it."""
+def _calibrated_with(parent: Case, added: Sequence[Addition], found: Diagnosis, aside: pd.DataFrame) -> Baseline | None:
+    """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""
+    child = with_additions(parent, added)
     theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
-    remember_place(child, folder, theta)
-
-
-def _needed(case: Case, rung: Rung, name: str) -> bool:
-    parameter = amplitude_of(case, name)
-    if parameter is None:
-        return True
-    middle, low, high = rung.values[parameter]
-    off = effect_of(case, name).amplitude.off
-    return abs(middle - off) > NEEDED * (high - low) / 3.92
+    known = z_at(child, {name: np.array([theta[name]]) for name in child.parameters})[0]
+    try:
+        return calibrated_anew(child, known, aside)
+    except InputError:  # it has run without the additions: they leave it no steady flow
+        return None

@@ -1,0 +1,106 @@
+"""Which effects a model keeps, told by made-up errors at what was held out."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
+
+STATIONS = 12
+PARENT: Names = ()
+A, B, C = ("a",), ("b",), ("c",)
+# Held-out errors by sections and by experiments [m/s], each the same at all stations.
+Errors = tuple[float, float]
+
+
+def a_rung(errors: Errors, amplitudes: Mapping[str, float], seen: float, spread: float = 0.0) -> Rung:
+    """Amplitudes have a standard error of 1; spread: from station to station, of the errors."""
+    uneven = spread * np.resize([1.0, -1.0], STATIONS)
+    return Rung(
+        name="+".join(amplitudes), title="", effects=tuple(amplitudes),
+        values={name: (value, value - 1.96, value + 1.96) for name, value in amplitudes.items()},
+        in_sample=InSample({}, seen, STATIONS, 0.01),
+        held_out=HeldOut(
+            errors[0] + uneven, errors[1] + uneven, np.ones(STATIONS, bool), tuple(f"low {i}" for i in range(STATIONS))
+        ),
+        predictive=PredictiveScores(np.nan, np.nan, np.nan), homogeneity={}, validation=np.nan,
+    )  # fmt: skip
+
+
+def choice(
+    models: Mapping[Names, Errors | None],
+    named: Names = ("a", "b"),
+    small: Mapping[Names, str] | None = None,
+    clearly: bool = False,
+    spread: float = 0.0,
+) -> Choice:
+    """Of models by the names in them, None where there is no flow; small: which amplitude is none in which model."""
+
+    def rung_with(names: Names) -> Rung | None:
+        errors = models[names]
+        if errors is None:
+            return None
+        amplitudes = {name: 0.5 if (small or {}).get(names) == name else 9.0 for name in names}
+        return a_rung(errors, amplitudes, seen=sum(errors), spread=spread if names else 0.0)
+
+    return chosen([Nominee(name, name, 0.0) for name in named], rung_with, clearly)
+
+
+def test_what_helps_by_itself_is_added_one_after_the_other() -> None:
+    made = choice({PARENT: (4, 4), A: (3, 3), B: (3, 3), A + B: (1, 2)})
+    assert made == Choice((PARENT, A, A + B), {})
+
+
+def test_what_helps_only_together_is_added_together() -> None:
+    made = choice({PARENT: (4, 4), A: (5, 3), B: (4, 5), A + B: (1, 1)})
+    assert made == Choice((PARENT, A + B), {})
+
+
+def test_two_of_three_are_enough_and_the_third_is_told() -> None:
+    models: dict[Names, Errors | None] = {PARENT: (4, 4), A: (5, 5), B: (5, 5), C: (5, 5), A + B: (2, 2)}
+    made = choice(models | {A + B + C: (3, 2)}, ("a", "b", "c"))
+    assert made.stages == (PARENT, A + B)
+    assert made.refused == {"c": "errors of held-out sections rose from 2.0000 to 3.0000 m/s"}
+
+
+@pytest.mark.parametrize("errors", [(5.0, 1.0), (1.0, 5.0), (4.0, 4.0), None])
+def test_no_model_is_left_worse_than_its_parent(errors: Errors | None) -> None:
+    made = choice({PARENT: (4, 4), A: errors}, A)
+    assert made.stages == (PARENT,)
+    assert list(made.refused) == ["a"]
+
+
+def test_what_the_next_one_makes_needless_is_dropped() -> None:
+    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2, 2)})
+    assert made == Choice((PARENT, B), {"a": "held-out errors are no higher without it"})
+
+
+def test_an_amplitude_compatible_with_none_is_dropped() -> None:
+    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2.5, 2.5)}, small={A + B: "a"})
+    assert made == Choice((PARENT, B), {"a": "its amplitude is compatible with none"})
+    made = choice({PARENT: (4, 4), A: (3, 3)}, A, small={A: "a"})
+    assert made == Choice((PARENT,), {"a": "its amplitude is compatible with none"})
+
+
+def test_nothing_is_dropped_where_the_rest_is_worse_than_the_parent() -> None:
+    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2, 5)}, small={A + B: "a"})
+    assert made == Choice((PARENT, A, A + B), {})
+
+
+def test_in_doubt_errors_must_fall_clearly() -> None:
+    models: dict[Names, Errors | None] = {PARENT: (4, 4), A: (3.9, 3.9)}
+    assert choice(models, A, spread=1.0).stages == (PARENT,)  # the mean square has risen
+    models[A] = (3.6, 3.6)
+    assert choice(models, A, spread=1.3).stages == (PARENT, A)
+    unclear = choice(models, A, clearly=True, spread=1.3)
+    assert unclear.stages == (PARENT,)
+    assert "fell by less than 2 standard errors" in unclear.refused["a"]
+    assert choice(models, A, clearly=True).stages == (PARENT, A)
+
+
+def test_what_cannot_be_judged_is_not_added() -> None:
+    made = choice({PARENT: (np.nan, np.nan), A: (np.nan, np.nan)}, A)
+    assert made.stages == (PARENT,)
+    assert "nothing to hold out" in made.refused["a"]

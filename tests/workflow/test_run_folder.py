@@ -1,0 +1,90 @@
+"""A calibrated model is the same whatever command ran before it. Places are two wells; no flow is solved."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from linear_baseline import stations_of
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import fit
+from vegglue.calibration.noise import noise_of
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import theta_at
+from vegglue.case.schema import Case
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.engine.interface import Model, Point
+from vegglue.engine.newton import NEWTON
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow import run_folder
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+STARTS: list[Array | None] = []
+
+
+def two_wells(model: Model, z: Array, near: Point | None = None) -> Point:
+    """Misfits (z^2 - 1) / 5 and (z - 1) / 40 of the first z, in m/s: wells at -1 and, lower, at 1."""
+    first = z[0]
+    prediction, slope = np.zeros(len(model.station)), np.zeros((len(model.station), z.size))
+    prediction[:2] = (first**2 - 1.0) / 5.0, (first - 1.0) / 40.0
+    slope[:2, 0] = 2.0 * first / 5.0, 1.0 / 40.0
+    return Point(z, prediction, slope, {})
+
+
+@pytest.fixture
+def case(monkeypatch: pytest.MonkeyPatch) -> Case:
+    case = load_case(CONFIG)
+    station: pd.DataFrame = stations_of(case, ("D1",), 3).assign(value=0.0)
+    model = Model(case, build_site(case), station, NEWTON)
+    STARTS.clear()
+    monkeypatch.setattr("vegglue.workflow.run_folder.model_in", lambda case: model)
+    monkeypatch.setattr("vegglue.workflow.run_folder.linearise", two_wells)
+    monkeypatch.setattr("vegglue.calibration.fit.linearise", two_wells)
+    return case
+
+
+def from_prior_at(first: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search of the prior begins at that first z."""
+
+    def searched(model: Model, known: Array | None) -> Baseline:
+        STARTS.append(known)
+        z = np.zeros(len(model.names))
+        z[0] = first
+        noise = noise_of(model.station)
+        return Baseline(model, noise, fit(model, noise, two_wells(model, z if known is None else known)), None, None)
+
+    monkeypatch.setattr("vegglue.workflow.run_folder.baseline", searched)
+
+
+def place(case: Case, folder: Path, known: float | None) -> float:
+    """The first z of the calibrated case, when an earlier command left that place."""
+    folder.mkdir()
+    if known is not None:
+        z = np.zeros((1, len(case.parameters)))
+        z[0, 0] = known
+        run_folder.remember_place(case, folder, {name: value[0] for name, value in theta_at(case, z).items()})
+    return float(run_folder.calibrated(case, folder, excluded_by()).fitted.point.z[0])
+
+
+@pytest.mark.parametrize("known", [0.999, 1.3, 0.7, -0.9])
+def test_a_known_place_that_leads_no_lower_changes_nothing(
+    known: float, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from_prior_at(0.8, monkeypatch)
+    assert place(case, tmp_path / "with", known) == place(case, tmp_path / "without", None)
+    assert STARTS == [None, None], "one search each: a known place does not double the time"
+
+
+def test_a_known_place_that_leads_lower_is_taken(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from_prior_at(-0.8, monkeypatch)
+    assert place(case, tmp_path / "without", None) < -0.9
+    assert place(case, tmp_path / "with", 0.7) > 0.9
+
+
+def test_the_same_again_gives_the_same(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from_prior_at(0.8, monkeypatch)
+    first = place(case, tmp_path / "runs", None)
+    again = run_folder.calibrated(case, tmp_path / "runs", excluded_by())
+    assert float(again.fitted.point.z[0]) == first

@@ -1,0 +1,152 @@
+"""Which of the effects that a diagnosis names a model keeps, by errors at what was held out.
+
+Those are the only judges: measurements for validation are never asked.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.diagnosis.comparison import By, Rung, held_out_rmse, improvement
+from vegglue.diagnosis.refits import NEEDED
+
+# Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
+CLEAR = 2.0
+WAYS: tuple[By, ...] = ("sections", "experiments")
+
+
+@dataclass(frozen=True)
+class Nominee:
+    """An effect that was named: its parameter, and the value of it that does nothing."""
+
+    name: str
+    parameter: str
+    off: float
+
+
+Names = tuple[str, ...]
+# The model with some of the nominees, in the order they were named; None where it finds no flow.
+RungWith = Callable[[Names], Rung | None]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """stages: names in the model, from none to the last, each with all of those before; refused: why, by name."""
+
+    stages: tuple[Names, ...]
+    refused: dict[str, str]
+
+
+def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False) -> Choice:
+    """Each is tried in the order named, those that do not help by themselves then together; what the last model does
+    not need is dropped again. clearly: errors must fall by CLEAR standard errors.
+    """
+    order = [one.name for one in named]
+
+    def better(kept: Names, more: Names) -> tuple[Names, str]:
+        both = tuple(name for name in order if name in {*kept, *more})
+        before = rung_with(kept)
+        assert before is not None
+        return both, why_not_kept(before, rung_with(both), clearly)
+
+    stages: list[Names] = [()]
+    kept, refused = _one_by_one(order, better, stages)
+    kept = _together(kept, refused, better, stages)
+    kept = _needed_of({one.name: one for one in named}, kept, refused, rung_with)
+    earlier = [stage for stage in stages if set(stage) < set(kept)]
+    return Choice((*earlier, kept), refused)
+
+
+Better = Callable[[Names, Names], tuple[Names, str]]
+
+
+def _one_by_one(order: Sequence[str], better: Better, stages: list[Names]) -> tuple[Names, dict[str, str]]:
+    """What helps by itself, and why the others do not."""
+    kept: Names = ()
+    refused: dict[str, str] = {}
+    for name in order:
+        both, why = better(kept, (name,))
+        if why:
+            refused[name] = why
+        else:
+            kept = both
+            stages.append(kept)
+    return kept, refused
+
+
+def _together(kept: Names, refused: dict[str, str], better: Better, stages: list[Names]) -> Names:
+    """What helps with the next of those that do not by themselves; what is kept leaves `refused`."""
+    group: Names = ()
+    for name in tuple(refused):
+        group = (*group, name)
+        both, why = better(kept, group)
+        refused[name] = why or refused[name]
+        if not why:
+            kept, group = both, _left(refused, group)
+            stages.append(kept)
+    return kept
+
+
+def _left(refused: dict[str, str], group: Names) -> Names:
+    """No group, after those of it are no longer refused."""
+    for name in group:
+        del refused[name]
+    return ()
+
+
+def _needed_of(named: dict[str, Nominee], kept: Names, refused: dict[str, str], rung_with: RungWith) -> Names:
+    """What is left when all that the model does not need is dropped; the reasons go to `refused`."""
+    for name in kept:
+        fewer = tuple(one for one in kept if one != name)
+        if why := _why_dropped(named[name], rung_with(()), rung_with(fewer), rung_with(kept)):
+            refused[name] = why
+            return _needed_of(named, fewer, refused, rung_with)
+    return kept
+
+
+def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: Rung | None) -> str:
+    """Why a model does not need an effect, '' when it does, or when it would be worse than its parent without."""
+    if parent is None or without is None or last is None:
+        return ""
+    if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without).values()):
+        return ""
+    if is_off(one, last):
+        return "its amplitude is compatible with none"
+    gains = _gains(without, last)
+    return "" if any(gain > 0.0 for gain, _ in gains.values()) else "held-out errors are no higher without it"
+
+
+def is_off(one: Nominee, rung: Rung) -> bool:
+    """Whether the amplitude lies within NEEDED standard errors of the value that does nothing."""
+    middle, low, high = rung.values[one.parameter]
+    return abs(middle - one.off) <= NEEDED * (high - low) / 3.92
+
+
+def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False) -> str:
+    """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
+    and rise by neither, and the misfit with all that was seen falls.
+    """
+    if after is None:
+        return "the model finds no steady flow with it"
+    gains = _gains(before, after)
+    if not gains:
+        return "there is nothing to hold out: one section in one experiment"
+    for by, (gain, error) in gains.items():
+        if gain < 0.0:
+            was, now = held_out_rmse(before, by), held_out_rmse(after, by)
+            return f"errors of held-out {by} rose from {was:.4f} to {now:.4f} m/s"
+        if clearly and not gain > CLEAR * error:
+            return (
+                f"the diagnosis is in doubt, and errors of held-out {by} fell by less than {CLEAR:.0f} standard errors"
+            )
+    if not any(gain > 0.0 for gain, _ in gains.values()):
+        return "held-out errors did not fall"
+    # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
+    return "" if after.in_sample.chi2 < before.in_sample.chi2 else "the misfit with what was seen rose"
+
+
+def _gains(before: Rung, after: Rung) -> dict[By, tuple[float, float]]:
+    """Fall of the held-out squares and its standard error, where anything can be held out."""
+    gains = {by: improvement(before, after, by) for by in WAYS}
+    return {by: one for by, one in gains.items() if np.isfinite(one[0])}
