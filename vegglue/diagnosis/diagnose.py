@@ -41,7 +41,8 @@ MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 # Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
 MOST_FOLLOWED = 3
 # Odds by which the best must lead, or others are followed too, and by which a place must then beat every other: 10 to
-# 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091); it is the vaguer answer.
+# 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091); it is the vaguer
+# answer.
 LEAST_ODDS = 10.0
 
 
