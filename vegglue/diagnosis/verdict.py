@@ -46,6 +46,8 @@ NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 ABSURD, FAR_OFF = 4.0, 4.0
+# Standard error of a place [m] below which its digits say enough.
+TOLD_ERROR = 0.3
 # Share of the support of an amplitude within which it lies at a bound.
 AT_BOUND = 0.01
 
@@ -155,10 +157,14 @@ def _place_words(place: Location) -> str:
     ]
     low, high = place.interval95
     unit = f" {place.unit}"
-    return (
-        f"at x = {place.x:.1f}, y = {place.y:.1f} m it acts as if {what} ({place.amplitude:.3g}{unit}, {low:.3g} to "
-        f"{high:.3g}{'; ' if against else ''}{''.join(against)})"
-    )
+    at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
+    told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
+    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
+
+
+def _give_or_take(error: float) -> str:
+    """(give or take 4 m), where that is more than is told by a digit."""
+    return f" (give or take {error:.1f})" if error > TOLD_ERROR else ""
 
 
 def _odds(odds: float) -> str:

@@ -104,7 +104,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Location:
-    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot.
+    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
+    and standard errors of x and y over all spots that could be it.
 
     effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
     [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
@@ -123,6 +124,8 @@ class Location:
     score: float
     experiments: tuple[str, ...]
     odds: dict[str, float]
+    x_error: float = 0.0
+    y_error: float = 0.0
 
     @property
     def shapes(self) -> dict[str, float]:
