@@ -90,7 +90,11 @@ def _place_contender(kind: Kind, refits: Sequence[tuple[int, Refit]]) -> list[Co
 
 def chances_of(contenders: Sequence[Contender]) -> Array:
     """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
-    evidence = np.array([one.log_evidence for one in contenders])
+    return tempered_chances(np.array([one.log_evidence for one in contenders]))
+
+
+def tempered_chances(evidence: Array) -> Array:
+    """p_j of E_j (k,) [-]."""
     weight = np.exp((evidence - evidence.max()) / tempering(evidence))
     return np.asarray(weight / weight.sum())
 

@@ -20,6 +20,7 @@ from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, log_evidence, pruned
 from vegglue.diagnosis.rivals import instrument_found, location_found, step_found
+from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.interface import Model
@@ -69,7 +70,11 @@ def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None)
         if following is None:
             found = replace(found, undecided=tuple(contenders))
             break
+        more = following[0].accepted > found.accepted
         found, base = following
+        if more:
+            base, steps = with_rivals_again(base, found.steps, suspects, say)
+            found = replace(found, steps=steps)
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
         say("looking for what is missing with it")

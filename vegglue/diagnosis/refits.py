@@ -141,22 +141,22 @@ def pruned(base: Baseline, earlier: list[str], say: Say) -> tuple[Baseline, list
         if abs(base.fitted.point.z[j] - off) > NEEDED * spread:
             continue
         say(f"{name} is no longer needed")
-        fewer = _without(base, one.key, one.parameter)
+        fewer = without_effect(base, one)
         if fewer is not None:
             base, unneeded = fewer, [*unneeded, name]
     return base, unneeded
 
 
-def _without(base: Baseline, key: str, parameter: str) -> Baseline | None:
-    """The model calibrated again without one of its effects."""
+def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
+    """The model calibrated again without one of its effects; None where no flow is found."""
 
     def less(model: Model) -> Model:
         case = model.case
-        effects = {name: one for name, one in case.effects.items() if name != key}
-        parameters = {name: one for name, one in case.parameters.items() if name != parameter}
+        effects = {name: entry for name, entry in case.effects.items() if name != one.key}
+        parameters = {name: prior for name, prior in case.parameters.items() if name != one.parameter}
         return replace(model, case=case.model_copy(update={"effects": effects, "parameters": parameters}))
 
-    kept = np.array([name != parameter for name in base.model.names])
+    kept = np.array([name != one.parameter for name in base.model.names])
     start = linearise(less(base.model), base.fitted.point.z[kept], base.fitted.point)
     if start is None:
         return None

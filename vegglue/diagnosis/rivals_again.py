@@ -1,0 +1,71 @@
+"""Rivals of effects accepted earlier, compared again with what was accepted later in the model.
+
+Where the data could not tell two effects apart while something else was missing too, they may now.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.diagnosis.competition import tempered_chances
+from vegglue.diagnosis.refits import Refit, Trial, calibrated_with, refits_of, start_with, without_effect
+from vegglue.diagnosis.rivals import IN_SET
+from vegglue.progress import Say
+from vegglue.results.diagnosis import Step, Suspect
+from vegglue.screening.candidates import candidates_in_case, candidates_of
+
+
+def with_rivals_again(
+    base: Baseline, steps: Sequence[Step], suspects: Mapping[str, Suspect], say: Say
+) -> tuple[Baseline, tuple[Step, ...]]:
+    """The model with the best rival of every step but the last, and the steps with the chances as they are now."""
+    kept: list[Step] = []
+    for step in steps[:-1]:
+        found = _again(base, step, suspects, say) if len(step.rivals) > 1 else None
+        base, step = found or (base, step)
+        kept.append(step)
+    return base, (*kept, *steps[-1:])
+
+
+def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], say: Say) -> tuple[Baseline, Step] | None:
+    """One step; None when no flow is found without its effect, or with any of its rivals."""
+    say(f"comparing {', '.join(step.rivals)} again")
+    own = next(one for one in candidates_in_case(base.model.case).values() if one.name == step.accepted)
+    less = without_effect(base, own)
+    if less is None:
+        return None
+    refits = _refits_of_rivals(less, step, suspects)
+    if not refits:
+        return None
+    best = max(refits, key=lambda one: one.log_factor)
+    chance = tempered_chances(np.array([one.log_factor for one in refits]))
+    if best.candidate.name == step.accepted:
+        return base, _with_chances(step, step.accepted, refits, chance)
+    further = calibrated_with(less, best)
+    return None if further is None else (further, _with_chances(step, best.candidate.name, refits, chance))
+
+
+def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[Refit]:
+    """The rivals, each from the size it had, in the model without the effect that was accepted."""
+    case, z = less.model.case, less.fitted.point.z
+    possible = {one.name: one for one in candidates_of(case, less.model.station)}
+    trials = []
+    for name in step.rivals:
+        one, suspect = possible[name], suspects[name]
+        gain = one.amplitude.gain(suspect.amplitude.value)
+        trials.append(Trial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
+    return [refit for refit in refits_of(search_model(less), trials) if refit is not None]
+
+
+def _with_chances(step: Step, accepted: str, refits: Sequence[Refit], chance: Array) -> Step:
+    """The step with those of its rivals that hold IN_SET of the chances, the likeliest first."""
+    names = [one.candidate.name for one in refits]
+    order = [int(j) for j in np.argsort(-chance)]
+    enough = int(np.searchsorted(np.cumsum(chance[order]), IN_SET)) + 1
+    rivals = tuple(names[j] for j in order[:enough])
+    groups = tuple(group for old in step.groups if (group := tuple(name for name in old if name in rivals)))
+    chances = tuple(float(chance[j]) for j in order[:enough])
+    return replace(step, accepted=accepted, rivals=rivals, chances=chances, groups=groups, others={})
