@@ -25,6 +25,7 @@ from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.interface import Model
 from vegglue.measurements.suspicious_values import absurd_values
+from vegglue.parallel import in_threads
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.screening.candidates import candidates_in_case
@@ -45,6 +46,8 @@ MOST_FOLLOWED = 3
 # 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091); it is the vaguer
 # answer.
 LEAST_ODDS = 10.0
+# Odds within which another of the same kind is followed: the grid that hypotheses are searched on decides no closer.
+SAME_KIND_ODDS = 3.0
 
 
 def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None) -> Diagnosis:
@@ -93,16 +96,17 @@ def _following(
 ) -> tuple[Findings, Baseline] | None:
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
-    Contenders of other kinds within LEAST_ODDS are followed one step further, with the best that could come next.
+    Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
+    come next: of its own kind within SAME_KIND_ODDS, of other kinds within LEAST_ODDS.
     """
     chance = chances_of(contenders)
-    near = [j for j, p in enumerate(chance) if p * LEAST_ODDS >= chance[0]]
-    rivals = [0, *(j for j in near if contenders[j].kind != contenders[0].kind)][:MOST_FOLLOWED]
-    branches = [_branch(screening, contenders, j, found, say) for j in rivals]
+    odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
+    rivals = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
+    branches = in_threads(_branch, [(screening, contenders, j, found, say) for j in rivals])
     possible = [one for one in branches if one is not None]
-    if len(rivals) == 1 or len(possible) < 2:
+    if len(possible) < 2:
         return possible[0] if possible else None
-    score = np.array([_prospect(*one, found) for one in possible])
+    score = np.array(in_threads(_prospect, [(*one, found) for one in possible]))
     best = int(np.argmax(score))
     vague = len(possible[best][0].places) > len(found.places)
     clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
