@@ -43,7 +43,7 @@ def a_suspect(name: str, shapes: dict[str, float] | None = None, **parts: dict[s
         name=name, title="Störung – größer als 0", shapes=shapes or {},
         amplitude=AmplitudeEstimate(
             value=0.1 + 0.2, interval95=(-np.inf, 1 / 3), unit="m2/s", off=0.0, scale=0.5, refitted=False,
-            objective=210.0, support=(-0.5, np.inf),
+            objective=210.0, support=(-8.0, 9.0),
         ),
         test=ScoreTest(score=7.3, p_family=0.0002),
         detectability=Detectability(visibility=0.9, smallest=0.05, testable=True, confounder="k_s", cosine=-0.4),

@@ -32,8 +32,12 @@ OF_AN_EFFECT = [
 DATASETS = {
     "stations": ["station", *OF_STATIONS, "prediction_first", "prediction", "error"],
     "suspects": [
-        "suspect", *(name for name in OF_AN_EFFECT if name not in ("interval95", "support")), "low95", "high95",
-        "least", "most",
+        "suspect",
+        *(name for name in OF_AN_EFFECT if name not in ("interval95", "support")),
+        "low95",
+        "high95",
+        "least",
+        "most",
     ],
     "zones": ["zone_number", "experiment", "section", "zone", "stations", "mean", "standard_error", "chi2"],
     "places": ["place", "x", "y", "score"],
