@@ -54,7 +54,7 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
 
 
 def _lattice(nx: int, ny: int) -> Array:
-    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): those with i % CELL_STRIDE, j % CELL_STRIDE its own."""
+    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): those with its own i and j % CELL_STRIDE."""
     i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
     member = np.arange(CELL_STRIDE**2)
     return ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
@@ -76,10 +76,15 @@ def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
     nx, equations, ny, n = sensitivity.shape
     half = CELL_STRIDE // 2
     for i in range(nx):
+        # Beside an edge the window is shifted inwards, so that every change is counted once.
+        first = 0 if i < CELL_STRIDE else i - half
+        last = nx if i >= nx - CELL_STRIDE else i + half + 1
         for j in range(ny):
             member = (i % CELL_STRIDE) * CELL_STRIDE + j % CELL_STRIDE
-            for a in range(max(i - half, 0), min(i + half + 1, nx)):
-                for b in range(max(j - half, 0), min(j + half + 1, ny)):
+            lowest = 0 if j < CELL_STRIDE else j - half
+            highest = ny if j >= ny - CELL_STRIDE else j + half + 1
+            for a in range(first, last):
+                for b in range(lowest, highest):
                     for k in range(equations):
                         weight = change[a, k, b, member]
                         if weight != 0.0:
