@@ -31,7 +31,7 @@ def step(*rivals: str, **fields: Any) -> Step:
 
 def grounds(*steps: Step, **parts: Any) -> Grounds:
     """Of a diagnosis that found these steps; parts: fields of the grounds, or of what was found, to be changed."""
-    of_findings = {name: parts.pop(name) for name in ("places", "instruments", "undecided") if name in parts}
+    of_findings = {name: parts.pop(name) for name in ("places", "instruments", "undecided", "absurd") if name in parts}
     usual = Grounds(AS_STATED, FITS, Findings(steps, **of_findings), None, None, (), float("nan"), False, ("n_b", 1.0))
     return replace(usual, **parts)
 
@@ -103,6 +103,13 @@ def test_instruments_are_told_by_where_they_stood(kind: str, where: dict[str, fl
     assert words in said(grounds(instruments=(one,)))[1]
     assert words in said(grounds(step("a"), instruments=(one,)), [a_suspect("a")])[1]
     assert words in said(grounds(places=(a_location(),), instruments=(one,)))[2]
+
+
+def test_data_that_cannot_be_are_told_before_all_else() -> None:
+    odd = grounds(step("a"), places=(a_location(),), field=a_field(), absurd=("levels lie below the bed.",))
+    kind, sentence, _ = said(odd, [a_suspect("a")])
+    assert kind == "cannot-tell"
+    assert sentence == "Before anything can be said of the model: levels lie below the bed."
 
 
 def test_what_scores_below_the_alarm_is_not_excluded() -> None:
