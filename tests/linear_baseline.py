@@ -15,7 +15,6 @@ from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import NEWTON
 from vegglue.site.gridded_site import build_site
 
-
 CASE_OF_TWINS = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")
 
 

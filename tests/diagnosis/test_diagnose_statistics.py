@@ -1,7 +1,7 @@
 """A small part of the study in docs/blind.md, with bounds that chance would hardly pass by itself.
 
 Diagnoses of a method that raises a false alarm in a third of all cases, or finds effects in half of them, would fail
-here. What is hidden is drawn from the whole library, and every search starts where a user's does, from the priors alone.
+here. What is hidden is drawn from the whole library; searches start where a user's does, from the priors alone.
 """
 
 from collections.abc import Iterator

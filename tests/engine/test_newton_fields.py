@@ -1,4 +1,4 @@
-"""Responses to a term in each cell, by adjoints: against those of uniform effects, and against flows that are solved."""
+"""Responses to a term in each cell, by adjoints: against those of uniform effects, and against solved flows."""
 
 from dataclasses import replace
 from pathlib import Path

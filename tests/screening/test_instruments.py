@@ -1,4 +1,4 @@
-"""Which instruments could be off: readings, probes at one place or one y, gauges, and what an offset of each changes."""
+"""Which instruments could be off: readings, probes at one place or one y, gauges, and what an offset changes."""
 
 import numpy as np
 import pandas as pd

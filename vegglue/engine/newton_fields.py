@@ -2,8 +2,8 @@
 
     d prediction_n / d a_c = - l_n . dR/da_c,    J' l_n = d prediction_n / d state
 
-A change in a cell reaches the residual of its neighbours only, so that every CELL_STRIDE-th cell along and across is changed
-at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974, doi:10.1093/imamat/13.1.117;
+A change in a cell reaches the residual of its neighbours only, so that every CELL_STRIDE-th cell along and across is
+changed at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974, doi:10.1093/imamat/13.1.117;
 not checked against it). Beside the inflow, where a bed changes how water is spread over the whole inflow, this is not
 so: there an answer is that of the cells around it together.
 """
@@ -54,7 +54,7 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
 
 
 def _lattice(nx: int, ny: int) -> Array:
-    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): those with its own i and j % CELL_STRIDE."""
+    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): every so many-th both ways."""
     i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
     member = np.arange(CELL_STRIDE**2)
     return ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
