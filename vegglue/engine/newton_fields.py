@@ -4,8 +4,9 @@
 
 A change in a cell reaches the residual of its neighbours only, so that every CELL_STRIDE-th cell along and across is
 changed at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974,
-doi:10.1093/imamat/13.1.117; not checked against it). Beside the inflow, where a bed changes how water is spread over the whole inflow, this is not
-so: there an answer is that of the cells around it together.
+doi:10.1093/imamat/13.1.117; not checked against it). Beside the inflow, where a
+bed changes how water is spread over the whole inflow, this is not so: there an answer is that of the cells around it
+together.
 """
 
 from collections.abc import Mapping, Sequence
