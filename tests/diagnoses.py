@@ -10,12 +10,15 @@ from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
     Diagnosis,
-    Location,
-    PlaceMap,
     EstimatedErrors,
+    FaultyInstrument,
+    FieldFound,
     FirstScreening,
+    Location,
     Misfit,
+    ModelErrorUsed,
     ParameterEstimates,
+    PlaceMap,
     Predictions,
     ScoreTest,
     Step,
@@ -40,12 +43,37 @@ def a_suspect(name: str, shapes: dict[str, float] | None = None, **parts: dict[s
         name=name, title="Störung – größer als 0", shapes=shapes or {},
         amplitude=AmplitudeEstimate(
             value=0.1 + 0.2, interval95=(-np.inf, 1 / 3), unit="m2/s", off=0.0, scale=0.5, refitted=False,
-            objective=210.0,
+            objective=210.0, support=(-8.0, 9.0),
         ),
         test=ScoreTest(score=7.3, p_family=0.0002),
         detectability=Detectability(visibility=0.9, smallest=0.05, testable=True, confounder="k_s", cosine=-0.4),
     )  # fmt: skip
     return changed(suspect, PARTS_OF_SUSPECT, parts)
+
+
+def a_location(**fields: Any) -> Location:
+    """Of more drag at x = 33.0, y = -0.6 m; fields: to be changed."""
+    usual = Location(
+        x=33.0, y=-0.6, length=1.8, width=0.45, term="drag", effect="unlisted_object", amplitude=0.4,
+        interval95=(0.3, 0.5), unit="1/m", score=12.0, experiments=("low", "high"), odds={"eddies": 30.0, "bed": 4.0},
+    )  # fmt: skip
+    return replace(usual, **fields)
+
+
+def an_instrument(**fields: Any) -> FaultyInstrument:
+    """One reading of velocity that is off, at x = 36.0, y = 1.0 m; fields: to be changed."""
+    usual = FaultyInstrument(
+        kind="reading", x=36.0, y=1.0, stations=(1,), offset=0.1, interval95=(0.08, 0.12), unit="m/s", log_factor=9.5
+    )
+    return replace(usual, **fields)
+
+
+def a_field(**fields: Any) -> FieldFound:
+    """Of friction; fields: to be changed."""
+    usual = FieldFound(
+        term="friction", size=0.4, length=7.5, width=1.5, log_factor=40.5, value=0.6, error=0.1, x=31.0, y=0.5
+    )
+    return replace(usual, **fields)
 
 
 def a_diagnosis(
@@ -73,13 +101,15 @@ def a_diagnosis(
         a_suspect("wind", test={"score": 0.3, "p_family": 1.0}, detectability={"testable": False}),
         a_suspect("turning", test={"score": -1.0, "p_family": 0.7}),
     )  # fmt: skip
-    step = Step("eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0)
+    step = Step(
+        "eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0, {"bed": 0.02}
+    )
     diagnosis = Diagnosis(
         name="open-x", version="0.1.0", suspects=usual if suspects is None else suspects,
         steps=(step,) if steps is None else steps,
         verdict=Verdict(
             "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
-            Location(33.0, -0.6, ("low", "high"), 0.4, 12.0), not_excluded=(),
+            a_location(), not_excluded=(),
         ),
         misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
         errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),
@@ -87,12 +117,15 @@ def a_diagnosis(
             station, first=random.random(STATIONS), last=random.random(STATIONS),
             error=np.array([0.01, 0.01, 0.002, 0.01, 0.01, np.nan]),
         ),
-        place_map=PlaceMap(np.repeat([30.0, 33.0, 36.0], 2), np.tile([-0.6, 0.6], 3), random.normal(size=6)),
+        place_map=PlaceMap(
+            "drag", np.repeat([30.0, 33.0, 36.0], 2), np.tile([-0.6, 0.6], 3), random.normal(size=6)
+        ),
         first_screening=FirstScreening(
             3.4, {"eddies": 45.2, "mixing[D3]": 43.0, "wind": 0.3, "turning": -1.0}, ("eddies", "mixing[D3]", "wind"),
             cosine=np.array([[1, 0.96, 0.1], [0.96, 1, 0.2], [0.1, 0.2, 1]]),
         ),
         parameters=ParameterEstimates({"n_b": 0.035}, {"n_b": (0.03, 0.02, 0.04)}),
+        places=(a_location(),), instruments=(an_instrument(),), model_error=ModelErrorUsed(0.05, 0.01, 0.5, 1.25),
     )  # fmt: skip
     return changed(diagnosis, PARTS, parts)
 
@@ -103,4 +136,12 @@ NOTHING = a_diagnosis(
     first_screening={"scores": {}, "compared": (), "cosine": np.zeros((0, 0))},
     place_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
 )  # fmt: skip
-NO_LOCATION = a_diagnosis(verdict={"location": None})
+NOTHING = replace(NOTHING, places=(), instruments=(), model_error=None)
+NO_LOCATION = replace(a_diagnosis(verdict={"location": None}), places=(), instruments=(), model_error=None)
+# A field and places of other terms, and instruments that stood at no one place.
+EVERY_KIND = replace(
+    a_diagnosis(verdict={"kind": "none-of-these"}, place_map={"term": "inflow"}),
+    places=(a_location(term="inflow", effect="unlisted_inflow", unit="m3/s"), a_location(term="bed", odds={})),
+    instruments=(an_instrument(), an_instrument(kind="probe", x=np.nan, stations=(0, 3), interval95=(-np.inf, 0.2))),
+    field=a_field(),
+)

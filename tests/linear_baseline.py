@@ -1,5 +1,7 @@
 """A calibrated model whose predictions are linear in z, prediction = slope z: no flow is solved for it."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
@@ -7,10 +9,21 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import MapEstimate, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
+from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import NEWTON
 from vegglue.site.gridded_site import build_site
+
+CASE_OF_TWINS = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")
+
+
+def measured_linearly(sections: tuple[str, ...], points: int, parameters: int) -> tuple[Array, Array]:
+    """Slopes (station, p), and values measured at a place of the prior with errors of 0.01 m/s (station,)."""
+    random = np.random.default_rng((1, parameters))
+    count = len(stations_of(CASE_OF_TWINS, sections, points))
+    slope = 0.05 * random.standard_normal((count, parameters))
+    return slope, slope @ random.standard_normal(parameters) + 0.01 * random.standard_normal(count)
 
 
 def stations_of(case: Case, sections: tuple[str, ...], points: int) -> pd.DataFrame:

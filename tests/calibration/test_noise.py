@@ -7,12 +7,12 @@ import scipy.stats
 
 from vegglue.calibration.noise import (
     covariance_of,
-    downweight_outliers,
     draw_whitened_errors,
     estimate_noise,
     noise_of,
     with_correlation,
     with_grid_error,
+    with_offset,
 )
 from vegglue.errors import InputError
 
@@ -97,10 +97,25 @@ def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
 
 
 def test_a_station_set_aside_counts_for_nothing() -> None:
-    noise = downweight_outliers(noise_of(stations()), np.array([5]))
+    noise = with_offset(noise_of(stations()), np.array([5]))
     left = np.zeros(SECTIONS * STATIONS)
     left[5] = 1.0
     assert np.abs(noise.whiten(left)).max() < 0.2
+
+
+def test_of_an_instrument_that_is_off_only_differences_count() -> None:
+    """Where three readings share an offset, it counts for nothing, and two independent errors are left."""
+    readings = np.array([5, 30, 60])
+    before, noise = noise_of(stations()), with_offset(noise_of(stations()), readings)
+    shared, own = np.zeros(before.rows.size), np.zeros(before.rows.size)
+    shared[readings], own[readings] = 1.0, (0.02, -0.01, -0.01)
+    assert np.abs(noise.whiten(shared)).max() < 0.2
+    assert np.sum(noise.whiten(own) ** 2) == pytest.approx(np.sum((own / 0.01) ** 2), rel=1e-3)
+    others = np.ones(before.rows.size) - shared
+    assert np.sum(noise.whiten(others) ** 2) == pytest.approx(np.sum(before.whiten(others) ** 2))
+    again = with_offset(noise, np.array([7]))
+    assert again.offsets.shape == (before.rows.size, 2), "one instrument after another"
+    assert np.abs(again.whiten(shared)).max() < 0.2
 
 
 def test_a_station_without_a_standard_error_is_named() -> None:

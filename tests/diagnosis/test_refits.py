@@ -1,11 +1,15 @@
-"""Which of the refits are kept as rivals, and in which groups."""
+"""Which of the refits are kept as rivals, in which groups, and the evidence of a refit."""
 
-from types import SimpleNamespace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy.stats
+from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
-from vegglue.diagnosis.refits import rivals_among
+from vegglue.diagnosis.competition import Contender, chances_of, tempering
+from vegglue.diagnosis.refits import log_evidence
+from vegglue.diagnosis.rivals import rivals_among
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 
@@ -15,8 +19,8 @@ def kept(fall: list[float], alike: dict[tuple[int, int], float]) -> Kept:
     cosine = np.eye(len(fall))
     for (i, j), value in alike.items():
         cosine[i, j] = cosine[j, i] = value
-    tried = [SimpleNamespace(column=j, candidate=SimpleNamespace(name="abcdef"[j])) for j in range(len(fall))]
-    return rivals_among(tried, np.array(fall), cosine)
+    chance = chances_of([Contender("effect", "abcdef"[j], 0.5 * one, j, None) for j, one in enumerate(fall)])
+    return rivals_among("abcdef"[: len(fall)], chance, cosine)
 
 
 def test_what_is_clearly_best_stands_alone() -> None:
@@ -40,3 +44,61 @@ def test_many_unlikely_ones_are_kept_until_the_set_holds_its_share() -> None:
     assert chance["a"] < 0.95
     assert sum(chance.values()) >= 0.95
     assert len(groups) == 5
+
+
+def test_of_less_than_all_chances_the_set_holds_its_share_of_what_effects_have() -> None:
+    """Where a place has the other half of the chances, 95 % of a half are enough."""
+    chance, groups = rivals_among("ab", np.array([0.49, 0.01]), np.eye(2))
+    assert groups == (("a",),)
+    assert chance == {"a": 0.49}
+
+
+def test_chances_are_those_of_the_evidence_where_little_is_explained() -> None:
+    """Odds e^1, but for fingerprints that may be wrong."""
+    chance = chances_of([Contender("effect", name, size, 0, None) for name, size in (("a", 1.0), ("b", 0.0))])
+    assert chance.sum() == pytest.approx(1.0)
+    assert chance[0] / chance[1] == pytest.approx(np.e, rel=0.01)
+    assert tempering(np.array([-5.0, 0.0])) == pytest.approx(1.0)
+
+
+def test_long_traces_may_be_wrong_and_prove_less() -> None:
+    """With 15 % of error, evidence of 800 counts w = 37 times less: 37 more are odds of e^1."""
+    chance = chances_of([Contender("effect", name, size, 0, None) for name, size in (("a", 800.0), ("b", 763.0))])
+    assert chance[0] / chance[1] == pytest.approx(np.e, rel=0.1)
+    ratios = [a / b for b, a in pairwise(tempering(np.array([0.0, 10.0, 100.0, 1000.0])))]
+    assert all(ratio > 1.0 for ratio in ratios)
+
+
+def test_chances_do_not_hang_on_the_order() -> None:
+    made = [Contender("effect", name, size, 0, None) for name, size in (("a", 3.0), ("b", 9.0), ("c", -4.0))]
+    assert chances_of(made[::-1])[::-1] == pytest.approx(chances_of(made))
+
+
+@pytest.mark.parametrize("columns", [1, 3, 4])
+def test_the_evidence_of_a_linear_model_is_that_of_its_gaussian(columns: int) -> None:
+    """ln N(y; 0, C + J J'): Laplace's approximation is exact there, whatever the parameters."""
+    slope, values = measured_linearly(("A", "B"), 4, columns)
+    station = stations_of(CASE_OF_TWINS, ("A", "B"), 4)
+    base = at_best(CASE_OF_TWINS, station, values, slope)
+    covariance = np.diag(station["standard_error"].to_numpy() ** 2) + slope @ slope.T
+    density = scipy.stats.multivariate_normal(np.zeros(len(values)), covariance).logpdf(values)
+    assert log_evidence(base) - 0.5 * len(values) * np.log(2.0 * np.pi) == pytest.approx(density)
+
+
+def test_a_parameter_that_changes_nothing_costs_nothing() -> None:
+    slope, values = measured_linearly(("A",), 5, 3)
+    station = stations_of(CASE_OF_TWINS, ("A",), 5)
+    idle = np.hstack([slope, np.zeros((len(slope), 1))])
+    found = [log_evidence(at_best(CASE_OF_TWINS, station, values, one)) for one in (slope, idle)]
+    assert found[1] == pytest.approx(found[0])
+
+
+def test_a_parameter_that_explains_nothing_is_charged() -> None:
+    slope, values = measured_linearly(("A",), 5, 2)
+    station = stations_of(CASE_OF_TWINS, ("A",), 5)
+    basis = np.linalg.qr(np.column_stack([slope, values]))[0]
+    other = np.random.default_rng(9).standard_normal((len(slope), 1))
+    other = 0.05 * (other - basis @ (basis.T @ other))
+    found = [log_evidence(at_best(CASE_OF_TWINS, station, values, one)) for one in (slope, np.hstack([slope, other]))]
+    length = float(np.sum((other / 0.01) ** 2))
+    assert found[1] - found[0] == pytest.approx(-0.5 * np.log1p(length)), "Occam's factor"

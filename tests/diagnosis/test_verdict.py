@@ -1,51 +1,120 @@
 """From what was found to a verdict in words: when it names, when it only remarks, and when it cannot tell."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import a_suspect
+from diagnoses import a_field, a_location, a_suspect, an_instrument
 
+from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.conclusion import chance_of_misfit
-from vegglue.diagnosis.verdict import judged
-from vegglue.results.diagnosis import Location, EstimatedErrors, Misfit, Step, Suspect
+from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.verdict import Grounds, judged
+from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step, Suspect
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
-FITS, MISSES = (Misfit(chi2, chi2, 5, chance_of_misfit(chi2, 5), pd.DataFrame()) for chi2 in (5.0, 80.0))
+# A misfit as it should be, one that errors do not make, and one that is absurd: 3.8 and 6 times the degrees of freedom.
+FITS, MISSES, ABSURD = (
+    Misfit(chi2, chi2, freedom, chance_of_misfit(chi2, freedom), pd.DataFrame())
+    for chi2, freedom in ((5.0, 5), (76.0, 20), (120.0, 20))
+)
 NONE = a_suspect("wind", test={"score": 0.4})
 
 
-def step(*rivals: str) -> Step:
+def step(*rivals: str, **fields: Any) -> Step:
     chances = tuple(0.96 / len(rivals) for _ in rivals)
-    return Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4)
+    return replace(Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4), **fields)
 
 
-Groups = tuple[tuple[str, ...], ...]
+def grounds(*steps: Step, **parts: Any) -> Grounds:
+    """Of a diagnosis that found these steps; parts: fields of the grounds, or of what was found, to be changed."""
+    of_findings = {name: parts.pop(name) for name in ("places", "instruments", "undecided", "absurd") if name in parts}
+    usual = Grounds(AS_STATED, FITS, Findings(steps, **of_findings), None, None, (), float("nan"), False, ("n_b", 1.0))
+    return replace(usual, **parts)
 
 
-def said(
-    steps: list[Step],
-    suspects: list[Suspect],
-    location: Location | None,
-    misfit: Misfit,
-    still: Groups = (),
-    alone: str = "",
-    errors: EstimatedErrors = AS_STATED,
-) -> tuple[str, str, str]:
-    found = judged(errors, misfit, steps, suspects, location, still, alone)
-    assert (found.location, found.not_excluded) == (location, still)
-    return found.kind, found.sentence, " ".join(found.remarks)
+def said(found: Grounds, suspects: Sequence[Suspect] = (NONE,)) -> tuple[str, str, str]:
+    verdict = judged(found, suspects)
+    places = found.findings.places
+    assert (verdict.location, verdict.not_excluded) == (places[0] if places else None, found.not_excluded)
+    return verdict.kind, verdict.sentence, " ".join(verdict.remarks)
 
 
 def test_nothing_is_missing_only_where_it_would_be_seen() -> None:
-    assert said([], [NONE], None, FITS)[0] == "nothing-missing"
+    assert said(grounds())[0] == "nothing-missing"
     blind = [a_suspect("wind", detectability={"testable": False})] * 9
-    assert said([], [NONE, *blind], None, FITS)[0] == "cannot-tell"
-    assert said([], [NONE], None, MISSES)[0] == "cannot-tell"
+    assert said(grounds(), [NONE, *blind])[0] == "cannot-tell"
+    assert said(grounds(misfit=MISSES))[0] == "cannot-tell"
+
+
+NEEDS_MORE = ModelErrorUsed(0.05, 0.01, needed=3.0, log_ratio=9.0)
+# What takes silence away, the same just within its bounds, and what is said of it.
+UNEARNED = {
+    "scale": ({"errors": replace(AS_STATED, scale=1.3)}, {"errors": replace(AS_STATED, scale=1.2)}, "1.3 times"),
+    "correlation": (
+        {"errors": replace(AS_STATED, correlation=0.85)},
+        {"errors": replace(AS_STATED, correlation=0.75)},
+        "correlated by 0.85",
+    ),
+    "neighbours": ({"neighbours": True}, {"neighbours": False}, "side by side"),
+    "model error": (
+        {"model_error": NEEDS_MORE},
+        {"model_error": replace(NEEDS_MORE, log_ratio=3.0)},
+        "15% in friction where 5%",
+    ),
+    "less model error": ({"model_error": NEEDS_MORE}, {"model_error": replace(NEEDS_MORE, needed=0.25)}, "15%"),
+    "unseen": ({"unseen": 1.5}, {"unseen": 1.2}, "1.5 times what is expected"),
+    "unseen beside others": ({"unseen": 1.5}, {"unseen": float("nan")}, "not calibrated to"),
+}
+
+
+@pytest.mark.parametrize("why", UNEARNED)
+def test_silence_has_to_be_earned(why: str) -> None:
+    too_much, within, words = UNEARNED[why]
+    kind, sentence, _ = said(grounds(**too_much))
+    assert kind == "cannot-tell"
+    assert words in sentence
+    assert said(grounds(**within))[0] == "nothing-missing"
+
+
+@pytest.mark.parametrize("why", UNEARNED)
+def test_an_instrument_alone_is_named_only_where_silence_is_earned(why: str) -> None:
+    too_much, within, _ = UNEARNED[why]
+    assert said(grounds(instruments=(an_instrument(),), **too_much))[0] == "cannot-tell"
+    kind, sentence, _ = said(grounds(instruments=(an_instrument(),), **within))
+    assert kind == "instrument"
+    assert "One reading at x = 36, y = 1 m is off by 0.1 m/s (0.08 to 0.12); it was set aside." in sentence
+    assert "Nothing else is missing" in sentence
+
+
+@pytest.mark.parametrize(
+    ("kind", "where", "words"),
+    [
+        ("probe", {"x": np.nan, "y": 0.5}, "The probe at y = 0.5 m is off in all sections by"),
+        ("position", {"x": 3.0, "y": 0.5}, "The probe at x = 3, y = 0.5 m is off in all experiments by"),
+        ("gauge", {"x": 3.0, "y": 0.0}, "The gauge at x = 3, y = 0 m is off in all experiments by"),
+    ],
+)
+def test_instruments_are_told_by_where_they_stood(kind: str, where: dict[str, float], words: str) -> None:
+    one = an_instrument(kind=kind, **where)
+    assert words in said(grounds(instruments=(one,)))[1]
+    assert words in said(grounds(step("a"), instruments=(one,)), [a_suspect("a")])[1]
+    assert words in said(grounds(places=(a_location(),), instruments=(one,)))[2]
+
+
+def test_data_that_cannot_be_are_told_before_all_else() -> None:
+    odd = grounds(step("a"), places=(a_location(),), field=a_field(), absurd=("levels lie below the bed.",))
+    kind, sentence, _ = said(odd, [a_suspect("a")])
+    assert kind == "cannot-tell"
+    assert sentence == "Before anything can be said of the model: levels lie below the bed."
 
 
 def test_what_scores_below_the_alarm_is_not_excluded() -> None:
     groups = (("effect0", "effect1"), tuple(f"effect{k}" for k in range(2, 11)))
-    verdict, _, remarks = said([], [NONE], None, FITS, groups)
+    verdict, _, remarks = said(grounds(not_excluded=groups))
     assert verdict == "nothing-missing"
     assert "effect0" in remarks
     assert "and 3 more" in remarks
@@ -53,14 +122,15 @@ def test_what_scores_below_the_alarm_is_not_excluded() -> None:
 
 
 def test_an_alarm_that_nothing_came_of_is_no_all_clear() -> None:
-    verdict, sentence, _ = said([], [NONE], None, FITS, (), "wind stands out, but no flow with it fits")
+    contenders = tuple(Contender("effect", name, 1.0, 0, None) for name in ("wind", "elder", "steep_bank", "jet"))
+    verdict, sentence, _ = said(grounds(undecided=contenders))
     assert verdict == "cannot-tell"
-    assert "wind stands out" in sentence
+    assert "wind or elder or steep_bank stands out" in sentence
 
 
 def test_a_misfit_is_not_said_to_hide() -> None:
-    assert "effect0" in said([], [NONE], None, FITS, (("effect0",),))[2]
-    assert "effect0" not in said([], [NONE], None, MISSES, (("effect0",),))[2]
+    assert "effect0" in said(grounds(not_excluded=(("effect0",),)))[2]
+    assert "effect0" not in said(grounds(misfit=MISSES, not_excluded=(("effect0",),)))[2]
 
 
 @pytest.mark.parametrize(
@@ -68,27 +138,116 @@ def test_a_misfit_is_not_said_to_hide() -> None:
     [(["a"], "identified"), (["a", "b", "c"], "one-of"), (["a", "b", "c", "d"], "cannot-tell")],
 )
 def test_a_set_of_more_than_three_groups_tells_nothing(rivals: list[str], verdict: str) -> None:
-    assert said([step(*rivals)], [a_suspect(name) for name in rivals], None, FITS)[0] == verdict
+    assert said(grounds(step(*rivals)), [a_suspect(name) for name in rivals])[0] == verdict
 
 
 def test_rivals_are_told_with_their_chances() -> None:
     both = Step("a", ("a", "b", "c"), (0.5, 0.3, 0.16), (("a", "b"), ("c",)), 200.0, 5.0, 1e-4)
-    sentence = said([both], [a_suspect(name) for name in "abc"], None, FITS)[1]
-    assert "trace in these data as b, together with a chance of 80% among those calibrated, or else c (16%)" in sentence
+    sentence = said(grounds(both), [a_suspect(name) for name in "abc"])[1]
+    assert (
+        "trace in these data as b, together with a chance of 80% among all that was tried, or else c (16%)" in sentence
+    )
+
+
+def test_what_is_of_another_kind_may_be_it_instead() -> None:
+    alone = step("a", chances=(0.8,), others={"bed": 0.15})
+    kind, sentence, _ = said(grounds(alone), [a_suspect("a")])
+    assert kind == "one-of"
+    assert "or else bed (15%)" in sentence
 
 
 def test_an_implausible_size_is_remarked() -> None:
     usual = a_suspect("a", amplitude={"value": 0.9, "scale": 0.5})
     huge = a_suspect("a", amplitude={"value": -0.34, "scale": 0.1})
-    assert "plausible" not in said([step("a")], [usual], None, FITS)[2]
-    assert "3.4 times what is plausible" in said([step("a")], [huge], None, FITS)[2]
+    assert "plausible" not in said(grounds(step("a")), [usual])[2]
+    assert "3.4 times what is plausible" in said(grounds(step("a")), [huge])[2]
 
 
-def test_a_place_wins_over_steps() -> None:
-    location = Location(33.0, -0.6, ("low",), 0.4, 12.0)
-    verdict, sentence, _ = said([step("a")], [a_suspect("a")], location, MISSES)
+def test_a_place_wins_over_steps_and_all_are_told() -> None:
+    found = grounds(step("a"), places=(a_location(), a_location(term="bed", unit="m", x=12.0)), misfit=MISSES)
+    verdict, sentence, _ = said(found, [a_suspect("a")])
     assert verdict == "none-of-these"
-    assert "after a: the misfit points at x = 33.0, y = -0.6 m" in sentence
+    first, second, third = sentence.split("; and ")
+    assert "at x = 33.0, y = -0.6 m it acts as if something holds the flow back (0.4 1/m, 0.3 to 0.5; 4 to 1" in first
+    assert "at x = 12.0, y = -0.6 m it acts as if the bed lies 0.40 m higher" in second
+    assert third.startswith("a of 0.3")
+
+
+@pytest.mark.parametrize(
+    ("term", "more", "less"),
+    [
+        ("drag", "holds the flow back", "lets the flow pass"),
+        ("bed", "0.40 m higher", "0.40 m lower"),
+        ("inflow", "water enters, 0.4 m3/s", "water leaves, 0.4 m3/s"),
+        ("viscosity", "mixes more", "mixes less"),
+    ],
+)
+def test_a_place_is_told_by_its_term_and_its_sign(term: str, more: str, less: str) -> None:
+    assert more in said(grounds(places=(a_location(term=term),)))[1]
+    assert less in said(grounds(places=(a_location(term=term, amplitude=-0.4),)))[1]
+
+
+def test_odds_are_told_against_the_closest_other_term() -> None:
+    odds = {"wind": 2.0, "bed": 400.0, "viscosity": 7000.0}
+    assert "400 to 1 against bed" in said(grounds(places=(a_location(odds=odds),)))[1]
+    assert "over 1,000 to 1 against bed" in said(grounds(places=(a_location(odds={"bed": 7000.0}),)))[1]
+    assert "against" not in said(grounds(places=(a_location(odds={"wind": 2.0}),)))[1]
+
+
+def test_a_field_is_none_of_the_known_effects() -> None:
+    verdict, sentence, _ = said(grounds(step("a"), field=a_field()), [a_suspect("a")])
+    assert verdict == "none-of-these"
+    assert (
+        "some 15 m along and 3.0 m across, most surely around x = 31.0, y = 0.5 m (+60%), rather than a of" in sentence
+    )
+    bed = a_field(term="bed", value=-0.12)
+    assert "the bed level that differs" in said(grounds(misfit=MISSES, field=bed))[1]
+    assert "(-0.12 m)" in said(grounds(misfit=MISSES, field=bed))[1]
+
+
+AT_ITS_END = {"value": 1.0, "support": (-1.0, 1.0), "scale": 0.5}
+# What takes a name away, the same just within its bounds, and what is said of it.
+DOUBTED = {
+    "absurd": ({"misfit": ABSURD}, {"misfit": MISSES}, {}, {}, "misses by 2.4 times"),
+    "far off": ({"strained": ("k_s", 4.5)}, {"strained": ("k_s", 3.5)}, {}, {}, "k_s would have to lie 4.5"),
+    "at its upper end": ({}, {}, AT_ITS_END, AT_ITS_END | {"value": 0.97}, "a would have to be as large as can be"),
+    "at its lower end": ({}, {}, AT_ITS_END | {"value": -0.99}, AT_ITS_END | {"value": -0.97}, "as large as can be"),
+}
+
+
+@pytest.mark.parametrize("why", DOUBTED)
+def test_a_name_has_to_be_earned(why: str) -> None:
+    too_much, within, amplitude, smaller, words = DOUBTED[why]
+    kind, sentence, _ = said(grounds(step("a"), **too_much), [a_suspect("a", amplitude=amplitude)])
+    assert kind == "cannot-tell"
+    assert words in sentence
+    assert "What explains most of the misfit: a of" in sentence
+    assert said(grounds(step("a"), **within), [a_suspect("a", amplitude=smaller)])[0] == "identified"
+
+
+@pytest.mark.parametrize("why", ["absurd", "far off"])
+def test_a_place_has_to_be_earned(why: str) -> None:
+    too_much, within, *_, words = DOUBTED[why]
+    kind, sentence, _ = said(grounds(places=(a_location(),), **too_much))
+    assert kind == "cannot-tell"
+    assert words in sentence
+    assert said(grounds(places=(a_location(),), **within))[0] == "none-of-these"
+
+
+def test_only_what_was_accepted_can_stand_in_for_something_else() -> None:
+    beside = a_suspect("b", amplitude=AT_ITS_END)
+    assert said(grounds(step("a")), [a_suspect("a"), beside])[0] == "identified"
+
+
+def test_an_effect_that_is_off_at_the_end_of_its_support_is_not_at_a_bound_there() -> None:
+    """Its size is small, and what is small does not stand in for anything."""
+    small = a_suspect("a", amplitude={"value": 0.005, "support": (0.0, 1.0), "off": 0.0})
+    assert said(grounds(step("a")), [small])[0] == "identified"
+
+
+def test_a_support_without_ends_has_no_bound() -> None:
+    endless = a_suspect("a", amplitude={"support": (-np.inf, np.inf), "value": 3.0, "scale": 2.0})
+    assert said(grounds(step("a")), [endless])[0] == "identified"
 
 
 def test_the_chance_of_a_misfit() -> None:
@@ -98,20 +257,28 @@ def test_the_chance_of_a_misfit() -> None:
 
 def test_what_is_left_too_large_is_remarked_after_a_step_only() -> None:
     left = "left is still larger than the errors allow"
-    assert left in said([step("a")], [a_suspect("a")], None, MISSES)[2]
-    assert left not in said([step("a")], [a_suspect("a")], None, FITS)[2]
-    assert left not in said([], [NONE], None, MISSES)[2]
-    assert left not in said([step(*"abcd")], [a_suspect(name) for name in "abcd"], None, MISSES)[2]
+    assert left in said(grounds(step("a"), misfit=MISSES), [a_suspect("a")])[2]
+    assert left not in said(grounds(step("a")), [a_suspect("a")])[2]
+    assert left not in said(grounds(misfit=MISSES))[2]
+    assert left not in said(grounds(step(*"abcd"), misfit=MISSES), [a_suspect(name) for name in "abcd"])[2]
 
 
 def test_errors_that_are_not_as_stated_are_remarked() -> None:
-    remarks = said([], [NONE], None, FITS, errors=EstimatedErrors(0.4, 1.5, 0.0, (3, 4)))[2]
+    remarks = said(grounds(errors=EstimatedErrors(0.4, 1.2, 0.0, (3, 4))))[2]
     assert "correlated by 0.40" in remarks
-    assert "too small by a factor of 1.50" in remarks
-    assert "2 stations stand alone" in remarks
-    assert said([], [NONE], None, FITS)[2] == ""
+    assert "too small by a factor of 1.20" in remarks
+    assert said(grounds())[2] == ""
+
+
+def test_the_model_error_that_is_allowed_is_remarked() -> None:
+    used = ModelErrorUsed(0.05, 0.01, needed=0.5, log_ratio=1.0)
+    assert (
+        "wrong by 5% of its friction and 1 cm of its bed everywhere; it needs 2.5% and 0.5 cm."
+        in said(grounds(model_error=used))[2]
+    )
+    assert "it needs none of it" in said(grounds(model_error=replace(used, needed=0.0)))[2]
 
 
 def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:
     hidden = a_suspect("wind", detectability={"testable": False, "cosine": -0.9})
-    assert "wind (looks like a change of k_s)" in said([], [hidden], None, FITS)[2]
+    assert "wind (looks like a change of k_s)" in said(grounds(), [hidden])[2]

@@ -1,6 +1,6 @@
 """Every effect against a number worked out by hand from its equation; one row each, none left out."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from math import exp, log, pi, sin, sqrt
 
 import numpy as np
@@ -65,6 +65,9 @@ def shear(x, y):
 
 U = sqrt(0.6**2 + 1e-6)
 HELIX = sqrt(0.05 * 0.8) / 0.41
+# Two half lengths and one half width from the middle of a spot.
+SPOT = {"x": 1.0, "y": 1.5, "length": 0.3, "width": 0.5}
+NEAR = geometry(x=1.6, y=2.0)
 LE = 1.0 - (1.0 - 0.9 * 64.0 ** (-1 / 3)) / (1.0 + 64.0**-1.5 * 8.0)
 
 # name: (what it gets, amplitude and shapes, what it hands on in the middle)
@@ -104,12 +107,15 @@ ROWS = {
     "debris_screen": (plant_cells(front=0.5), {"excess": 2.0, "length": 0.5}, {"phi": 2.0 * (1.0 + 2.0 * exp(-1.0))}),
     "density_trend": (plant_cells(front=2.0), {"trend": 0.3, "length": 2.0}, {"phi": 2.0}),
     "edge_thinning": (plant_cells(edge=-0.3), {"share": 0.4, "width": 0.3}, {"phi": 2.0 * (1.0 - 0.4 * exp(-1.0))}),
+    "patch_density": (plant_cells(patch=1.0), {"excess": 0.5, "patch": 2.0}, {"phi": 2.0 * 1.5}),
     "depth_dependent_bank": (
         cells(on=geometry(bank=1.0)),
         {"exponent": -1.0, "reference_depth": 0.4},
         {"rate": 0.1 * 0.5},
     ),
     "depth_dependent_bed": (cells(), {"exponent": 2.0, "reference_depth": 0.4}, {"rate": 0.1 * 4.0}),
+    "bank_trend": (cells(on=geometry(bank=1.0, share_along=0.25)), {"trend": 2.0}, {"rate": 0.1 * exp(0.5)}),
+    "bed_trend": (cells(on=geometry(share_along=-0.25)), {"trend": 2.0}, {"rate": 0.1 * exp(-0.5)}),
     "bank_difference": (cells(on=geometry(bank=1.0, offset=-1.3)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(-0.5)}),
     "steep_bank": (cells(on=geometry(side_slope=0.75)), {"share": 1.0}, {"rate": 0.1 * 1.25}),  # 3, 4, 5
     "bank_vegetation": (
@@ -176,11 +182,10 @@ ROWS = {
     "among_plants": (reading(canopy_share=0.5), {"gain": 0.2}, {"value": 0.55}),
     "gauge_datum": (gauge(), {"shift": 0.02}, {"value": 0.52}),
     "gauge_head": (gauge(u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),
-    "unlisted_object": (
-        cells(on=geometry(x=1.0, y=2.0)),
-        {"drag": 2.0, "x": 1.0, "y": 1.5, "radius": 0.5},
-        {"rate": 0.1 + 2.0 * exp(-1.0)},
-    ),
+    "unlisted_object": (cells(on=NEAR), {"drag": 2.0, **SPOT}, {"rate": 0.1 + 2.0 * exp(-5.0)}),
+    "unlisted_bed": (NEAR, {"rise": 0.2, **SPOT}, {"bed": 0.2 * exp(-5.0)}),
+    "unlisted_inflow": (NEAR, {"discharge": 0.2, **SPOT}, {"inflow": 0.2 * exp(-5.0) / (pi * 0.3 * 0.5)}),
+    "unlisted_viscosity": (cells(on=NEAR), {"viscosity": 0.02, **SPOT}, {"viscosity": 0.02 * exp(-5.0)}),
 }  # fmt: skip
 
 
@@ -199,6 +204,41 @@ def test_effect_hands_on_what_its_equation_says(name):
         if middle.ndim == 3 and middle.shape[:2] == (5, 5):
             middle = middle[2, 2]
         assert middle == pytest.approx(np.broadcast_to(number, middle.shape), rel=1e-9, abs=1e-15), key
+
+
+@pytest.mark.parametrize(
+    ("name", "elsewhere", "unchanged"),
+    [
+        ("patch_density", plant_cells(patch=0.0), {"phi": 2.0}),
+        ("bank_trend", cells(on=geometry(share_along=0.25)), {"rate": 0.1}),
+        ("bed_trend", cells(on=geometry(bank=1.0, share_along=0.25)), {"rate": 0.1}),
+        ("bed_trend", cells(on=geometry(planted=1.0, share_along=0.25)), {"rate": 0.1}),
+    ],
+)
+def test_an_effect_of_a_part_leaves_the_others_alone(name, elsewhere, unchanged):
+    values = {key: np.array([value]) for key, value in ROWS[name][1].items()}
+    found = library()[name].act(elsewhere, **values)
+    assert {key: float(np.ravel(found[key])[0]) for key in unchanged} == pytest.approx(unchanged)
+
+
+def test_less_than_nothing_is_nothing_at_a_place():
+    """Drag and viscosity that are taken away leave none, and no less."""
+    middle = {"x": 1.6, "y": 2.0, "length": 0.3, "width": 0.5}
+    values = {key: np.array([value]) for key, value in middle.items()}
+    drag = library()["unlisted_object"].act(cells(on=NEAR), drag=np.array([-2.0]), **values)["rate"]
+    added = library()["unlisted_viscosity"].act(cells(on=NEAR), viscosity=np.array([-0.3]), **values)["viscosity"]
+    assert not drag.any()
+    assert added[2, 2, 0] == pytest.approx(-0.01), "what is there already, and no more"
+
+
+def test_water_that_enters_at_a_place_is_all_the_water():
+    """Over a grid that holds the spot, q dx dy sums up to Q."""
+    line = 0.05 * np.arange(-100, 101)
+    wide = ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05}, (201, 201, 1)))
+    wide = replace(wide, x=line[:, None, None], y=line[None, :, None])
+    spot = {"x": np.array([0.3]), "y": np.array([-0.2]), "length": np.array([1.1]), "width": np.array([0.4])}
+    entering = library()["unlisted_inflow"].act(wide, discharge=np.array([0.7]), **spot)["inflow"]
+    assert entering.sum() * 0.05**2 == pytest.approx(0.7, rel=1e-6)
 
 
 def test_no_instrument_effect_touches_a_discharge():

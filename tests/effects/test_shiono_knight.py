@@ -47,7 +47,8 @@ def panels(bed, rows):
     other = np.broadcast_to((y > 0.5 * WIDTH).astype(float)[None, :, None], (COLUMNS, rows, 1))
     nothing, far = np.zeros_like(other), np.full_like(other, np.inf)
     return ChannelGeometry(
-        x=centres(COLUMNS * SPACING, COLUMNS)[:, None, None], y=y[None, :, None], dx=SPACING, dy=WIDTH / rows,
+        x=centres(COLUMNS * SPACING, COLUMNS)[:, None, None], y=y[None, :, None],
+        share_along=np.zeros((COLUMNS, 1, 1)), dx=SPACING, dy=WIDTH / rows,
         bed=bed[..., None], offset=nothing, half_width=nothing + 3.0, side_slope=nothing, bank=other, planted=nothing,
         front=far, edge=far, wake=far, patch=nothing - 1.0,
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """diagnosis.h5: what is written comes back exactly, and xarray reads it."""
 
+import json
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NO_LOCATION, NOTHING, a_diagnosis
+from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis
 
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Diagnosis
@@ -16,36 +17,45 @@ from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, wr
 
 HASH = "d" * 64
 ATTRIBUTES = {
-    "chi2", "chi2_first", "config", "config_hash", "correlation", "first_parameters", "first_scores", "flagged",
-    "format", "freedom", "grid_error", "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence",
-    "steps", "threshold", "verdict", "version", "where",
+    "chi2", "chi2_first", "config", "config_hash", "correlation", "field", "first_parameters", "first_scores",
+    "flagged", "format", "freedom", "grid_error", "instruments", "locations", "mapped_term", "model_error", "name",
+    "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "threshold", "verdict",
+    "version", "where",
 }  # fmt: skip
 OF_STATIONS = [
     "experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device",
 ]  # fmt: skip
 OF_AN_EFFECT = [
     "name", "title", "unit", "amplitude", "interval95", "score", "p_family", "visibility", "smallest_detectable",
-    "testable", "refitted", "objective", "mimicked_by", "likeness", "shapes", "off", "scale",
+    "testable", "refitted", "objective", "mimicked_by", "likeness", "shapes", "off", "scale", "support",
 ]  # fmt: skip
 DATASETS = {
     "stations": ["station", *OF_STATIONS, "prediction_first", "prediction", "error"],
-    "suspects": ["suspect", *(name for name in OF_AN_EFFECT if name != "interval95"), "low95", "high95"],
+    "suspects": [
+        "suspect",
+        *(name for name in OF_AN_EFFECT if name not in ("interval95", "support")),
+        "low95",
+        "high95",
+        "least",
+        "most",
+    ],
     "zones": ["zone_number", "experiment", "section", "zone", "stations", "mean", "standard_error", "chi2"],
     "places": ["place", "x", "y", "score"],
     "alike": ["name", "other", "cosine"],
 }
 IN_JSON = [
     "verdict", "sentence", "set", "groups", "not_excluded", "where", "effects", "steps", "remarks", "chi2", "threshold",
-    "noise", "flagged", "parameters", "first_parameters", "zones",
+    "noise", "flagged", "parameters", "first_parameters", "places", "instruments", "field", "model_error", "zones",
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, NO_LOCATION])
+@pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, NO_LOCATION, EVERY_KIND])
 def test_diagnosis_comes_back_as_it_went(tmp_path: Path, diagnosis: Diagnosis) -> None:
     write_diagnosis(tmp_path / "diagnosis.h5", diagnosis, "name: open-x\n", HASH)
     back = read_diagnosis(tmp_path / "diagnosis.h5", HASH)
     assert_same(back, diagnosis)
     assert diagnosis_json(back) == diagnosis_json(diagnosis)
+    json.dumps(diagnosis_json(back), allow_nan=False)
 
 
 def assert_same(back: object, there: object) -> None:
@@ -58,6 +68,10 @@ def assert_same(back: object, there: object) -> None:
         pd.testing.assert_frame_equal(back, there, check_column_type=False)
     elif isinstance(there, np.ndarray | float):
         np.testing.assert_array_equal(back, there)
+    elif isinstance(there, tuple):
+        assert len(back) == len(there)
+        for one, other in zip(back, there, strict=True):
+            assert_same(one, other)
     else:
         assert back == there
 

@@ -11,8 +11,7 @@ from vegglue.screening import score_test
 from vegglue.screening.family_wise_p import FITTED_AT, Family, family_of, family_p, log_family_p
 
 ROWS, SLOPES, PRINTS, NULLS = 60, 3, 40, 5000
-# Rates of false alarms that `detection` uses, of first and of later effects and spots of drag, but for 0.002, which
-# this many draws do not resolve.
+# Rates of false alarms, and what counts as detectable (`suspects`), down to what this many draws resolve.
 LEVELS = (0.05, 0.04, 0.01, 0.008)
 # What p may be off by itself: 8 % from the 150 of 3,000 draws it is fitted to, and a tail that falls more slowly than
 # that of any number of independent tests.

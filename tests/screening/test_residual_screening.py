@@ -11,34 +11,42 @@ from linear_baseline import at_best, stations_of
 from vegglue.arrays import Array
 from vegglue.case.config import load_case
 from vegglue.effects.definition import Amplitude
+from vegglue.screening.evidence import Kind, alarm_p
 from vegglue.screening.family_wise_p import Family
 from vegglue.screening.fingerprints import Fingerprints
+from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, screen
-from vegglue.screening.spatial_scan import DragSpots
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 STATION = stations_of(CASE, ("A", "B"), 6)
+STATION = STATION.assign(x=np.where(STATION["section"] == "A", 10.0, 14.0))
 EFFECTS, SPOTS, NULLS = 12, 8, 150
 AMPLITUDES = [Amplitude("a", "-", "", 1.0, 0.0 if column % 3 == 0 else -9.0, 9.0) for column in range(EFFECTS)]
 
 
 def changes() -> tuple[Array, Array, Array]:
-    """Slopes, fingerprints of effects and of spots (station, ...): what a standard deviation of each changes [m/s]."""
+    """Slopes, fingerprints of effects and of spots of all terms (station, ...): what a standard deviation of each
+    changes [m/s].
+    """
     random = np.random.default_rng(4)
-    sizes = len(CASE.parameters), EFFECTS, SPOTS
+    sizes = len(CASE.parameters), EFFECTS, SPOTS * len(EFFECT_AT_PLACE)
     slope, of_effects, of_spots = (0.02 * random.standard_normal((len(STATION), size)) for size in sizes)
     return slope, of_effects, of_spots
 
 
-def screened(values: Array, effects: int = EFFECTS) -> Screening:
+def screened(values: Array, effects: int = EFFECTS, flagged: tuple[int, ...] = ()) -> Screening:
     """With the first so many effects to be tested."""
     slope, of_effects, of_spots = changes()
     base = at_best(CASE, STATION, values, slope)
-    spots = DragSpots(np.arange(SPOTS), np.arange(SPOTS), 1.0, of_spots)
+    x, one = np.arange(float(SPOTS)), np.ones(SPOTS)
+    places = tuple(
+        Places(term, x, x, one, one, 1.0, of_spots[:, k * SPOTS : (k + 1) * SPOTS])
+        for k, term in enumerate(EFFECT_AT_PLACE)
+    )
     columns = [np.array([column]) for column in range(effects)]
     tested = columns, [{}] * effects, AMPLITUDES[:effects], of_effects[:, :effects]
-    known = Fingerprints(base.fitted.point, [], *tested, spots)
-    return screen(base, before=SimpleNamespace(fingerprints=known))
+    known = Fingerprints(base.fitted.point, [], *tested, places)
+    return screen(base, flagged, before=SimpleNamespace(fingerprints=known))
 
 
 def measured(random: np.random.Generator, missing: Array | float = 0.0) -> Array:
@@ -54,7 +62,7 @@ def nulls() -> list[Screening]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["effects", "spots", "stations"])
+@pytest.mark.parametrize("name", ["effects", "spots"])
 def test_chances_are_uniform_when_nothing_is_missing(nulls: list[Screening], name: str) -> None:
     """That which is told everywhere, that which is decided by where it decides."""
     families: list[Family] = [getattr(one, name) for one in nulls]
@@ -65,10 +73,57 @@ def test_chances_are_uniform_when_nothing_is_missing(nulls: list[Screening], nam
         assert scipy.stats.binomtest(int(np.sum(decided <= level)), decided.size, level).pvalue > 1e-3, level
 
 
+@pytest.mark.slow
+def test_alarms_are_as_rare_as_said_when_nothing_is_missing(nulls: list[Screening]) -> None:
+    """Over effects, places, readings, probes and gauges together."""
+    chances = np.array([alarm_p(one.kinds, one.errors, 1) for one in nulls])
+    assert scipy.stats.kstest(chances, "uniform").pvalue > 1e-3
+    for level in (0.1, 0.05, 0.01):
+        assert scipy.stats.binomtest(int(np.sum(chances <= level)), chances.size, level).pvalue > 1e-3, level
+
+
+def kind_of(screening: Screening, name: str) -> Kind:
+    return next(kind for kind in screening.kinds if kind.name == name)
+
+
+def test_every_kind_is_as_likely_before() -> None:
+    """A quarter each for effects, places and instruments, shared by terms and by kinds of instrument; the rest is left
+    for fields.
+    """
+    found = screened(measured(np.random.default_rng(0)))
+    prior = {kind.name: float(np.exp(kind.log_prior).sum()) for kind in found.kinds}
+    assert set(prior) == {"effect", *EFFECT_AT_PLACE, "reading", "position", "probe"}
+    assert prior["effect"] == pytest.approx(0.25)
+    assert sum(prior[term] for term in EFFECT_AT_PLACE) == pytest.approx(0.25)
+    assert {round(prior[term], 9) for term in EFFECT_AT_PLACE} == {0.0625}
+    assert sum(prior[name] for name in ("reading", "position", "probe")) == pytest.approx(0.25)
+
+
+def test_something_at_a_place_stands_out_with_its_term() -> None:
+    column = 2 * SPOTS + 3
+    found = screened(measured(np.random.default_rng(0), 3.0 * changes()[2][:, column]))
+    best = max(found.kinds, key=lambda kind: kind.total)
+    assert (best.name, best.best) == (list(EFFECT_AT_PLACE)[2], 3)
+    assert alarm_p(found.kinds, found.errors, 1) < 1e-3
+
+
+def test_a_probe_that_is_off_everywhere_is_one_instrument_and_no_effect() -> None:
+    values = measured(np.random.default_rng(3))
+    values[(STATION["y"] == 4.0).to_numpy()] += 0.04
+    found = screened(values)
+    best = max(found.kinds, key=lambda kind: kind.total)
+    assert best.name == "probe"
+    one = found.instruments["probe"][best.best]
+    assert set(one.readings) == set(np.flatnonzero(STATION["y"] == 4.0))
+
+
 def test_an_effect_that_is_missing_stands_out_alone() -> None:
     missing = 4.0 * changes()[1][:, 5]
     found = screened(measured(np.random.default_rng(0), missing))
     assert found.effects.best == 5
+    assert max(found.kinds, key=lambda kind: kind.total).name == "effect"
+    assert kind_of(found, "effect").best == 5
+    assert alarm_p(found.kinds, found.errors, 1) < 1e-3
     assert found.effects.log_p() < np.log(1e-6)
     assert found.effects.p_of(found.best_score(5)) == pytest.approx(1 / (1 + found.effects.maxima.size))
     gain = found.effects.scores[5] / found.effects.length[5]
@@ -79,13 +134,22 @@ def test_where_every_effect_is_at_work_already_none_stands_out() -> None:
     found = screened(measured(np.random.default_rng(0)), effects=0)
     assert found.effects.log_p() == 0.0
     assert found.ranking == []
-    assert found.stations.log_p() > np.log(0.01)
+    assert alarm_p(found.kinds, found.errors, 1) > 0.01
 
 
-def test_an_outlier_is_a_station_and_no_effect() -> None:
+def test_an_outlier_is_a_reading_and_no_effect() -> None:
     values = measured(np.random.default_rng(3))
     values[7] += 0.15
     found = screened(values)
-    assert found.stations.best == 7
-    assert found.stations.log_p() < found.effects.log_p() - 3.0
-    assert found.stations.without((7,)).best != 7
+    best = max(found.kinds, key=lambda kind: kind.total)
+    assert best.name == "reading"
+    assert found.instruments["reading"][best.best].readings == (7,)
+    assert best.total > kind_of(found, "effect").total + 3.0
+
+
+def test_what_was_set_aside_is_not_set_aside_again() -> None:
+    values = measured(np.random.default_rng(3))
+    values[7] += 0.15
+    again = kind_of(screened(values, flagged=(7,)), "reading")
+    assert again.size[7] == 0.0
+    assert again.best != 7

@@ -132,7 +132,7 @@ def study(trial: Trial, config: Path) -> dict[str, Any]:
     except InputError as error:
         return record | {"left_out": str(error), "visible": not isinstance(error, VisibilityError)}
     model = replace(ground.model, station=station)
-    found = diagnose_model(model, ground.here.z)
+    found = diagnose_model(model)
     record |= _said(answer, found) | {"seconds": time.process_time() - began}
     if found.steps and trial.number % LOOKED_INTO == 0:
         record |= held_out(model, found)
@@ -216,7 +216,7 @@ def measured_again(
     values += error * np.random.default_rng((seed, 3)).standard_normal(len(more))
     station = pd.concat([model.station, more.assign(value=values, standard_error=error, used=True)], ignore_index=True)
     case = model.case.model_copy(update={"experiments": experiments})
-    again = diagnose_model(replace(model, case=case, station=station), base.fitted.point.z)
+    again = diagnose_model(replace(model, case=case, station=station))
     return {
         "plan": best.plan.name, "now": best.now, "then": best.then, "before": len(found.steps[0].groups),
         "after": len(again.steps[0].groups) if again.steps else 0, "verdict": again.verdict.kind, "set": again.set,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_diagnosis, a_suspect
+from diagnoses import a_diagnosis, a_location, a_suspect
 from reach import said_to
 
 from vegglue.calibration.noise import noise_of, with_grid_error
@@ -15,8 +15,8 @@ from vegglue.cli.main import main
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import Location, Step
-from vegglue.screening.candidates import with_effect
+from vegglue.results.diagnosis import Step
+from vegglue.screening.candidates import cause_of, with_effect
 from vegglue.screening.score_test import project
 from vegglue.storage.result_files import write_diagnosis
 from vegglue.twins.hidden_effect import TwinBase
@@ -106,6 +106,24 @@ def test_a_size_that_is_given_is_kept(ground: TwinBase) -> None:
     assert above[row] / station["standard_error"][row] == pytest.approx(-8.0, abs=4.0)
 
 
+@pytest.mark.parametrize(("patch", "number"), [("p1", 1.0), ("p2", 2.0)])
+def test_a_patch_that_is_named_is_the_one_that_hides_it(ground: TwinBase, patch: str, number: float) -> None:
+    station, answer = measured_twin(ground, [f"patch_density[{patch}]=2"], 6.0, "white", 4)
+    (hidden,) = answer.hidden
+    assert (hidden.name, hidden.shapes) == (f"patch_density[{patch}]", {"patch": number})
+    candidate = candidate_named(ground.model.case, station, hidden.name)
+    trace = responses(ground.model, ground.here, [cause_of(ground.model.case, candidate, {})])[:, 0]
+    changed = (station["value"] - ground.there.prediction).to_numpy()
+    assert np.corrcoef(trace, changed)[0, 1] > 0.5, "the change is that of the patch"
+
+
+def test_something_unlisted_at_a_named_place_stands_there(ground: TwinBase) -> None:
+    _, answer = measured_twin(ground, ["unlisted_object[x15,y0.5]"], 6.0, "white", 4)
+    (hidden,) = answer.hidden
+    assert hidden.shapes == {"x": 15.0, "y": 0.5, "length": 0.5, "width": 0.5}
+    assert hidden.signal == pytest.approx(6.0, rel=0.1)
+
+
 @pytest.mark.slow
 def test_the_seed_decides_everything(ground: TwinBase) -> None:
     first, again = (measured_twin(ground, ["?"], 6.0, "white", 5) for _ in range(2))
@@ -166,7 +184,7 @@ def test_marks_of_every_kind() -> None:
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].amplitude is False
-    location = Location(30.0, 0.4, ("low",), 1.0, 5.0)
+    location = a_location(x=30.0, y=0.4)
     nowhere = a_diagnosis(verdict={"kind": "none-of-these", "location": location})
     assert marks(an_answer(thing), nowhere)[0].found
 

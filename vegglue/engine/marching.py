@@ -27,7 +27,7 @@ REST_RATE, STEPS_BETWEEN_CHECKS = 1e-9, 100
 # Step of central differences in z [standard deviations of the prior].
 MARCHED_DIFFERENCE_STEP = 0.02
 # Small changes of a term in one cell, in its unit: large against what is left of the march when it ends.
-MARCHED_CHANGE: dict[Term, float] = {"friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-5, "viscosity": 1e-3}
+MARCHED_CHANGE: dict[Term, float] = {"friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-4, "viscosity": 1e-3}
 
 
 def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
@@ -86,7 +86,9 @@ def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: f
 def _responses_to_cells(
     model: Model, point: Point, experiment: str, terms: Sequence[Term], time_step: float, longest: float
 ) -> dict[Term, Array]:
-    """(f(change) - f(-change)) / (2 change) for every cell of the grid: a member each."""
+    """(f(change) - f(-change)) / (2 change) for every cell of the grid: a member each; (f(change) - f(0)) / change for
+    water that enters, which comes without momentum, while water that leaves takes its own along.
+    """
     nx, ny = model.site.bed.shape
     one = _problem(model, experiment, point.z[None])
     geometry = channel_geometry(model.case, model.site, experiment)
@@ -94,10 +96,11 @@ def _responses_to_cells(
     found: dict[Term, Array] = {}
     for term in terms:
         predictions = []
-        for change in (MARCHED_CHANGE[term], -MARCHED_CHANGE[term]):
+        ahead, behind = MARCHED_CHANGE[term], 0.0 if term == "inflow" else -MARCHED_CHANGE[term]
+        for change in (ahead, behind):
             problem = with_changed_term(one, geometry, term, change * np.eye(nx * ny).reshape(nx, ny, nx * ny))
             predictions.append(_read(model, experiment, problem, _rested(problem, start, time_step, longest)))
-        response = (predictions[0] - predictions[1]).T / (2.0 * MARCHED_CHANGE[term])
+        response = (predictions[0] - predictions[1]).T / (ahead - behind)
         found[term] = response.reshape(-1, nx, ny)
     return found
 

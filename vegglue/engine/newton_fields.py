@@ -2,10 +2,11 @@
 
     d prediction_n / d a_c = - l_n . dR/da_c,    J' l_n = d prediction_n / d state
 
-A change in a cell reaches the residual of its neighbours only, so that every STRIDE-th cell along and across is changed
-at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974, doi:10.1093/imamat/13.1.117;
-not checked against it). Beside the inflow, where a bed changes how water is spread over the whole inflow, this is not
-so: there an answer is that of the cells around it together.
+A change in a cell reaches the residual of its neighbours only, so that every CELL_STRIDE-th cell along and across is
+changed at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974,
+doi:10.1093/imamat/13.1.117; not checked against it). Beside the inflow, where a
+bed changes how water is spread over the whole inflow, this is not so: there an answer is that of the cells around it
+together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +27,7 @@ from vegglue.solver.tangent import adjoints
 from vegglue.solver.wet_band import widen
 
 # Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
-STRIDE = 5
+CELL_STRIDE = 5
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
 SMALL_CHANGE: dict[Term, float] = {"friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4}
 
@@ -46,7 +47,7 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
     for term in terms:
         small = SMALL_CHANGE[term]
         many = with_changed_term(part, geometry, term, small * lattice)
-        change = (residual(many, np.repeat(flow.state, STRIDE**2, axis=3)) - without) / small
+        change = (residual(many, np.repeat(flow.state, CELL_STRIDE**2, axis=3)) - without) / small
         wide = np.zeros((weights.shape[3], grid.x.size, grid.y.size))
         wide[:, :, slice(*flow.band)] = _told_apart(sensitivity, change.astype(np.float32))
         found[term] = wide
@@ -54,16 +55,16 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
 
 
 def _lattice(nx: int, ny: int) -> Array:
-    """1 in the cells that are changed in member m, (nx, ny, STRIDE^2): those with i % STRIDE, j % STRIDE its own."""
-    i, j = np.arange(nx)[:, None, None] % STRIDE, np.arange(ny)[None, :, None] % STRIDE
-    member = np.arange(STRIDE**2)
-    return ((i == member // STRIDE) & (j == member % STRIDE)).astype(float)
+    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): every so many-th both ways."""
+    i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
+    member = np.arange(CELL_STRIDE**2)
+    return ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
 
 
 def _told_apart(sensitivity: Single, change: Single) -> Single:
-    """-l . dR of every cell (n, nx, ny), summed over the window of STRIDE cells around it.
+    """-l . dR of every cell (n, nx, ny), summed over the window of CELL_STRIDE cells around it.
 
-    sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, STRIDE^2).
+    sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, CELL_STRIDE^2).
     """
     nx, _, ny, n = sensitivity.shape
     found = np.zeros((nx, ny, n), dtype=np.float32)
@@ -74,12 +75,17 @@ def _told_apart(sensitivity: Single, change: Single) -> Single:
 @compiled
 def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
     nx, equations, ny, n = sensitivity.shape
-    half = STRIDE // 2
+    half = CELL_STRIDE // 2
     for i in range(nx):
+        # Beside an edge the window is shifted inwards, so that every change is counted once.
+        first = 0 if i < CELL_STRIDE else i - half
+        last = nx if i >= nx - CELL_STRIDE else i + half + 1
         for j in range(ny):
-            member = (i % STRIDE) * STRIDE + j % STRIDE
-            for a in range(max(i - half, 0), min(i + half + 1, nx)):
-                for b in range(max(j - half, 0), min(j + half + 1, ny)):
+            member = (i % CELL_STRIDE) * CELL_STRIDE + j % CELL_STRIDE
+            lowest = 0 if j < CELL_STRIDE else j - half
+            highest = ny if j >= ny - CELL_STRIDE else j + half + 1
+            for a in range(first, last):
+                for b in range(lowest, highest):
                     for k in range(equations):
                         weight = change[a, k, b, member]
                         if weight != 0.0:

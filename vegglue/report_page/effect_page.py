@@ -20,6 +20,7 @@ CAUSES = {
     "experiment": "a cause of its own in each experiment",
     "section": "a cause of its own at each section",
     "device": "a cause of its own in each device",
+    "patch": "a cause of its own in each patch",
 }
 
 

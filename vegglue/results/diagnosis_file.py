@@ -41,7 +41,7 @@ AT_STATIONS = ("prediction_first", "prediction", "error")
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
-    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of drag, and
+    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places, and
     cosines of fingerprints.
     """
     at_stations = diagnosis.predictions
@@ -184,8 +184,8 @@ def _step_from(step: dict[str, Any]) -> Step:
 
 def _row(suspect: Suspect) -> dict[str, Any]:
     row = flat_suspect(suspect)
-    low, high = row.pop("interval95")
-    return row | {"low95": low, "high95": high, "shapes": json.dumps(suspect.shapes)}
+    ends = dict(zip(("low95", "high95", "least", "most"), (*row.pop("interval95"), *row.pop("support")), strict=True))
+    return row | ends | {"shapes": json.dumps(suspect.shapes)}
 
 
 def _suspect_from(row: Mapping[str, Any]) -> Suspect:
@@ -196,6 +196,7 @@ def _suspect_from(row: Mapping[str, Any]) -> Suspect:
         amplitude=AmplitudeEstimate(
             value=row["amplitude"],
             interval95=(row["low95"], row["high95"]),
+            support=(row["least"], row["most"]),
             **{name: row[name] for name in ("unit", "off", "scale", "refitted", "objective")},
         ),
         test=ScoreTest(row["score"], row["p_family"]),

@@ -1,5 +1,5 @@
-"""Candidates for effects that a calibrated model lacks, their fingerprints, and score tests of the residual.
+"""Candidates for effects that a calibrated model lacks, their fingerprints, score tests and evidence.
 
-May import: effects, case, site, measurements, engine, calibration.
-Open first: candidates.py, residual_screening.py.
+May import: effects, case, site, measurements, flow, engine, calibration.
+Open first: candidates.py, residual_screening.py, evidence.py.
 """

@@ -118,12 +118,15 @@ def _any(model: Model, random: np.random.Generator) -> Candidate:
 
 
 def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.Generator) -> dict[str, float]:
-    """Between the values that a search tries, not on them; something unlisted stands anywhere on the floor."""
+    """Between the values that a search tries, not on them, but for those that say where a candidate acts; something
+    in no list stands anywhere on the floor.
+    """
     if listed:
-        return {
+        drawn = {
             shape.name: float(random.uniform(min(shape.grid), max(shape.grid))) if shape.grid else shape.default
             for shape in candidate.effect.shapes
         }
+        return drawn | dict(candidate.fixed)
     used = model.station[model.station["used"].to_numpy(bool)]
     low, high = model.case.grid.x
     x = random.uniform(low + 0.15 * (high - low), low + 0.8 * (high - low))

@@ -46,7 +46,7 @@ def scour_hole(geometry: ChannelGeometry, depth: Array, x: Array, y: Array, radi
     return {"bed": -depth * np.exp(-_away(geometry, x, y, radius))}
 
 
-PLACE = (
+OBJECT_PLACE = (
     Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
     Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
     Shape("radius", "m", "its radius r", 0.6, 0.01, 100.0),
@@ -55,7 +55,9 @@ DRAG = Amplitude("drag", "1/m", "drag c per length of flow through it", 1.0, 0.0
 
 
 def _unlisted(name: str, stage: Stage, title: str, act: Act, amplitude: Amplitude) -> Effect:
-    return Effect(name, stage, title, str(act.__doc__), act, amplitude, PLACE, source="definition", mirrored=False)
+    return Effect(
+        name, stage, title, str(act.__doc__), act, amplitude, OBJECT_PLACE, source="definition", mirrored=False
+    )
 
 
 LOSS = Amplitude("loss", "1/s", "rate a of loss", 0.3, 0.0, 50.0)

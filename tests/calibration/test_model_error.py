@@ -1,0 +1,167 @@
+"""The model's own error: a smooth random field of friction and bed, the same in all experiments."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linear_baseline import at_best, stations_of
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import with_own_error
+from vegglue.calibration.model_error import (
+    CellResponses,
+    bumps,
+    cell_responses,
+    field_columns,
+    model_error_columns,
+    responses_to_bumps,
+)
+from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case, ModelError
+from vegglue.effects.library import library
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.model import coarser, model_of
+from vegglue.measurements.observations import read_observations
+from vegglue.screening.candidates import effect_entry, place_candidate
+from vegglue.site.grid import Grid
+
+CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
+CASE_ALLOWS = ModelError(friction=0.05, bed=0.01)
+NX, NY = 40, 24
+GRID = Grid(0.5 * np.arange(NX), 0.25 * np.arange(NY) - 3.0, 0.5, 0.25)
+
+
+def seen_directly(cells: list[tuple[int, int]]) -> CellResponses:
+    """Predictions that are the field in some cells."""
+    of = np.zeros((len(cells), NX, NY), dtype=np.float32)
+    for station, (i, j) in enumerate(cells):
+        of[station, i, j] = 1.0
+    return CellResponses(GRID, {"friction": of})
+
+
+@pytest.mark.parametrize(("length", "width"), [(2.0, 1.0), (1.0, 1.0), (4.0, 0.5)])
+def test_the_field_has_its_standard_deviation_and_dies_out(length: float, width: float) -> None:
+    """In the middle of the grid, on bumps and between them; far apart it is of its own."""
+    cells = [(i, j) for i in (16, 18, 19, 21) for j in (10, 12, 13)]
+    columns = field_columns(seen_directly([*cells, (1, 1)]), "friction", bumps(GRID, length, width))
+    covariance = columns @ columns.T
+    assert np.diag(covariance)[: len(cells)] == pytest.approx(1.0, rel=0.05)
+    near = covariance[0, 1]
+    assert 0.0 < near < 1.0
+    assert np.abs(covariance[-1, :-1]).max() < 0.01
+    assert np.linalg.eigvalsh(covariance).min() > -1e-9
+
+
+def test_a_field_is_as_smooth_as_its_bumps() -> None:
+    """exp(-d^2 / 2 l^2), as of bumps exp(-d^2 / l^2) that stand close."""
+    row = [(i, 12) for i in range(14, 26)]
+    columns = field_columns(seen_directly(row), "friction", bumps(GRID, 2.0, 1.0))
+    found = columns @ columns[0]
+    d = GRID.x[14:26] - GRID.x[14]
+    assert found == pytest.approx(np.exp(-(d**2) / (2.0 * 2.0**2)), abs=0.06)
+
+
+def test_bumps_are_no_smaller_than_cells() -> None:
+    small = bumps(GRID, 0.01, 0.01)
+    assert (small.length, small.width) == pytest.approx((1.5 * 0.5, 1.5 * 0.25))
+    assert small.x[[0, -1]] == pytest.approx(GRID.x[[0, -1]])
+
+
+def test_responses_to_bumps_are_sums_over_cells() -> None:
+    random = np.random.default_rng(1)
+    some = CellResponses(GRID, {"bed": random.standard_normal((2, NX, NY)).astype(np.float32)})
+    over = bumps(GRID, 3.0, 1.0)
+    found = responses_to_bumps(some, "bed", over)
+    k, m = 2, 3
+    shape = np.exp(-(((GRID.x[:, None] - over.x[k]) / 3.0) ** 2) - ((GRID.y[None] - over.y[m]) / 1.0) ** 2)
+    assert found[1, k, m] == pytest.approx(float(np.sum(some.of["bed"][1] * shape)), rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def flowing() -> tuple[Model, Point]:
+    """The channel of twins on cells of twice the size."""
+    model = coarser(model_of(CASE, read_observations(CASE)))
+    assert model is not None
+    point = linearise(model, np.zeros(len(model.names)))
+    assert point is not None
+    return model, point
+
+
+def test_the_error_of_predictions_is_that_of_friction_and_of_bed(flowing: tuple[Model, Point]) -> None:
+    both, friction, bed = (
+        (columns := model_error_columns(*flowing, ModelError(friction=f, bed=b))) @ columns.T
+        for f, b in ((0.05, 0.01), (0.1, 0.0), (0.0, 0.02))
+    )
+    assert both == pytest.approx(0.25 * (friction + bed))
+    assert (np.diag(friction) > 0.0).all()
+    assert (np.diag(bed) > 0.0).all()
+    assert model_error_columns(*flowing, ModelError()).shape == (len(flowing[0].station), 0)
+
+
+def test_what_one_experiment_sees_another_sees_too(flowing: tuple[Model, Point]) -> None:
+    """The bed is the same at low and at high water: errors of neighbours in different experiments are correlated."""
+    model, point = flowing
+    columns = model_error_columns(model, point, ModelError(bed=0.01))
+    station = model.station.reset_index(drop=True)
+    velocity = station[station["kind"] == "velocity"]
+    low, high = (velocity[velocity["experiment"] == name].index.to_numpy() for name in list(CASE.experiments)[:2])
+    same = [(a, b) for a in low for b in high if (station.loc[a, ["x", "y"]] == station.loc[b, ["x", "y"]]).all()]
+    assert len(same) > 5
+    unit = columns / np.linalg.norm(columns, axis=1, keepdims=True)
+    assert np.median([unit[a] @ unit[b] for a, b in same]) > 0.5
+
+
+def test_responses_of_all_experiments_stand_in_the_rows_of_their_stations(flowing: tuple[Model, Point]) -> None:
+    model, point = flowing
+    found = cell_responses(model, point, ("friction",)).of["friction"]
+    for experiment in CASE.experiments:
+        rows = model.rows[experiment]
+        alone = model.engine.responses_to_cells(model, point, experiment, ["friction"])["friction"]
+        assert found[rows] == pytest.approx(alone, rel=1e-5, abs=1e-9)
+
+
+def test_the_error_stands_in_the_covariance() -> None:
+    noise = noise_of(stations_of(CASE, ("A",), 4).assign(value=0.5))
+    columns = 0.02 * np.random.default_rng(3).standard_normal((noise.rows.size, 5))
+    after = with_model_error(noise, columns)
+    assert covariance_of(after) == pytest.approx(covariance_of(noise) + columns @ columns.T)
+    assert after.lower @ after.lower.T == pytest.approx(covariance_of(after))
+    assert np.linalg.eigvalsh(after.model_error).min() > -1e-12
+
+
+def test_something_unlisted_in_the_model_may_differ_from_its_spot(flowing: tuple[Model, Point]) -> None:
+    """In proportion to its size, and around it alone; what is off may not."""
+    model, point = flowing
+    place = {"x": 15.0, "y": 0.2, "length": 0.6, "width": 0.5}
+
+    def columns(drag: float) -> Array:
+        entry = effect_entry(place_candidate(library()["unlisted_object"], place), drag, place)
+        changed = replace(model, case=CASE.model_copy(update={"effects": {"thing": entry}}))
+        return model_error_columns(changed, point, CASE_ALLOWS)
+
+    without = model_error_columns(model, point, CASE_ALLOWS)
+    own, twice, off = (columns(drag)[:, without.shape[1] :] for drag in (0.2, 0.4, 0.0))
+    assert twice == pytest.approx(2.0 * own)
+    assert not off.any()
+    assert 1 < own.shape[1] < 60, "bumps around the place, not all over the channel"
+
+
+def linear(case: Case) -> tuple[Array, Array]:
+    random = np.random.default_rng(5)
+    station = stations_of(case, ("A", "B"), 4)
+    return 0.02 * random.standard_normal(len(station)), 0.05 * random.standard_normal((len(station), 4))
+
+
+def test_no_allowance_gives_the_numbers_without_it_bit_by_bit() -> None:
+    values, slope = linear(CASE)
+    base = at_best(CASE, stations_of(CASE, ("A", "B"), 4), values, slope)
+    case = CASE.model_copy(update={"model_error": ModelError()})
+    after = with_own_error(replace(base, model=replace(base.model, case=case)))
+    assert CASE.model_error == ModelError(), "none is allowed unless a config says so"
+    assert after.noise is base.noise
+    assert after.fitted is base.fitted
+    assert not base.noise.model_error.any()
+    zero = with_model_error(base.noise, np.zeros((base.noise.rows.size, 0)))
+    assert np.array_equal(zero.lower, base.noise.lower)
