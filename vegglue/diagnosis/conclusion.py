@@ -23,6 +23,7 @@ from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
     FieldFound,
+    FieldMapKept,
     FirstScreening,
     Misfit,
     ModelErrorUsed,
@@ -50,7 +51,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit, errors, model_error = _misfit(first, last, found), _errors(last, found), _model_error(last)
-    field = _field(first, last, found, misfit)
+    field, field_map = _field(first, last, found, misfit)
     silent = not (found.steps or found.places or found.undecided)
     grounds = Grounds(
         errors=errors,
@@ -88,6 +89,7 @@ def concluded(
         instruments=found.instruments,
         field=field,
         model_error=model_error,
+        field_map=field_map,
     )
 
 
@@ -135,21 +137,23 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
     return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
 
 
-def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -> FieldFound | None:
-    """A smooth field of one term, where it explains the misfit of the first model better than all that was accepted, or
-    closes a misfit in which nothing was; None where there is nothing to explain.
+def _field(
+    first: Screening, last: Screening, found: Findings, misfit: Misfit
+) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
+    """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
+    accepted, or closes a misfit in which nothing was; None where there is nothing to explain.
     """
     if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= POOR):
-        return None
+        return None, None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
     ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
     if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS):
-        return None
+        return None, None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid
     i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)
-    return FieldFound(
+    most = FieldFound(
         term=best.term,
         size=best.size,
         length=best.over.length,
@@ -160,6 +164,7 @@ def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -
         x=float(grid.x[i]),
         y=float(grid.y[j]),
     )
+    return most, FieldMapKept(grid.x, grid.y, mapped.value, mapped.error)
 
 
 def _neighbours_aside(screening: Screening, found: Findings) -> bool:

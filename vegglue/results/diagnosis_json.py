@@ -58,6 +58,7 @@ def flat_suspect(suspect: Suspect) -> dict[str, Any]:
         "shapes": suspect.shapes,
         "off": amplitude.off,
         "scale": amplitude.scale,
+        "support": amplitude.support,
     }
 
 

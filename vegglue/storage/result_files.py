@@ -18,7 +18,7 @@ from vegglue.results.posterior_file import posterior_attributes, posterior_from,
 from vegglue.storage.hdf5 import open_hdf5, read_groups, stored_attribute, write_whole
 from vegglue.storage.resume import part_file
 
-POSTERIOR_FORMAT, DIAGNOSIS_FORMAT = "vegglue posterior 1", "vegglue diagnosis 2"
+POSTERIOR_FORMAT, DIAGNOSIS_FORMAT = "vegglue posterior 1", "vegglue diagnosis 3"
 Result = TypeVar("Result")
 
 
