@@ -28,8 +28,6 @@ MARKS: dict[str, tuple[str, str, str]] = {
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
 }
-# Place across the panel of scores [-], 0 left to 1 right, from which a mark would stand under the key.
-KEY_FROM = 0.45
 # Panels side by side: with five, the ticks of each still have room.
 FINGERPRINT_COLUMNS = 5
 # One for each experiment, told apart without colour.
@@ -71,10 +69,9 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
                     label="when looked at last")] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
     if handles:
-        scores.legend(handles=handles, loc="lower right", frameon=False, fontsize=SMALL)
-        lowest = np.nan_to_num(first)[-len(handles) - 1 :]
-        if lowest.max() > KEY_FROM**2 * reach:  # rows of their own below the marks
-            scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), -0.9)
+        scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), -0.9)  # rows of their own below the marks
+        key = scores.legend(handles=handles, loc="lower right", fontsize=SMALL, framealpha=1.0)
+        key.get_frame().set(facecolor=COLOUR["paper"], linewidth=0)  # hides the threshold, which runs through it
     visible.barh(rows, suspects["visibility"], height=0.5, color=COLOUR["narrow"])
     visible.set(xlim=(0, 1), xlabel="visibility [–]", xticks=[0, 0.5, 1])
     for axes in (scores, visible):
