@@ -14,12 +14,10 @@ from vegglue.report_page.cause_words import (
     against_rivals,
     field_in_words,
     instrument_rows,
-    model_error_number,
     place_rows,
 )
-from vegglue.report_page.diagnosis_words import diagnosis_section
 from vegglue.report_page.run import Run
-from vegglue.results.causes import FieldMapKept, ModelErrorUsed
+from vegglue.results.causes import FieldMapKept
 from vegglue.results.diagnosis import Diagnosis
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
@@ -35,7 +33,8 @@ def test_odds_are_told_against_the_nearest_rivals() -> None:
     assert against_rivals(a_location(odds={"wind": 1e9, "bed": 210.4, "inflow": 4.0})) == (
         "4.0 to 1 against inflow, 210 to 1 against bed"
     )
-    assert against_rivals(a_location(odds={"wind": 1e9})) == "over 1,000 to 1 against wind"
+    assert against_rivals(a_location(odds={"wind": 1e9})) == "over 1,000 to 1 against all else"
+    assert against_rivals(a_location(odds={"position": 20.0, "wind": 1e9})) == "20 to 1 against a probe that is off"
     assert against_rivals(a_location(odds={})) == ""
 
 
@@ -96,11 +95,3 @@ def test_a_field_is_drawn_in_its_unit(tmp_path: Path, term: str, value: float, s
     assert said in picture.caption
     assert "50" in picture.caption.split("nothing, ")[1], "half of it lies within two standard errors"
     assert not list(field_picture(run_in(tmp_path), NOTHING))
-
-
-def test_the_model_error_is_told_beside_what_is_allowed() -> None:
-    number = model_error_number(ModelErrorUsed(0.05, 0.01, 0.6, 0.3))
-    assert number.value.replace("\u202f", " ") == "3.0 % and 0.60 cm"
-    assert "5.0\u202f% and 1.0" in number.remark
-    assert model_error_number(ModelErrorUsed(0.05, 0.01, 0.0, 0.3)).value == "none"
-    assert len(diagnosis_section(a_diagnosis()).numbers) == len(diagnosis_section(NOTHING).numbers) + 1

@@ -1,4 +1,4 @@
-"""What the report says of causes that are no listed effect: places, instruments, fields, the model's own error."""
+"""What the report says of causes that are no listed effect: places, instruments, fields."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.figures.places import TERM_SIGNS
-from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
-from vegglue.report_page.key_numbers import KeyNumber
-from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, ModelErrorUsed
+from vegglue.figures.typography import NARROW, count, fixed, interval, short, unit_html
+from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location
 
 # Quantity and unit of a field, as they are told.
 FIELDS: Mapping[str, tuple[str, str]] = {
@@ -22,6 +21,13 @@ OF_KIND = {
     "position": "probe, in all experiments",
     "probe": "probe, in all sections",
     "gauge": "gauge, in all experiments",
+}
+# Rivals of a place that do not go by the name of an effect or a term.
+RIVAL_WORDS = {
+    "reading": "one bad reading",
+    "position": "a probe that is off",
+    "probe": "a probe that is off in all sections",
+    "gauge": "a gauge that is off",
 }
 # Rivals of a place whose odds are told: the nearest ones; and odds above which the figure no longer says more.
 RIVALS_TOLD, TOLD_ODDS = 2, 1000.0
@@ -77,9 +83,12 @@ def odds_in_words(odds: float) -> str:
 
 
 def against_rivals(place: Location) -> str:
-    """'200 to 1 against drag, over 1,000 to 1 against streamlining': the nearest rivals, '' without."""
+    """'200 to 1 against drag, 410 to 1 against streamlining': the nearest rivals, '' without."""
     nearest = sorted(place.odds.items(), key=lambda one: one[1])[:RIVALS_TOLD]
-    return ", ".join(f"{odds_in_words(odds)} against {name}" for name, odds in nearest)
+    if nearest and nearest[0][1] > TOLD_ODDS:
+        return f"{odds_in_words(nearest[0][1])} against all else"
+    told = [(name, odds) for name, odds in nearest if odds <= TOLD_ODDS]
+    return ", ".join(f"{odds_in_words(odds)} against {RIVAL_WORDS.get(name, name)}" for name, odds in told)
 
 
 def size_of(place: Location) -> str:
@@ -154,13 +163,3 @@ def field_in_words(diagnosis: Diagnosis) -> str:
 def field_scale(term: str) -> float:
     """By which values of a field are multiplied before they are told: friction in %."""
     return 100.0 if FIELDS[term][1] == "%" else 1.0
-
-
-def model_error_number(used: ModelErrorUsed) -> KeyNumber:
-    """'3 % and 0.6 cm', of friction and bed, beside what is allowed."""
-    needed = _both(used, used.needed) if used.needed else "none"
-    return KeyNumber("error of the model itself", needed, f"needed of {_both(used, 1.0)} allowed, friction and bed")
-
-
-def _both(used: ModelErrorUsed, share: float) -> str:
-    return f"{percent(share * used.friction)} and {short(100 * share * used.bed, 2)}{NARROW}cm"

@@ -9,7 +9,7 @@ from vegglue.arrays import Array
 from vegglue.figures.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of
-from vegglue.report_page.cause_words import InstrumentRow, PlaceRow, instrument_rows, model_error_number, place_rows
+from vegglue.report_page.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.report_page.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
@@ -192,5 +192,4 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
         KeyNumber("effects tried", f"{len(diagnosis.suspects)}", f"{apart} of them untestable with these data"),
         KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),
         KeyNumber("error of the grid", f"{short(1000 * errors.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
-        *([] if diagnosis.model_error is None else [model_error_number(diagnosis.model_error)]),
     ]
