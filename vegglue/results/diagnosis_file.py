@@ -44,8 +44,8 @@ FIELD_UNITS = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
-    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places,
-    cosines of fingerprints, and the map of the field where there is one.
+    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places, and
+    cosines of fingerprints.
     """
     at_stations = diagnosis.predictions
     stations = table_group(at_stations.station, "station", STATION_UNITS)
@@ -71,6 +71,7 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
 
 
 def _field_group(diagnosis: Diagnosis) -> dict[str, Group]:
+    """The map of the field, where there is one."""
     mapped, found = diagnosis.field_map, diagnosis.field
     if mapped is None or found is None:
         return {}
