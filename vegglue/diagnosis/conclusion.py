@@ -7,6 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.stats
 
+from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2, interval95
 from vegglue.calibration.noise import covariance_of
 from vegglue.diagnosis.competition import tempering
@@ -74,10 +75,7 @@ def concluded(
         misfit=misfit,
         errors=errors,
         first_screening=_first_screening(first),
-        parameters=ParameterEstimates(
-            {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
-            {name: interval95(base.model, base.fitted, name) for name in base.model.names},
-        ),
+        parameters=_parameters(before, base),
         predictions=Predictions(
             station=before.model.station,
             first=before.fitted.point.prediction,
@@ -108,6 +106,13 @@ def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:
         freedom=freedom,
         p=chance_of_misfit(misfit, freedom),
         zones=misfit_zones(before.model, before.noise, before.fitted.point),
+    )
+
+
+def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
+    return ParameterEstimates(
+        {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
+        {name: interval95(after.model, after.fitted, name) for name in after.model.names},
     )
 
 
