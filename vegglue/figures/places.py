@@ -17,7 +17,7 @@ from matplotlib.patches import Ellipse, Polygon
 from vegglue.arrays import Array
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, canvas, label, styled
-from vegglue.figures.typography import fixed, short
+from vegglue.figures.typography import fixed
 
 # What a spot of each term means where its score is positive, and where it is negative.
 TERM_SIGNS: Mapping[str, tuple[str, str]] = {
@@ -34,6 +34,9 @@ SHADES = (0.22, 0.5, 0.85)
 TOLD_FROM, FADED = 2.0, 0.3
 # Blue is more and vermilion less, as in all maps; light grey between, told from both in every colour blindness.
 LESS_TO_MORE = LinearSegmentedColormap.from_list("less_to_more", [COLOUR["measured"], "#f3f2ef", COLOUR["model"]])
+
+# Pale enough for stations and patches on top.
+GREYS = LinearSegmentedColormap.from_list("greys", ["#f3f2ef", COLOUR["muted"]])
 
 
 @dataclass(frozen=True)
@@ -170,11 +173,11 @@ def draw_field_map(field: DrawnField, marks: PlanMarks) -> Figure:
     if told.any() and not told.all():
         upper.contour(field.x, field.y, told.T.astype(float), levels=[0.5], colors=EDGE_COLOUR, linewidths=0.7)
     _colour_bar(upper, mesh, f"{field.what} [{field.unit}]")
-    mesh = lower.pcolormesh(field.x, field.y, field.error.T, cmap="cividis", vmin=0.0, rasterized=True)
+    mesh = lower.pcolormesh(field.x, field.y, field.error.T, cmap=GREYS, vmin=0.0, rasterized=True)
     _colour_bar(lower, mesh, f"standard error [{field.unit}]")
     _paint_marks(upper, marks)
     _paint_marks(lower, PlanMarks(marks.patches, marks.stations, marks.aside))
-    text = f"outlined: more than {short(TOLD_FROM)} standard errors; pale: less"
+    text = f"outlined: more than {TOLD_FROM:g} standard errors; pale: less"
     upper.text(1.0, 1.02, text, transform=upper.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
     for axes in (upper, lower):
         axes.set_ylabel("y [m]")
