@@ -7,17 +7,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_diagnosis, a_suspect
+from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_suspect
 from drawings import off_the_sheet, points, texts
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
+from matplotlib.patches import Polygon
 from matplotlib.transforms import Bbox
 
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung, held_out_rmse, improvement
 from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
-from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones
+from vegglue.figures.misfit import draw_gauges, draw_profiles, draw_zones
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
@@ -107,37 +108,6 @@ def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
     assert faces[0] == COLOUR["measured"]
 
 
-def test_places_mark_what_was_found() -> None:
-    drag = a_diagnosis().place_map
-    axes = draw_places(drag.x, drag.y, drag.score, (33.0, -0.6), [], np.zeros((1, 2))).axes[0]
-    assert "x = 33.0, y = −0.6 m" in texts(axes)
-    assert any(line.get_marker() == "*" and list(line.get_xdata()) == [33.0] for line in axes.lines)
-
-
-@pytest.mark.parametrize("places", [1, 2])
-def test_places_too_few_for_a_map_can_be_drawn(places: int) -> None:
-    drag = a_diagnosis().place_map
-    part = drag.x[:places], drag.y[:places], drag.score[:places]
-    (axes,) = draw_places(*part, None, [], np.array([[31.0, 0.5]])).axes
-    assert points(axes, ".") == [(31.0, 0.5)]
-    assert not axes.collections, "no contours"
-    assert texts(axes) == [], "no key of contours, and nothing found"
-
-
-def test_places_draw_contours_patches_and_stations() -> None:
-    drag = a_diagnosis().place_map
-    corners = np.array([[30.0, 0.0], [34.0, 0.0], [34.0, 0.5], [30.0, 0.5]])
-    spots = np.array([[31.0, 0.5], [35.0, -0.5]])
-    figure = draw_places(drag.x, drag.y, 9.0 * drag.score, None, [Outline("p1", corners)], spots)
-    (axes,) = figure.axes
-    assert len(axes.collections) == 4, "more and less drag, faces and lines"
-    assert points(axes, ".") == [tuple(spot) for spot in spots]
-    assert np.array_equal(axes.patches[0].get_xy()[:4], corners)
-    assert points(axes, "*") == []
-    assert f"largest {9.0 * np.abs(drag.score).max():.1f}" in " ".join(texts(axes))
-    assert off_the_sheet(figure) == []
-
-
 def test_suspects_differ_by_form_and_not_by_colour_alone() -> None:
     scores, visible = draw_suspects(SUSPECTS, 3.4).axes
     marks = {line.get_label(): line for line in scores.lines if line.get_label() in MARKS}
@@ -217,7 +187,7 @@ def crowded() -> Diagnosis:
 
 SCREENS = {
     "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()),
-    "no location": a_diagnosis(steps=(), verdict={"location": None}),
+    "no location": replace(a_diagnosis(steps=(), verdict={"location": None}), places=()), "every kind": EVERY_KIND,
 }  # fmt: skip
 
 
@@ -239,7 +209,7 @@ def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
         assert len(texts(rest[0])) == 2 * len(zones)
     if drag.x.size:
         station = diagnosis.predictions.station
-        assert len(points(rest[-1], "*")) == (verdict.location is not None)
+        assert points(rest[-1], "*") == [(one.x, one.y) for one in diagnosis.places]
         assert set(points(rest[-1], ".")) == set(zip(station["x"], station["y"], strict=True))
 
 
@@ -272,7 +242,8 @@ def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
     assert (width, height) == (14 * 130, round(8.6 * 130))
     outlines = [corners_of(patch) for patch in case.plants.patches]
     drawn = draw_diagnosis(a_diagnosis(), [Outline("", corners) for corners in outlines]).axes[-1].patches
-    assert [patch.get_xy()[:4].tolist() for patch in drawn] == [corners.tolist() for corners in outlines]
+    patches = [patch for patch in drawn if isinstance(patch, Polygon)]
+    assert [patch.get_xy()[:4].tolist() for patch in patches] == [corners.tolist() for corners in outlines]
 
 
 def a_rung(name: str, error: float, **changes: object) -> Rung:

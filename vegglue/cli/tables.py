@@ -37,7 +37,11 @@ def show_diagnosis(found: Diagnosis) -> None:
             p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
         )  # fmt: skip
     console.print(table)
-    for row in found.errors.flagged:
+    for off in found.instruments:
+        at = ", ".join(f"{name} = {value:g}" for name, value in (("x", off.x), ("y", off.y)) if np.isfinite(value))
+        console.print(f"- set aside: the {off.kind} at {at} m, {len(off.stations)} reading(s)")
+    of_instruments = {row for off in found.instruments for row in off.stations}
+    for row in [row for row in found.errors.flagged if row not in of_instruments]:
         station = found.predictions.station.iloc[row]
         place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
         console.print(f"- set aside: {place}, measured {station['value']:g}")

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.stats
 
+from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2, interval95
 from vegglue.calibration.noise import covariance_of
 from vegglue.diagnosis.competition import tempering
@@ -23,6 +24,7 @@ from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
     FieldFound,
+    FieldMapKept,
     FirstScreening,
     Misfit,
     ModelErrorUsed,
@@ -50,7 +52,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit, errors, model_error = _misfit(first, last, found), _errors(last, found), _model_error(last)
-    field = _field(first, last, found, misfit)
+    field, field_map = _field(first, last, found, misfit)
     silent = not (found.steps or found.places or found.undecided)
     grounds = Grounds(
         errors=errors,
@@ -73,10 +75,7 @@ def concluded(
         misfit=misfit,
         errors=errors,
         first_screening=_first_screening(first),
-        parameters=ParameterEstimates(
-            {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
-            {name: interval95(base.model, base.fitted, name) for name in base.model.names},
-        ),
+        parameters=_parameters(before, base),
         predictions=Predictions(
             station=before.model.station,
             first=before.fitted.point.prediction,
@@ -88,6 +87,7 @@ def concluded(
         instruments=found.instruments,
         field=field,
         model_error=model_error,
+        field_map=field_map,
     )
 
 
@@ -106,6 +106,13 @@ def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:
         freedom=freedom,
         p=chance_of_misfit(misfit, freedom),
         zones=misfit_zones(before.model, before.noise, before.fitted.point),
+    )
+
+
+def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
+    return ParameterEstimates(
+        {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
+        {name: interval95(after.model, after.fitted, name) for name in after.model.names},
     )
 
 
@@ -135,21 +142,23 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
     return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
 
 
-def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -> FieldFound | None:
-    """A smooth field of one term, where it explains the misfit of the first model better than all that was accepted, or
-    closes a misfit in which nothing was; None where there is nothing to explain.
+def _field(
+    first: Screening, last: Screening, found: Findings, misfit: Misfit
+) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
+    """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
+    accepted, or closes a misfit in which nothing was; None where there is nothing to explain.
     """
     if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= POOR):
-        return None
+        return None, None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
     ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
     if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS):
-        return None
+        return None, None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid
     i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)
-    return FieldFound(
+    most = FieldFound(
         term=best.term,
         size=best.size,
         length=best.over.length,
@@ -160,6 +169,7 @@ def _field(first: Screening, last: Screening, found: Findings, misfit: Misfit) -
         x=float(grid.x[i]),
         y=float(grid.y[j]),
     )
+    return most, FieldMapKept(grid.x, grid.y, mapped.value, mapped.error)
 
 
 def _neighbours_aside(screening: Screening, found: Findings) -> bool:

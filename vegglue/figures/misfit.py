@@ -1,4 +1,4 @@
-"""Figures of where a model misses, before and after something was added: sections, gauges, zones, the map of places.
+"""Figures of where a model misses, before and after something was added: sections, gauges, zones.
 
 Every function takes plain arrays and tables and returns a matplotlib Figure; nothing here knows a run or a page.
 """
@@ -9,15 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
-from vegglue.arrays import Array
-from vegglue.figures.plan_view import Outline
-from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
+from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, styled
 from vegglue.figures.typography import fixed
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 
@@ -25,10 +21,6 @@ from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 LIKELY_RESIDUAL = 2.0
 # Root mean square misfit [standard errors] from which it is set in bold: twice what errors alone make.
 BOLD_MISFIT = 2.0
-# Least score [standard errors] in full colour, so that a map of errors alone (scores of 2 to 3) stays pale.
-FULL_COLOUR_SCORE = 6.0
-# Opacity [-] of the colour in each quarter of the largest score of a map; the first quarter stays blank.
-SHADES = (0.22, 0.5, 0.85)
 BEFORE: dict[str, Any] = {"color": COLOUR["muted"], "linewidth": 1.2, "dashes": (3, 2)}
 AFTER: dict[str, Any] = {"color": COLOUR["model"], "linewidth": 1.5}
 
@@ -174,66 +166,3 @@ def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
     axes.tick_params(length=0, labelsize=8)
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.xaxis.tick_top()
-
-
-@styled
-def draw_places(
-    x: Array, y: Array, score: Array, found: tuple[float, float] | None, patches: Sequence[Outline], stations: Array
-) -> Figure:
-    """Standard errors by which a spot of drag at each place would improve the fit, y stretched.
-
-    x, y, score: (place,), on a raster with holes; stations: x, y (station, 2) [m]. Blue and solid lines: a spot that
-    holds the flow back; vermilion and dashed lines: one that lets it pass.
-    """
-    figure, axes = canvas(2 * WIDTH, 2.5)
-    paint_places(axes, x, y, score, found, patches, stations)
-    return figure
-
-
-def paint_places(
-    axes: Axes,
-    x: Array,
-    y: Array,
-    score: Array,
-    found: tuple[float, float] | None,
-    patches: Sequence[Outline],
-    stations: Array,
-) -> None:
-    """Paint draw_places on given axes; found: x, y [m] of the spot that is marked."""
-    along, across, field = _raster(x, y, score)
-    largest = float(np.nanmax(np.abs(field), initial=0.0)) or 1.0
-    if min(field.shape) > 1:
-        _paint_scores(axes, along, across, field, largest)
-    for patch in patches:
-        axes.add_patch(Polygon(patch.corners, closed=True, fill=False, edgecolor=COLOUR["stems"], linewidth=1.1))
-    axes.plot(*stations.T, ".", markersize=2.2, color=COLOUR["ink"], markeredgewidth=0, alpha=0.7)
-    if found is not None:
-        axes.plot(*found, "*", markersize=13, color=COLOUR["measured"], markeredgecolor=COLOUR["paper"], zorder=7)
-        text = f"x = {fixed(found[0], 1)}, y = {fixed(found[1], 1)} m"
-        label(axes, *found, text, "ink", xytext=(8, 7), fontsize=8.5, fontweight="bold")
-    axes.set(xlabel="x [m], flow to the right", ylabel="y [m]")
-
-
-def _raster(x: Array, y: Array, score: Array) -> tuple[Array, Array, Array]:
-    along, across = np.unique(x), np.unique(y)
-    field = np.full((along.size, across.size), np.nan)
-    field[np.searchsorted(along, x), np.searchsorted(across, y)] = score
-    return along, across, field
-
-
-def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest: float) -> None:
-    full = max(largest, FULL_COLOUR_SCORE)
-    quarters = full * np.array([0.25, 0.5, 0.75, 1.0])
-    shown = np.ma.masked_invalid(field.T)
-    for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):
-        faces = [to_rgba(COLOUR[colour], shade) for shade in SHADES]
-        axes.contourf(along, across, sign * shown, levels=quarters, colors=faces)
-        axes.contour(
-            along, across, sign * shown, levels=quarters[:-1], colors=COLOUR[colour], linewidths=0.7, linestyles=line
-        )
-    text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
-    axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
-    for place, words, colour in (
-        (0.0, "━ more drag here would help", "model"), (0.24, "╌ less drag here would help", "measured"),
-    ):  # fmt: skip
-        axes.text(place, 1.02, words, transform=axes.transAxes, fontsize=SMALL, color=COLOUR[colour])

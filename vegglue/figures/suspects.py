@@ -28,8 +28,8 @@ MARKS: dict[str, tuple[str, str, str]] = {
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
 }
-# Place across the panel of scores [-], 0 left to 1 right, from which a mark would stand under the key.
-KEY_FROM = 0.45
+# Where the panel of scores begins, over its first row: the words beside the threshold then cover no mark.
+TOP = -1.5
 # Panels side by side: with five, the ticks of each still have room.
 FINGERPRINT_COLUMNS = 5
 # One for each experiment, told apart without colour.
@@ -63,18 +63,17 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
     scores.axvline(threshold, color=COLOUR["ink"], linewidth=0.9, dashes=(4, 2))
     scores.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
     reach = float(np.nanmax([3.2 * threshold, *(1.15 * first), *(1.15 * left)]))  # room right of the threshold
-    scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, -0.9), xlabel="score [standard errors], root scale")
+    scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, TOP), xlabel="score [standard errors], root scale")
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
-    label(scores, threshold, -0.9, "errors alone seldom reach this", xytext=(4, -8), va="center")
+    label(scores, threshold, TOP, "errors alone seldom reach this", xytext=(4, -8), va="center")
     scores.set_yticks(rows, [_effect_label(name, word) for name, word in zip(suspects["name"], status, strict=True)])
     again = [Line2D([], [], linestyle="", marker="o", markersize=3.4, markerfacecolor="none", color=COLOUR["model"],
                     label="when looked at last")] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
     if handles:
-        scores.legend(handles=handles, loc="lower right", frameon=False, fontsize=SMALL)
-        lowest = np.nan_to_num(first)[-len(handles) - 1 :]
-        if lowest.max() > KEY_FROM**2 * reach:  # rows of their own below the marks
-            scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), -0.9)
+        scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), TOP)  # rows of their own below the marks
+        key = scores.legend(handles=handles, loc="lower right", fontsize=SMALL, framealpha=1.0)
+        key.get_frame().set(facecolor=COLOUR["paper"], linewidth=0)  # hides the threshold, which runs through it
     visible.barh(rows, suspects["visibility"], height=0.5, color=COLOUR["narrow"])
     visible.set(xlim=(0, 1), xlabel="visibility [–]", xticks=[0, 0.5, 1])
     for axes in (scores, visible):

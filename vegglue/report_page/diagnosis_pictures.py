@@ -11,14 +11,16 @@ import pandas as pd
 from matplotlib.figure import Figure, FigureBase, SubFigure
 
 from vegglue.case.schema import Case
-from vegglue.figures.misfit import draw_gauges, draw_places, draw_profiles, draw_zones, paint_places, paint_zones
+from vegglue.figures.misfit import draw_gauges, draw_profiles, draw_zones, paint_zones
+from vegglue.figures.places import paint_places
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
+from vegglue.report_page.cause_pictures import field_picture, outlines, place_picture, plan_marks
+from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.diagnosis_words import (
-    accepted_effects,
     first_score,
     last_score,
     ranked_suspects,
@@ -28,7 +30,6 @@ from vegglue.report_page.diagnosis_words import (
 from vegglue.report_page.run import Run, published_picture
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.score_test import alike_groups
-from vegglue.site.polygons import corners_of
 
 # Effects drawn at once: as many rows as their names stay legible on one screen.
 SUSPECTS_DRAWN = 16
@@ -40,13 +41,14 @@ VERDICT_LINE_LETTERS = 135
 
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
     """All figures of a diagnosis, written to run.folder/figures: those as wide as the page, and the others."""
-    wide = [*_suspects(run, diagnosis), *_profiles(run, diagnosis), *_places(run, diagnosis)]
+    wide = [*_suspects(run, diagnosis), *place_picture(run, diagnosis), *field_picture(run, diagnosis)]
+    wide += _profiles(run, diagnosis)
     return {"wide": wide, "narrow": [*_zones(run, diagnosis), *_alike(run, diagnosis), *_gauges(run, diagnosis)]}
 
 
 def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
     """Write the whole diagnosis as one screen, PNG or SVG by the ending of `path`."""
-    save(draw_diagnosis(diagnosis, _outlines(case)), path, dots_per_inch=130)
+    save(draw_diagnosis(diagnosis, outlines(case)), path, dots_per_inch=130)
 
 
 def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str, path: Path) -> None:
@@ -69,9 +71,9 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
     if len(diagnosis.misfit.zones):
         paint_zones(zones.subplots(), diagnosis.misfit.zones)
-    if diagnosis.place_map.x.size:
-        place = lower.subplots()
-        paint_places(place, *_place_map(diagnosis), patches, _stations(diagnosis))
+    mapped = diagnosis.place_map
+    if mapped.x.size:
+        paint_places(lower.subplots(), mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, patches))
     return figure
 
 
@@ -91,20 +93,6 @@ def _suspect_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["name", "status", "first", "left", "visibility"])
 
 
-def _stations(diagnosis: Diagnosis) -> np.ndarray:
-    return diagnosis.predictions.station[["x", "y"]].drop_duplicates().to_numpy(float)
-
-
-def _place_map(diagnosis: Diagnosis) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float] | None]:
-    location, drag = diagnosis.verdict.location, diagnosis.place_map
-    found = None if location is None else (location.x, location.y)
-    return drag.x, drag.y, drag.score, found
-
-
-def _outlines(case: Case) -> list[Outline]:
-    return [Outline(patch.name, corners_of(patch)) for patch in case.plants.patches]
-
-
 def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     table = _suspect_table(diagnosis)
     if table.empty:
@@ -116,10 +104,10 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         f"<b>Suspects.</b> Of {count(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
         f"errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
     )
-    if diagnosis.steps:
+    if accepted_causes(diagnosis):
         still = int(np.sum(np.abs(np.nan_to_num(left)) > threshold))
         after = f"{still} still {'does' if still == 1 else 'do'}" if still else "none does any more"
-        caption += f"; with {html.escape(accepted_effects(diagnosis))} added, {after} (rings)"
+        caption += f"; with {html.escape(accepted_causes(diagnosis))} added, {after} (rings)"
     caption += ". Visibility: the share of its trace that no change of the calibrated parameters can mimic."
     alt = "Effects ranked by score: " + ", ".join(
         f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
@@ -131,7 +119,7 @@ def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     stations = diagnosis.predictions.table
     velocity = stations[stations["kind"] == STREAMWISE]
     sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
-    names = accepted_effects(diagnosis)
+    names = accepted_causes(diagnosis)
     before, after = (
         rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
     )
@@ -161,34 +149,11 @@ def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         return
     both = diagnosis.predictions.first, diagnosis.predictions.last
     before, after = (1000 * rms_residual(diagnosis, each, WATER_LEVEL) for each in both)
-    finding, names = f"{short(after, 2)} mm", accepted_effects(diagnosis)
+    finding, names = f"{short(after, 2)} mm", accepted_causes(diagnosis)
     if names:
         finding = f"{short(before, 2)} mm before (hollow) and {finding} with {html.escape(names)} (full)"
     caption = f"<b>Gauges.</b> The model misses the levels by {finding} (root mean square)."
     yield published_picture(run, draw_gauges(stations, names), "missing-gauges", caption, f"Gauges: {finding}.")
-
-
-def _places(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    if not diagnosis.place_map.x.size:
-        return
-    location = diagnosis.verdict.location
-    if location is not None:
-        given = f"With {html.escape(accepted_effects(diagnosis))} in the model, a" if diagnosis.steps else "A"
-        finding = (
-            f"{given} spot of drag at x = {fixed(location.x, 1)} m, y = {fixed(location.y, 1)} m would explain most "
-            f"({fixed(abs(location.score), 1)} standard errors); {html.escape(', '.join(location.experiments))} point "
-            "at it"
-        )
-    elif diagnosis.steps:
-        finding = f"Before {html.escape(accepted_effects(diagnosis))} is added; no place explains as much as that does"
-    else:
-        finding = "No place stands out more than errors alone make it"
-    caption = (
-        f"<b>Where a spot of drag would help</b>, y stretched. {finding}. Green: patches; dots: stations; full lines: "
-        "more drag would help, dashed: less."
-    )
-    figure = draw_places(*_place_map(diagnosis), _outlines(run.case), _stations(diagnosis))
-    yield published_picture(run, figure, "missing-places", caption, f"Plan of the channel. {finding}.")
 
 
 def _in_a_row(names: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.figures.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of
+from vegglue.report_page.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.report_page.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
@@ -60,6 +61,8 @@ class DiagnosisSection:
     other_suspects: list[SuspectRow]
     rescored: bool
     flagged: list[FlaggedRow]
+    places: list[PlaceRow]
+    instruments: list[InstrumentRow]
 
 
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
@@ -67,7 +70,17 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     first, others = _suspect_rows(diagnosis)
     flagged = [_flagged(diagnosis, row) for row in diagnosis.errors.flagged]
     verdict, numbers = diagnosis.verdict, _numbers(diagnosis)
-    return DiagnosisSection(verdict.sentence, verdict.remarks, numbers, first, others, bool(diagnosis.steps), flagged)
+    return DiagnosisSection(
+        sentence=verdict.sentence,
+        remarks=verdict.remarks,
+        numbers=numbers,
+        suspects=first,
+        other_suspects=others,
+        rescored=_changed(diagnosis),
+        flagged=flagged,
+        places=place_rows(diagnosis),
+        instruments=instrument_rows(diagnosis),
+    )
 
 
 def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
@@ -88,8 +101,13 @@ def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
 
 
 def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
-    """The score of an effect after the last step [standard errors]; NaN without steps, or where refitted."""
-    return float("nan") if suspect.amplitude.refitted or not diagnosis.steps else suspect.test.score
+    """The score of an effect in the last model [standard errors]; NaN where that is the first, or where refitted."""
+    return float("nan") if suspect.amplitude.refitted or not _changed(diagnosis) else suspect.test.score
+
+
+def _changed(diagnosis: Diagnosis) -> bool:
+    """Whether anything was taken into the model or set aside."""
+    return bool(diagnosis.steps or diagnosis.places or diagnosis.instruments)
 
 
 def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
@@ -99,11 +117,6 @@ def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
         diagnosis.suspects,
         key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
     )
-
-
-def accepted_effects(diagnosis: Diagnosis) -> str:
-    """The accepted effects in words, '' for none."""
-    return " and ".join(step.accepted for step in diagnosis.steps)
 
 
 def rms_residual(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
@@ -169,7 +182,7 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     before, after = (
         rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
     )
-    fell = bool(diagnosis.steps)
+    fell = _changed(diagnosis)
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
     apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)

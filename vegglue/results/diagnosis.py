@@ -1,5 +1,6 @@
 """What a diagnosis says, as values: the verdict, the effects that explain the misfit, where it lies, and all numbers.
 
+What is no effect of the library stands in causes.py.
 How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
 """
 
@@ -10,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.results.causes import FaultyInstrument, FieldFound, FieldMapKept, Location, ModelErrorUsed, PlaceMap
 
 # instrument: nothing is missing but that some readings are off.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
@@ -103,85 +105,6 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Location:
-    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
-    and standard errors of x and y over all spots that could be it.
-
-    effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
-    [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
-    other kind, by its name.
-    """
-
-    x: float
-    y: float
-    length: float
-    width: float
-    term: str
-    effect: str
-    amplitude: float
-    interval95: tuple[float, float]
-    unit: str
-    score: float
-    experiments: tuple[str, ...]
-    odds: dict[str, float]
-    x_error: float = 0.0
-    y_error: float = 0.0
-
-    @property
-    def shapes(self) -> dict[str, float]:
-        """The shapes of the effect there."""
-        return {"x": self.x, "y": self.y, "length": self.length, "width": self.width}
-
-
-@dataclass(frozen=True)
-class FaultyInstrument:
-    """An instrument found to be off, whose readings were set aside: a reading, a position, a probe or a gauge.
-
-    x, y: where it stood [m], NaN where it stood at several; stations: rows of its readings; offset: what it shows too
-    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-].
-    """
-
-    kind: str
-    x: float
-    y: float
-    stations: tuple[int, ...]
-    offset: float
-    interval95: tuple[float, float]
-    unit: str
-    log_factor: float
-
-
-@dataclass(frozen=True)
-class FieldFound:
-    """A smooth field of a term that would close the misfit: its standard deviation [unit of the term], half length and
-    half width of its bumps [m], ln of its Bayes factor against none [-], and where it stands out most: value there, its
-    standard error, x and y [m].
-    """
-
-    term: str
-    size: float
-    length: float
-    width: float
-    log_factor: float
-    value: float
-    error: float
-    x: float
-    y: float
-
-
-@dataclass(frozen=True)
-class ModelErrorUsed:
-    """The model's own error: relative error of friction [-] and error of the bed [m] as allowed, and the share of both
-    that the last residual asks for most [-], with the ln of its likelihood ratio against what is allowed.
-    """
-
-    friction: float
-    bed: float
-    needed: float
-    log_ratio: float
-
-
-@dataclass(frozen=True)
 class Verdict:
     """What was concluded. location: of drag that no listed effect explains, None without; not_excluded: where nothing
     was detected, groups of effects among which one that is there undetected is, nine times of ten.
@@ -257,20 +180,8 @@ class Predictions:
 
 
 @dataclass(frozen=True)
-class PlaceMap:
-    """Scores [standard errors] of a spot of one term at x, y [m], (spot,) each: of the model in which a location was
-    found, else of drag in the first.
-    """
-
-    term: str
-    x: Array
-    y: Array
-    score: Array
-
-
-@dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found in the case `name`, by which version."""
+    """Everything a diagnosis found in the case `name`, by which version; field_map: where there is a field."""
 
     name: str
     version: str
@@ -287,6 +198,7 @@ class Diagnosis:
     instruments: tuple[FaultyInstrument, ...] = ()
     field: FieldFound | None = None
     model_error: ModelErrorUsed | None = None
+    field_map: FieldMapKept | None = None
 
     @property
     def set(self) -> list[str]:

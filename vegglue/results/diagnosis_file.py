@@ -18,6 +18,7 @@ from vegglue.results.diagnosis import (
     EstimatedErrors,
     FaultyInstrument,
     FieldFound,
+    FieldMapKept,
     FirstScreening,
     Location,
     Misfit,
@@ -38,6 +39,8 @@ from vegglue.results.layout import Group, Variable, table_group
 T = TypeVar("T")
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")
+# Units of smooth fields, by their term.
+FIELD_UNITS = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
@@ -49,11 +52,11 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
     arrays = zip(AT_STATIONS, (at_stations.first, at_stations.last, at_stations.error), strict=True)
     values = {name: Variable(("station",), array, VALUE_UNIT) for name, array in arrays}
     suspects = pd.DataFrame([_row(suspect) for suspect in diagnosis.suspects])
-    drag = diagnosis.place_map
+    places = diagnosis.place_map
     spots = {
-        "x": Variable(("place",), drag.x, "m"),
-        "y": Variable(("place",), drag.y, "m"),
-        "score": Variable(("place",), drag.score),
+        "x": Variable(("place",), places.x, "m"),
+        "y": Variable(("place",), places.y, "m"),
+        "score": Variable(("place",), places.score),
     }
     first = diagnosis.first_screening
     names = np.array(first.compared, object)
@@ -61,9 +64,20 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
         "stations": Group(stations.coordinates, {**stations.variables, **values}),
         "suspects": table_group(suspects, "suspect", {}),
         "zones": table_group(diagnosis.misfit.zones, "zone_number", {}),
-        "places": Group({"place": np.arange(drag.x.size)}, spots),
+        "places": Group({"place": np.arange(places.x.size)}, spots),
         "alike": Group({"name": names, "other": names}, {"cosine": Variable(("name", "other"), first.cosine)}),
+        **_field_group(diagnosis),
     }
+
+
+def _field_group(diagnosis: Diagnosis) -> dict[str, Group]:
+    """The map of the field, where there is one."""
+    mapped, found = diagnosis.field_map, diagnosis.field
+    if mapped is None or found is None:
+        return {}
+    unit = FIELD_UNITS[found.term]
+    values = {name: Variable(("x", "y"), getattr(mapped, name), unit) for name in ("value", "error")}
+    return {"field": Group({"x": mapped.x, "y": mapped.y}, values, {"x": "m", "y": "m"})}
 
 
 def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -103,7 +117,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[str, Any]) -> Diagnosis:
     """The diagnosis whose file has these groups and attributes."""
-    stations, drag = groups["stations"], groups["places"]
+    stations, places = groups["stations"], groups["places"]
     return Diagnosis(
         name=str(attributes["name"]),
         version=str(attributes["version"]),
@@ -129,11 +143,12 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         predictions=Predictions(
             _table_from(stations, "station", *AT_STATIONS), *(stations[name] for name in AT_STATIONS)
         ),
-        place_map=PlaceMap(str(attributes["mapped_term"]), drag["x"], drag["y"], drag["score"]),
+        place_map=PlaceMap(str(attributes["mapped_term"]), places["x"], places["y"], places["score"]),
         places=tuple(_location_from(one) for one in json.loads(attributes["locations"])),
         instruments=tuple(_instrument_from(one) for one in json.loads(attributes["instruments"])),
         field=_optional(FieldFound, json.loads(attributes["field"])),
         model_error=_optional(ModelErrorUsed, json.loads(attributes["model_error"])),
+        field_map=_optional(FieldMapKept, groups.get("field")),
     )
 
 

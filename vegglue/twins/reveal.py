@@ -50,10 +50,9 @@ def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
 
 
 def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
-    location = diagnosis.verdict.location
-    if location is None:
-        return float("nan")
-    return float(np.hypot(location.x - hidden.shapes["x"], location.y - hidden.shapes["y"]))
+    """Distance of the nearest place that is pointed at [m], NaN where there is none."""
+    x, y = hidden.shapes["x"], hidden.shapes["y"]
+    return float(min((np.hypot(one.x - x, one.y - y) for one in diagnosis.places), default=np.nan))
 
 
 def groups_of(diagnosis: Diagnosis) -> list[int]:
@@ -71,7 +70,7 @@ def guess_in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
     if not answer.hidden:
         lines.append("Nothing was hidden.")
         if diagnosis is not None:
-            right = "right" if diagnosis.verdict.kind == "nothing-missing" else "a false alarm, or too shy"
+            right = {"nothing-missing": "right", "cannot-tell": "too shy"}.get(diagnosis.verdict.kind, "a false alarm")
             lines.append(f"The diagnosis said {diagnosis.verdict.kind}: {right}.")
         return lines
     if diagnosis is None:
@@ -89,7 +88,10 @@ def _truth(hidden: Hidden) -> str:
 def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     truth = f"Hidden: {_truth(mark.hidden)}. "
     if mark.hidden.name == BAD_PROBE:
-        return truth + ("It was set aside." if mark.found else "It was not noticed.")
+        alone = (
+            " The verdict was instrument: nothing else is missing." if diagnosis.verdict.kind == "instrument" else ""
+        )
+        return truth + ("It was set aside." + alone if mark.found else "It was not noticed.")
     if not mark.hidden.listed:
         told = f"The verdict was {diagnosis.verdict.kind}"
         return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")

@@ -1,0 +1,108 @@
+"""Causes other than listed effects that a diagnosis found: places, instruments, fields, the model's own error."""
+
+from dataclasses import dataclass
+
+from vegglue.arrays import Array
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
+    and standard errors of x and y over all spots that could be it.
+
+    effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
+    [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
+    other kind, by its name.
+    """
+
+    x: float
+    y: float
+    length: float
+    width: float
+    term: str
+    effect: str
+    amplitude: float
+    interval95: tuple[float, float]
+    unit: str
+    score: float
+    experiments: tuple[str, ...]
+    odds: dict[str, float]
+    x_error: float = 0.0
+    y_error: float = 0.0
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """The shapes of the effect there."""
+        return {"x": self.x, "y": self.y, "length": self.length, "width": self.width}
+
+
+@dataclass(frozen=True)
+class PlaceMap:
+    """Scores [standard errors] of a spot of one term at x, y [m], (spot,) each, in the model as it was: of the term of
+    the first place that was found, else of drag. Spots of one length stand together, in the order of x.
+    """
+
+    term: str
+    x: Array
+    y: Array
+    score: Array
+
+
+@dataclass(frozen=True)
+class FaultyInstrument:
+    """An instrument found to be off, whose readings were set aside: a reading, a position, a probe or a gauge.
+
+    x, y: where it stood [m], NaN where it stood at several; stations: rows of its readings; offset: what it shows too
+    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-].
+    """
+
+    kind: str
+    x: float
+    y: float
+    stations: tuple[int, ...]
+    offset: float
+    interval95: tuple[float, float]
+    unit: str
+    log_factor: float
+
+
+@dataclass(frozen=True)
+class FieldFound:
+    """A smooth field of a term that would close the misfit: its standard deviation [unit of the term], half length and
+    half width of its bumps [m], ln of its Bayes factor against none [-], and where it stands out most: value there, its
+    standard error, x and y [m].
+    """
+
+    term: str
+    size: float
+    length: float
+    width: float
+    log_factor: float
+    value: float
+    error: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class FieldMapKept:
+    """The smooth field of a term over the grid it was computed on: value and standard error (nx, ny) [unit of the
+    term], at cell centres x (nx,), y (ny,) [m].
+    """
+
+    x: Array
+    y: Array
+    value: Array
+    error: Array
+
+
+@dataclass(frozen=True)
+class ModelErrorUsed:
+    """The model's own error: relative error of friction [-] and error of the bed [m] as allowed, and the share of both
+    that the last residual asks for most [-], with the ln of its likelihood ratio against what is allowed.
+    """
+
+    friction: float
+    bed: float
+    needed: float
+    log_ratio: float
