@@ -8,7 +8,7 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.screening import score_test
-from vegglue.screening.evidence import DRAWS_TOGETHER, Kind, alarm_p, kind_of_hypotheses, log_factors
+from vegglue.screening.evidence import NULL_DRAWS_TOGETHER, HypothesisKind, alarm_p, kind_of_hypotheses, log_factors
 
 ROWS, SLOPES, DRAWS, NULLS = 40, 3, 400, 500
 
@@ -24,7 +24,7 @@ def at_best(slopes: Array, values: Array) -> tuple[Array, Array]:
     return values - slopes @ z, z
 
 
-def kind_of(slopes: Array, prints: Array, values: Array, size: float = 1.0, one_sided: bool = False) -> Kind:
+def kind_of(slopes: Array, prints: Array, values: Array, size: float = 1.0, one_sided: bool = False) -> HypothesisKind:
     columns = prints.shape[1]
     projected = score_test.project(slopes, *at_best(slopes, values), prints)
     sizes, prior = np.full(columns, size), np.full(columns, 0.1 / columns)
@@ -70,7 +70,7 @@ def test_what_can_only_have_the_other_sign_explains_nothing() -> None:
     assert found.total == pytest.approx(float(np.log(0.1) - 0.5 * np.log1p(found.size[0] ** 2)))
 
 
-def kinds_of(values: Array) -> list[Kind]:
+def kinds_of(values: Array) -> list[HypothesisKind]:
     """A kind of many hypotheses, one of a few that have one sign, and one of a single hypothesis of another size."""
     random = np.random.default_rng(7)
     slopes, prints = made(random, 31)
@@ -81,7 +81,7 @@ def kinds_of(values: Array) -> list[Kind]:
     ]
 
 
-def drawn(seed: int, missing: float = 0.0) -> tuple[list[Kind], Array]:
+def drawn(seed: int, missing: float = 0.0) -> tuple[list[HypothesisKind], Array]:
     """Kinds of a residual of errors, calibrated, and further draws of errors alone; missing: size of hypothesis 4."""
     random = np.random.default_rng((8, seed))
     slopes, prints = made(np.random.default_rng(7), 31)
@@ -119,7 +119,7 @@ def test_slack_makes_the_alarm_less_loud() -> None:
 
 def test_draws_are_counted_alike_however_many_are_worked_on_together(monkeypatch: pytest.MonkeyPatch) -> None:
     kinds, errors = drawn(1)
-    assert DRAWS_TOGETHER < DRAWS
+    assert NULL_DRAWS_TOGETHER < DRAWS
     together = alarm_p(kinds, errors, 1)
-    monkeypatch.setattr("vegglue.screening.evidence.DRAWS_TOGETHER", 7)
+    monkeypatch.setattr("vegglue.screening.evidence.NULL_DRAWS_TOGETHER", 7)
     assert alarm_p(kinds, errors, 1) == together

@@ -11,7 +11,7 @@ from linear_baseline import at_best, stations_of
 from vegglue.arrays import Array
 from vegglue.case.config import load_case
 from vegglue.effects.definition import Amplitude
-from vegglue.screening.evidence import Kind, alarm_p
+from vegglue.screening.evidence import HypothesisKind, alarm_p
 from vegglue.screening.family_wise_p import Family
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
@@ -82,7 +82,7 @@ def test_alarms_are_as_rare_as_said_when_nothing_is_missing(nulls: list[Screenin
         assert scipy.stats.binomtest(int(np.sum(chances <= level)), chances.size, level).pvalue > 1e-3, level
 
 
-def kind_of(screening: Screening, name: str) -> Kind:
+def kind_of(screening: Screening, name: str) -> HypothesisKind:
     return next(kind for kind in screening.kinds if kind.name == name)
 
 

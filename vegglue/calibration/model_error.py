@@ -40,7 +40,7 @@ FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
 # Chosen after open-f, where a spot left 0.3 of the trace of a smaller pier in neighbouring places.
 SHAPE_ERROR, AROUND = 0.5, 2.0
 # Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
-FEWEST_CELLS = 1.5
+BUMP_CELLS = 1.5
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellR
     return CellResponses(model.site.grid, found)
 
 
-def bumps(grid: Grid, length: float, width: float, cells: float = FEWEST_CELLS) -> Bumps:
+def bumps(grid: Grid, length: float, width: float, cells: float = BUMP_CELLS) -> Bumps:
     """Bumps of half length l and half width w [m], as far apart, and of at least so many cells."""
     length, width = max(length, cells * grid.dx), max(width, cells * grid.dy)
     x, y = _raster(grid.x, length), _raster(grid.y, width)

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.refits import Refit, Trial, refits_of, start_with
+from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.progress import Say
 from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import Kind, log_factors
+from vegglue.screening.evidence import HypothesisKind, log_factors
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
@@ -77,7 +77,7 @@ def contenders_of(screening: Screening, say: Say) -> list[Contender]:
     return sorted(found, key=lambda one: -one.log_evidence)
 
 
-def _place_contender(kind: Kind, refits: Sequence[tuple[int, Refit]]) -> list[Contender]:
+def _place_contender(kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]) -> list[Contender]:
     """The best refitted spot of a term with the evidence of all its spots, corrected as that of this one; none if no
     flow was found with any.
     """
@@ -108,7 +108,7 @@ def _within_reach(evidence: float, best: float) -> bool:
     return bool((best - evidence) / tempering(np.array(best)) < REACH)
 
 
-def _linear_evidence(kind: Kind, second: SecondLook | None) -> Array:
+def _linear_evidence(kind: HypothesisKind, second: SecondLook | None) -> Array:
     """E of every column of the listed effects (c,), from the place that promises more."""
     at_best = kind.log_evidence
     return at_best if second is None else np.maximum(at_best, second.log_factor + kind.log_prior)
@@ -121,7 +121,7 @@ def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[i
     return [j for j in ranked if _within_reach(float(of_each[j]), best)] or ranked[:1]
 
 
-def _promising_spots(places: Places, kind: Kind, best: float) -> list[int]:
+def _promising_spots(places: Places, kind: HypothesisKind, best: float) -> list[int]:
     """The best spot of each length, those within reach."""
     evidence = kind.log_evidence
     of_length = [np.flatnonzero(places.length == length) for length in np.unique(places.length)]
@@ -135,7 +135,7 @@ def _column_of(screening: Screening, candidate: int, linear: Array) -> int:
     return int(columns[np.argmax(linear[columns])])
 
 
-def _effect_trial(screening: Screening, candidate: int, linear: Array, second: SecondLook | None) -> Trial:
+def _effect_trial(screening: Screening, candidate: int, linear: Array, second: SecondLook | None) -> RefitTrial:
     """A listed effect at its best setting, from the best place, and from the second one where that promises more."""
     column, one = _column_of(screening, candidate, linear), screening.fingerprints.candidates[candidate]
     shapes, case = screening.fingerprints.settings[column], screening.search.model.case
@@ -143,10 +143,10 @@ def _effect_trial(screening: Screening, candidate: int, linear: Array, second: S
     by_score = screening.kinds[0].log_evidence[column] - screening.kinds[0].log_prior[column]
     if second is not None and second.log_factor[column] > by_score:
         starts.append(start_with(case, one, shapes, second.point.z, float(second.gain[column])))
-    return Trial(one, shapes, tuple(starts))
+    return RefitTrial(one, shapes, tuple(starts))
 
 
-def _place_trial(screening: Screening, places: Places, spot: int) -> Trial:
+def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
     """Something unlisted at one spot, from the best place and the size of its score."""
     case, search = screening.search.model.case, screening.search
     kind = next(kind for kind in screening.kinds if kind.name == places.term)
@@ -155,10 +155,10 @@ def _place_trial(screening: Screening, places: Places, spot: int) -> Trial:
     size = kind.size[spot]
     gain = kind.scores[spot] * places.plausible / max(size, 1e-300) * size**2 / (1.0 + size**2)
     starts = (start_with(case, candidate, shapes, search.point.z, share * float(gain)) for share in START_SHARES)
-    return Trial(candidate, shapes, tuple(starts))
+    return RefitTrial(candidate, shapes, tuple(starts))
 
 
-def _settings_charge(screening: Screening, kind: Kind, candidate: int, column: int) -> float:
+def _settings_charge(screening: Screening, kind: HypothesisKind, candidate: int, column: int) -> float:
     """ln prior of an effect whose setting `column` was refitted, and what its other settings add to first order."""
     columns = screening.fingerprints.columns[candidate]
     evidence = kind.log_evidence

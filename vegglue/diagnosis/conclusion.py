@@ -41,7 +41,7 @@ from vegglue.version import VERSION
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
 # Odds by which a field must beat all that was accepted: 10 to 1, as a place an effect.
-LEAST_ODDS = 10.0
+FIELD_ODDS = 10.0
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -154,7 +154,7 @@ def _field(
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
     ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
-    if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS):
+    if best.log_factor <= 0.0 or ahead < np.log(FIELD_ODDS):
         return None, None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid
     i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)

@@ -86,18 +86,23 @@ def best_field(search: SearchModel, half_width: float) -> tuple[FieldHypothesis,
 
 
 def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypothesis) -> FieldMap:
-    """The likeliest field and how well it is known."""
+    """The likeliest field, sum_k a_k phi_k, and how well it is known: var = phi' phi - |L^-1 F phi|^2 in each cell.
+
+    L L' = F F' + C + J J', and sizes a ~ N(0, 1) before the data.
+    """
     whole, residual = _without_field(search)
-    scale = np.sqrt((one.over.along**2).sum(axis=0).mean() * (one.over.across**2).sum(axis=0).mean())
+    along, across = one.over.along, one.over.across
+    scale = np.sqrt((along**2).sum(axis=0).mean() * (across**2).sum(axis=0).mean())
     columns = search.noise.used(field_columns(responses, one.term, one.over)) * one.size
     factor = scipy.linalg.cho_factor(whole + columns @ columns.T, lower=True)
     shape = (one.over.x.size, one.over.y.size)
     sizes = (columns.T @ scipy.linalg.cho_solve(factor, residual)).reshape(shape)
-    white = scipy.linalg.solve_triangular(factor[0], columns, lower=True)
-    spread = np.maximum(1.0 - (white**2).sum(axis=0), 0.0).reshape(shape)
-    along, across = one.over.along, one.over.across
+    of_cells = np.einsum("nab,ai,bj->nij", columns.reshape(-1, *shape), along, across, optimize=True)
+    white = scipy.linalg.solve_triangular(factor[0], of_cells.reshape(len(columns), -1), lower=True)
+    before = (along**2).sum(axis=0)[:, None] * (across**2).sum(axis=0)[None]
+    variance = before - (white**2).sum(axis=0).reshape(before.shape)
     unit = one.size / scale
-    return FieldMap(unit * (along.T @ sizes @ across), unit * np.sqrt((along**2).T @ spread @ across**2))
+    return FieldMap(unit * (along.T @ sizes @ across), unit * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _without_field(search: SearchModel) -> tuple[Array, Array]:

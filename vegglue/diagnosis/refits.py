@@ -29,7 +29,7 @@ REFIT_STEPS = 10
 
 
 @dataclass(frozen=True)
-class Trial:
+class RefitTrial:
     """What is to be refitted: a candidate with values of its shapes, and z (k, p + 1) of the places to start from."""
 
     candidate: Candidate
@@ -57,7 +57,7 @@ class Refit:
         return replace(suspect, shapes=dict(self.shapes), amplitude=amplitude)
 
 
-def refits_of(search: SearchModel, trials: Sequence[Trial]) -> list[Refit | None]:
+def refits_of(search: SearchModel, trials: Sequence[RefitTrial]) -> list[Refit | None]:
     """Each trial refitted, side by side; None where no flow is found."""
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
     tasks = [(search, trial, start) for trial in trials for start in trial.starts]
@@ -70,7 +70,7 @@ def refits_of(search: SearchModel, trials: Sequence[Trial]) -> list[Refit | None
     return found
 
 
-def changed_case(case: Case, trial: Trial) -> Case:
+def changed_case(case: Case, trial: RefitTrial) -> Case:
     """The case with what is tried."""
     return with_effect(case, trial.candidate, trial.shapes)
 
@@ -92,13 +92,13 @@ def _log_evidence(fitted: MapEstimate) -> float:
     return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
 
 
-def _refitted(search: SearchModel, trial: Trial, start: Array) -> MapEstimate | None:
+def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
     model = replace(search.model, case=changed_case(search.model.case, trial))
     point = linearise(model, start, search.point) or linearise(model, start)
     return None if point is None else fit(model, search.noise, point, REFIT_STEPS)
 
 
-def _refit(search: SearchModel, trial: Trial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
+def _refit(search: SearchModel, trial: RefitTrial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
     model = replace(search.model, case=changed_case(search.model.case, trial))
     amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
     gained = _log_evidence(fitted) - _log_evidence(nothing)

@@ -11,7 +11,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.diagnosis.competition import tempered_chances
-from vegglue.diagnosis.refits import Refit, Trial, calibrated_with, refits_of, start_with, without_effect
+from vegglue.diagnosis.refits import Refit, RefitTrial, calibrated_with, refits_of, start_with, without_effect
 from vegglue.diagnosis.rivals import IN_SET
 from vegglue.progress import Say
 from vegglue.results.diagnosis import Step, Suspect
@@ -56,7 +56,7 @@ def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect
     for name in step.rivals:
         one, suspect = possible[name], suspects[name]
         gain = one.amplitude.gain(suspect.amplitude.value)
-        trials.append(Trial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
+        trials.append(RefitTrial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
     return [refit for refit in refits_of(search_model(less), trials) if refit is not None]
 
 

@@ -48,8 +48,8 @@ NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
 ABSURD, FAR_OFF = 4.0, 4.0
 # Standard error of a place [m] below which its digits say enough.
 TOLD_ERROR = 0.3
-# Share of the support of an amplitude within which it lies at a bound.
-AT_BOUND = 0.01
+# Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound.
+AT_BOUND = 0.03
 
 
 @dataclass(frozen=True)
@@ -132,11 +132,10 @@ def _accepted(found: Findings) -> list[str]:
 
 
 def _is_at_bound(suspect: Suspect) -> bool:
-    low, high = suspect.amplitude.support
-    margin = AT_BOUND * (high - low)
-    value = suspect.amplitude.value
-    off_is_bound = suspect.amplitude.off in (low, high)
-    return bool((value < low + margin and not (off_is_bound and suspect.amplitude.off == low)) or value > high - margin)
+    """Whether an amplitude lies at an end of its support, other than the end at which it is off."""
+    amplitude = suspect.amplitude
+    margin = AT_BOUND * amplitude.scale
+    return any(abs(amplitude.value - end) < margin for end in amplitude.support if end != amplitude.off)
 
 
 def _named(found: Findings, suspects: Sequence[Suspect]) -> str:

@@ -20,11 +20,11 @@ from vegglue.arrays import Array, Single
 from vegglue.screening import score_test
 
 # Draws of errors alone that are worked on together: what lies between them then fits the memory.
-DRAWS_TOGETHER = 250
+NULL_DRAWS_TOGETHER = 250
 
 
 @dataclass(frozen=True)
-class Kind:
+class HypothesisKind:
     """Hypotheses of one kind, whitened and projected.
 
     log_prior (c,): ln of the chance of each column before the data; size (c,): a = s |S_perp| [-]; scores T (c,);
@@ -56,12 +56,12 @@ class Kind:
 
 def kind_of_hypotheses(
     name: str, projected: score_test.Projected, plausible: Array, prior: Array, one_sided: np.ndarray | None = None
-) -> Kind:
+) -> HypothesisKind:
     """plausible (c,): s [unit of the size]; prior (c,): chance of each column before the data."""
     if one_sided is None:
         one_sided = np.zeros(plausible.size, dtype=bool)
     scores = score_test.scores(projected, one_sided)
-    return Kind(name, projected, np.log(prior), plausible * projected.length, one_sided, scores)
+    return HypothesisKind(name, projected, np.log(prior), plausible * projected.length, one_sided, scores)
 
 
 def log_factors(scores: Array, size: Array) -> Array:
@@ -70,7 +70,7 @@ def log_factors(scores: Array, size: Array) -> Array:
     return np.asarray(0.5 * scores**2 * (square / (1.0 + square)) - 0.5 * np.log1p(square))
 
 
-def alarm_p(kinds: Sequence[Kind], errors: Array, seed: int, slack: float = 0.0) -> float:
+def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: float = 0.0) -> float:
     """P(errors alone give as large a sum of Bayes factors over all kinds), counted, (1 + count) / (1 + draws).
 
     errors (draws, n): whitened; slack: by how much scores are made smaller first [standard errors].
@@ -80,17 +80,17 @@ def alarm_p(kinds: Sequence[Kind], errors: Array, seed: int, slack: float = 0.0)
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     drawn = np.hstack([errors, of_prior]).astype(np.float32)
     count = 0
-    for first in range(0, len(drawn), DRAWS_TOGETHER):
-        part = drawn[first : first + DRAWS_TOGETHER]
+    for first in range(0, len(drawn), NULL_DRAWS_TOGETHER):
+        part = drawn[first : first + NULL_DRAWS_TOGETHER]
         sums = [logsumexp(_of_scores(kind, _drawn_scores(kind, part)), axis=1) for kind in kinds]
         count += int(np.sum(logsumexp(sums, axis=0) >= found))
     return (1 + count) / (1 + len(errors))
 
 
-def _of_scores(kind: Kind, scores: Array) -> Array:
+def _of_scores(kind: HypothesisKind, scores: Array) -> Array:
     return log_factors(scores, kind.size) + kind.log_prior
 
 
-def _drawn_scores(kind: Kind, drawn: Single) -> Array:
+def _drawn_scores(kind: HypothesisKind, drawn: Single) -> Array:
     scores = drawn @ kind.projected.units.astype(np.float32)
     return np.where(kind.one_sided & (scores < 0), 0.0, scores)

@@ -3,7 +3,8 @@
 value -> value + offset,   the offset the same in all readings of the instrument
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -30,19 +31,27 @@ class Instrument:
 
 def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument, ...]]:
     """Those of the used stations: every reading; probes at one place in several experiments, and at one y in several
-    sections; gauges at one place in several experiments.
+    sections; gauges at one place in several experiments. Readings of other kinds have offsets of their own.
     """
-    x, y = used["x"].to_numpy(float), used["y"].to_numpy(float)
-    names = used["kind"].astype(str)
-    probe = names.map(lambda name: kind_of(name).velocity).to_numpy(bool)
-    gauge = names.map(lambda name: kind_of(name).instrument == "gauge").to_numpy(bool)
-    readings = tuple(Instrument("reading", (row,), float(x[row]), float(y[row])) for row in range(len(used)))
-    probes = _shared("probe", [(row, float("nan"), float(y[row])) for row in _rows(probe)])
-    gauges = _shared("gauge", [(row, float(x[row]), float(y[row])) for row in _rows(gauge)])
-    positions = _shared("position", [(row, float(x[row]), float(y[row])) for row in _rows(probe)])
-    at_places = {one.readings for one in positions}
-    across = tuple(one for one in probes if one.readings not in at_places)
-    return {"reading": readings, "position": positions, "probe": across, "gauge": gauges}
+    kinds = [kind_of(str(name)) for name in used["kind"]]
+    places = used[["x", "y"]].to_numpy(float)
+    rows = range(len(used))
+    probes = [row for row in rows if kinds[row].velocity]
+    gauges = [row for row in rows if kinds[row].instrument == "gauge"]
+    of = [f"{kinds[row].name} {places[row, 0]:.3f} {places[row, 1]:.3f}" for row in rows]
+    across = [f"{kinds[row].name} {places[row, 1]:.3f}" for row in rows]
+    positions = _shared("position", {row: of[row] for row in probes}, places)
+    at_one_place = {one.readings for one in positions}
+    return {
+        "reading": tuple(Instrument("reading", (row,), *map(float, places[row])) for row in rows),
+        "position": positions,
+        "probe": tuple(
+            replace(one, x=float("nan"))
+            for one in _shared("probe", {row: across[row] for row in probes}, places)
+            if one.readings not in at_one_place
+        ),
+        "gauge": _shared("gauge", {row: of[row] for row in gauges}, places),
+    }
 
 
 def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
@@ -53,17 +62,11 @@ def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
     return columns
 
 
-def _rows(chosen: np.ndarray) -> list[int]:
-    return [int(row) for row in np.flatnonzero(chosen)]
-
-
-def _shared(kind: InstrumentKind, rows: list[tuple[int, float, float]]) -> tuple[Instrument, ...]:
-    """Instruments of more than one reading, rows of the same place together; rows: (row, x, y)."""
-    together: dict[str, list[tuple[int, float, float]]] = {}
-    for row, x, y in rows:
-        together.setdefault(f"{x:.3f} {y:.3f}", []).append((row, x, y))
+def _shared(kind: InstrumentKind, name: Mapping[int, str], places: Array) -> tuple[Instrument, ...]:
+    """Instruments of more than one reading, rows of the same name together; places: x, y of all rows (n, 2) [m]."""
+    together: dict[str, list[int]] = {}
+    for row, its in name.items():
+        together.setdefault(its, []).append(row)
     return tuple(
-        Instrument(kind, tuple(row for row, _, _ in found), found[0][1], found[0][2])
-        for found in together.values()
-        if len(found) > 1
+        Instrument(kind, tuple(rows), *map(float, places[rows[0]])) for rows in together.values() if len(rows) > 1
     )

@@ -13,7 +13,7 @@ from vegglue.engine.interface import Point
 from vegglue.flow.local_changes import Term
 from vegglue.screening import score_test
 from vegglue.screening.candidates import start_amplitude, with_effect
-from vegglue.screening.evidence import Kind, kind_of_hypotheses
+from vegglue.screening.evidence import HypothesisKind, kind_of_hypotheses
 from vegglue.screening.family_wise_p import Family, family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
 from vegglue.screening.instruments import (
@@ -55,7 +55,7 @@ class Screening:
     projected: score_test.Projected
     effects: Family
     spots: Family
-    kinds: tuple[Kind, ...]
+    kinds: tuple[HypothesisKind, ...]
     instruments: dict[str, tuple[Instrument, ...]]
     errors: Array
 
@@ -124,7 +124,7 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     )
 
 
-def _kind_of_effects(fingerprints: Fingerprints, projected: score_test.Projected) -> Kind:
+def _kind_of_effects(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
     """Listed effects: as likely before, and so are the settings of one."""
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)
@@ -133,7 +133,9 @@ def _kind_of_effects(fingerprints: Fingerprints, projected: score_test.Projected
     return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.one_sided)
 
 
-def _kinds_of_places(fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]) -> list[Kind]:
+def _kinds_of_places(
+    fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]
+) -> list[HypothesisKind]:
     """A kind for each term: all its spots are as likely before, and all terms."""
     kinds = []
     for one in fingerprints.places:
@@ -148,7 +150,7 @@ def _kinds_of_instruments(
     instruments: Mapping[InstrumentKind, tuple[Instrument, ...]],
     projected: Mapping[InstrumentKind, score_test.Projected],
     flagged: tuple[int, ...],
-) -> list[Kind]:
+) -> list[HypothesisKind]:
     """A kind each for single readings, probes and gauges, without those that are known to be off."""
     kinds = []
     for name, of_kind in projected.items():
