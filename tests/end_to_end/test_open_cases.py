@@ -76,6 +76,25 @@ def test_something_unlisted_is_none_of_these_and_has_a_place(tmp_path: Path) -> 
     assert ((location.x - 33.0) ** 2 + (location.y + 0.6) ** 2) ** 0.5 < 1.5
 
 
+@pytest.mark.parametrize(("name", "term", "x", "y"), [("open-i", "bed", 47.0, -0.5), ("open-f", "drag", 33.0, -0.6)])
+def test_a_place_is_of_the_right_term(name: str, term: str, x: float, y: float, tmp_path: Path) -> None:
+    found = looked_into(imported(name, tmp_path), tmp_path)
+    (place,) = found.places
+    assert found.verdict.kind == "none-of-these", found.verdict.sentence
+    assert ((place.x - x) ** 2 + (place.y - y) ** 2) ** 0.5 < 1.5
+    assert place.term == term
+    assert all(odds > 10.0 for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity"))
+
+
+@pytest.mark.parametrize(("name", "kind", "offset"), [("open-j", "probe", 0.05), ("open-k", "gauge", -0.015)])
+def test_an_instrument_that_is_off_is_set_aside_alone(name: str, kind: str, offset: float, tmp_path: Path) -> None:
+    found = looked_into(imported(name, tmp_path), tmp_path)
+    (faulty,) = found.instruments
+    assert found.verdict.kind == "instrument", found.verdict.sentence
+    assert (faulty.kind, found.steps, found.places) == (kind, (), ())
+    assert faulty.interval95[0] <= offset <= faulty.interval95[1]
+
+
 @pytest.mark.parametrize(("name", "added"), [("open-l", 2), ("open-i", 1)])
 def test_two_effects_and_a_place_are_added(name: str, added: int, tmp_path: Path) -> None:
     grown = extended(imported(name, tmp_path), tmp_path)
