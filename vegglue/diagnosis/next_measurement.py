@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+import scipy.linalg
 
 from vegglue.arrays import Array
+from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, linearise, responses
@@ -82,23 +84,29 @@ def worth_of_measurements(
         return [[] for _ in questions]
     every = [rival for question in questions for rival in question]
     changed = [cause_of(wide.case, one, shapes) for one, shapes, _ in every]
-    errors = _errors(wide.station, noise)[:, None]
-    slope = point.slope / errors
-    traces = responses(wide, point, changed) / errors * np.array([gain for _, _, gain in every])
+    own_error = model_error_columns(wide, point, wide.case.model_error)
+    covariance = np.diag(_errors(wide.station, noise) ** 2) + own_error @ own_error.T
+    traces = responses(wide, point, changed) * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
     known[: len(model.station)] = model.station["used"].to_numpy(bool)
     ends = np.cumsum([len(question) for question in questions])
     own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
-    return [_ranked(plans, known, slope, part) for part in own]
+    return [_ranked(plans, known, covariance, point.slope, part) for part in own]
 
 
-def _ranked(plans: Sequence[MeasurementPlan], known: np.ndarray, slope: Array, traces: Array) -> list[MeasurementWorth]:
-    now = _least(slope[known], traces[known])
-    found = []
+def _ranked(
+    plans: Sequence[MeasurementPlan], known: np.ndarray, covariance: Array, slope: Array, traces: Array
+) -> list[MeasurementWorth]:
+    def least(rows: np.ndarray) -> float:
+        lower = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
+        white = scipy.linalg.solve_triangular(lower, np.hstack([slope, traces])[rows], lower=True)
+        return _least(white[:, : slope.shape[1]], white[:, slope.shape[1] :])
+
+    now, found = least(known), []
     for plan in plans:
         rows = known.copy()
         rows[plan.rows] = True
-        found.append(MeasurementWorth(plan, now, _least(slope[rows], traces[rows])))
+        found.append(MeasurementWorth(plan, now, least(rows)))
     return sorted(found, key=lambda one: -one.per_hour)
 
 
