@@ -6,7 +6,7 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MapEstimate, fit, objective
+from vegglue.calibration.fit import MapEstimate, fit, log_evidence_under, objective
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import (
     Noise,
@@ -105,6 +105,11 @@ def with_own_error(base: Baseline) -> Baseline:
     fitted = fit(base.model, noise, base.fitted.point)
     on_coarse = None if base.coarse is None else linearise(base.coarse, fitted.point.z, base.on_coarse)
     return replace(base, noise=noise, fitted=fitted, on_coarse=on_coarse)
+
+
+def log_evidence(base: Baseline) -> float:
+    """ln p(y) - 1/2 ln|C| of a calibrated model, C the covariance of its errors, up to a constant of the data [-]."""
+    return log_evidence_under(base.fitted) - float(np.log(np.diag(base.noise.lower)).sum())
 
 
 def for_prediction(base: Baseline) -> Baseline:

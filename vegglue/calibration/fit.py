@@ -74,6 +74,15 @@ def covariance(noise: Noise, point: Point) -> Array:
     return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
 
 
+def log_evidence_under(fitted: MapEstimate) -> float:
+    """ln p(y) = -1/2 F - 1/2 ln|H| by Laplace, F the objective and H^-1 the covariance of z, up to what all models have
+    in common under the same covariance of the errors [-].
+
+    Source: Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not checked against it.
+    """
+    return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
+
+
 def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, float, float]:
     """theta(z_j) and theta(z_j -/+ 1.96 s_j) of a parameter, in its unit, s_j^2 the variance of z_j."""
     j = model.names.index(name)

@@ -7,14 +7,13 @@ import numpy as np
 import scipy.linalg
 import scipy.stats
 
-from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, interval95
 from vegglue.calibration.noise import covariance_of
 from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
-from vegglue.diagnosis.refits import log_evidence
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
 from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.baseline import Baseline, baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_offset
 from vegglue.diagnosis.competition import Contender, chances_of, contenders_of, tempering
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.refits import Refit, calibrated_with, log_evidence, pruned
+from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
 from vegglue.diagnosis.rivals import instrument_found, location_found, step_found
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, grid_difference, with_own_error
-from vegglue.calibration.fit import MapEstimate, fit, interval95
+from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_under
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
@@ -82,16 +82,6 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
     return np.append(z, z_of(changed.parameters[candidate.parameter], amplitude))
 
 
-def log_evidence(base: Baseline) -> float:
-    """ln p(y) = -1/2 F - 1/2 ln|H| - 1/2 ln|C| of a calibrated model, up to a constant of the data [-]."""
-    return _log_evidence(base.fitted) - float(np.log(np.diag(base.noise.lower)).sum())
-
-
-def _log_evidence(fitted: MapEstimate) -> float:
-    """The same where all models have the same covariance C of the errors."""
-    return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
-
-
 def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
     model = replace(search.model, case=changed_case(search.model.case, trial))
     point = linearise(model, start, search.point) or linearise(model, start)
@@ -101,7 +91,7 @@ def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstima
 def _refit(search: SearchModel, trial: RefitTrial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
     model = replace(search.model, case=changed_case(search.model.case, trial))
     amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
-    gained = _log_evidence(fitted) - _log_evidence(nothing)
+    gained = log_evidence_under(fitted) - log_evidence_under(nothing)
     return Refit(trial.candidate, trial.shapes, fitted, gained, amplitude, (low, high))
 
 

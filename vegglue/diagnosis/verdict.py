@@ -174,8 +174,8 @@ def _field_words(field: FieldFound) -> str:
     what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
     value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNITS[field.term]}"
     return (
-        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.0f} m along "
-        f"and {2 * field.width:.1f} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
+        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
+        f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
     )
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, baseline, for_prediction
-from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, fit
+from vegglue.calibration.baseline import Baseline, baseline, for_prediction, log_evidence
+from vegglue.calibration.fit import fit
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -24,9 +24,8 @@ from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
 from vegglue.storage.result_files import read_posterior, stored_hash
 
-# Standard errors within which a known place is the one found from the prior; and by how much the objective must be
-# lower to be that of another one [-]: ten times what a fit leaves. Chosen, not measured.
-SAME_PLACE, LEADS_LOWER = 1.0, 10.0 * NEGLIGIBLE_DECREASE
+# Standard errors within which two ends of a fit are one place. Chosen, not measured.
+SAME_PLACE = 1.0
 MAKE_ROOM = "make room and run it again"
 
 
@@ -89,16 +88,14 @@ def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
 
 
 def calibrated_anew(case: Case, known: Array | None, aside: pd.DataFrame) -> Baseline:
-    """The case where it predicts best, searched from the prior, whatever ran before; from z = `known` (p,), too, where
-    that leads to a lower objective.
-
-    From the prior it takes a quarter longer than from a known place, since its search is on coarse grids.
+    """The case where it predicts best, searched from the prior, whatever ran before; from z = `known` (p,), too: where
+    they end at different places, the one with more evidence, as the model's own error is another at each.
     """
     model = excluding(model_in(case), aside)
     base = for_prediction(baseline(model, None))
-    if known is None or not _leads_lower(base, known):
+    if known is None or _leads_to(base, known):
         return base
-    return for_prediction(baseline(model, known))
+    return max(base, for_prediction(baseline(model, known)), key=log_evidence)
 
 
 def best_place(base: Baseline) -> dict[str, float]:
@@ -106,11 +103,14 @@ def best_place(base: Baseline) -> dict[str, float]:
     return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}
 
 
-def _leads_lower(base: Baseline, known: Array) -> bool:
-    """Whether the fit from another place ends lower, under the same noise."""
-    fitted = base.fitted
-    away = known - fitted.point.z
-    if away @ np.linalg.solve(fitted.covariance, away) < SAME_PLACE**2:
-        return False
-    start = linearise(base.model, known, fitted.point) or linearise(base.model, known)
-    return start is not None and fit(base.model, base.noise, start).objective < fitted.objective - LEADS_LOWER
+def _leads_to(base: Baseline, known: Array) -> bool:
+    """Whether a fit from another place ends where the base lies, or finds no flow."""
+    if _same_place(base, known):
+        return True
+    start = linearise(base.model, known, base.fitted.point) or linearise(base.model, known)
+    return start is None or _same_place(base, fit(base.model, base.noise, start).point.z)
+
+
+def _same_place(base: Baseline, z: Array) -> bool:
+    away = z - base.fitted.point.z
+    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < SAME_PLACE**2)
