@@ -55,6 +55,11 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> Ma
         longest = length / 4.0 if decrease < predicted / 4.0 else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
         if moved is not None and decrease > 0.0:
             point = moved
+    return at_point(noise, point)
+
+
+def at_point(noise: Noise, point: Point) -> MapEstimate:
+    """What is known at a point, taken for the MAP estimate."""
     return MapEstimate(point, chi2(noise, point), objective(noise, point), covariance(noise, point))
 
 
