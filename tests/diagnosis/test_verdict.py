@@ -197,9 +197,7 @@ def test_odds_are_told_against_the_closest_other_term() -> None:
 def test_a_field_is_none_of_the_known_effects() -> None:
     verdict, sentence, _ = said(grounds(step("a"), field=a_field()), [a_suspect("a")])
     assert verdict == "none-of-these"
-    assert (
-        "some 15 m along and 3 m across, most surely around x = 31.0, y = 0.5 m (+60%), rather than a of" in sentence
-    )
+    assert "some 15 m along and 3 m across, most surely around x = 31.0, y = 0.5 m (+60%), rather than a of" in sentence
     bed = a_field(term="bed", value=-0.12)
     assert "the bed level that differs" in said(grounds(misfit=MISSES, field=bed))[1]
     assert "(-0.12 m)" in said(grounds(misfit=MISSES, field=bed))[1]

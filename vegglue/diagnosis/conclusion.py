@@ -145,7 +145,8 @@ def _field(
     first: Screening, last: Screening, found: Findings, misfit: Misfit
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
-    accepted, or closes a misfit in which nothing was; None where there is nothing to explain.
+    accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
+    same term says it in fewer words.
     """
     if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= POOR):
         return None, None
@@ -153,7 +154,8 @@ def _field(
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
     ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
-    if best.log_factor <= 0.0 or ahead < np.log(FIELD_ODDS):
+    told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
+    if best.log_factor <= 0.0 or ahead < np.log(FIELD_ODDS) or best.term in told_as_place:
         return None, None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid
     i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)

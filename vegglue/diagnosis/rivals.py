@@ -58,7 +58,9 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
     white = noise.whiten(noise.used(column))[:, 0] ** 2
     names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
     share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
-    evidence = {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
+    # What was not worth a refit counts to first order.
+    evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
+    evidence |= {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
     ahead = {name: best.log_evidence - other for name, other in evidence.items() if name != best.kind}
     return Location(
         **places.shapes(best.column),
