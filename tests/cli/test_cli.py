@@ -205,7 +205,7 @@ def test_the_readme_names_commands_and_targets_that_exist() -> None:
 
 def test_every_key_of_the_readmes_table_is_one_of_a_case() -> None:
     known = set(yaml.safe_load(block("yaml"))) | {"extends", "outlet", "infer", "numerics", "eddy_viscosity"}
-    known |= {"survey", "reference", "canopy_correction"}
+    known |= {"survey", "reference", "canopy_correction", "model_error"}
     rows = re.findall(r"^\| ((?:`[a-z_.: ]+`(?:, )?)+) \|", README, re.MULTILINE)
     keys = {re.split(r"[.:]", key)[0] for row in rows for key in re.findall(r"`([^` ]+)[^`]*`", row)} - {"vegglue"}
     assert keys - known == set()

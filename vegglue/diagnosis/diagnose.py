@@ -15,11 +15,11 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_offset
-from vegglue.diagnosis.competition import Contender, chances_of, contenders_of, tempering
+from vegglue.diagnosis.competition import Contender, chances_of, contenders_of, tempered_chances, tempering
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import instrument_found, location_found, step_found
+from vegglue.diagnosis.rivals import instrument_found, location_found, step_found, with_chances
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -103,14 +103,21 @@ def _following(
     odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
     rivals = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
     branches = in_threads(_branch, [(screening, contenders, j, found, say) for j in rivals])
-    possible = [one for one in branches if one is not None]
+    possible = [(j, *one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
-        return possible[0] if possible else None
-    score = np.array(in_threads(_prospect, [(*one, found) for one in possible]))
+        return possible[0][1:] if possible else None
+    ends = in_threads(_prospect, [(following, base, found) for _, following, base in possible])
+    score = np.array(ends) - log_evidence(screening.base)
     best = int(np.argmax(score))
-    vague = len(possible[best][0].places) > len(found.places)
-    clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
-    return None if vague and not clear else possible[best]
+    _, following, base = possible[best]
+    if len(following.places) > len(found.places):
+        clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
+        return (following, base) if clear else None
+    if len(following.steps) > len(found.steps):
+        names = [contenders[j].name for j, _, _ in possible]
+        last = with_chances(following.steps[-1], names, tempered_chances(score))
+        following = replace(following, steps=(*following.steps[:-1], last))
+    return following, base
 
 
 def _prospect(following: Findings, base: Baseline, found: Findings) -> float:

@@ -1,6 +1,7 @@
 """The winner of a competition as a finding, with what may be it instead and how likely that is."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,6 +48,21 @@ def step_found(
         p_family=p,
         others=_others(contenders, chance, "effect"),
     )
+
+
+def with_chances(step: Step, followed: Sequence[str], chance: Array) -> Step:
+    """The step once some contenders have been followed further: the chances that they have together are shared anew.
+
+    chance (k,): of each contender followed, by name, the accepted one among them.
+    """
+    told = step.chance | step.others
+    together = sum(told.get(name, 0.0) for name in followed)
+    told |= {name: float(p) * together for name, p in zip(followed, chance, strict=True) if name in told}
+    least = HARDLY * max(told.values())
+    rivals = tuple(sorted((name for name in step.rivals if told[name] >= least), key=lambda name: -told[name]))
+    groups = tuple(group for old in step.groups if (group := tuple(name for name in old if name in rivals)))
+    others = {name: told[name] for name in step.others if told[name] >= least}
+    return replace(step, rivals=rivals, chances=tuple(told[name] for name in rivals), groups=groups, others=others)
 
 
 def location_found(screening: Screening, contenders: Sequence[Contender], accepted: int, refit: Refit) -> Location:
