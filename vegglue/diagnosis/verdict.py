@@ -8,12 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.diagnosis.causes_in_words import (
+    causes_in_words,
+    field_sentence,
+    instruments_in_words,
+    model_error_in_words,
+    with_their_chances,
+)
 from vegglue.diagnosis.findings import Findings
 from vegglue.results.diagnosis import (
     EstimatedErrors,
-    FaultyInstrument,
     FieldFound,
-    Location,
     Misfit,
     ModelErrorUsed,
     Step,
@@ -26,8 +31,6 @@ from vegglue.results.diagnosis import (
 MOST_GROUPS = 3
 # Chance of the last misfit under errors alone, below which something is still missing.
 POOR = 1e-3
-# Chance of what is named, below which it is stated: above, it would be told as 100 %.
-STATED_BELOW = 0.995
 # Share of the effects that must be testable before it is said that nothing is missing.
 TESTABLE_SHARE = 0.25
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
@@ -46,8 +49,6 @@ NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 ABSURD, FAR_OFF = 4.0, 4.0
-# Standard error of a place [m] below which its digits say enough.
-TOLD_ERROR = 0.3
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound.
 AT_BOUND = 0.03
 
@@ -88,9 +89,9 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
     if found.absurd:
         return "cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}"
     doubt = _doubt(grounds, suspects)
-    named = _named(found, suspects)
+    named = causes_in_words(found, suspects)
     if grounds.field is not None:
-        words = _field_words(grounds.field) + (f", rather than {named}" if named else "")
+        words = field_sentence(grounds.field) + (f", rather than {named}" if named else "")
         return "none-of-these", f"None of the known effects: {words} ({_told(misfit)} without it)."
     if found.places or found.steps:
         if doubt:
@@ -98,11 +99,11 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         if found.places:
             return "none-of-these", f"None of the known effects: {named}; {_told(misfit)} with it."
         if len(found.steps[0].groups) > MOST_GROUPS:
-            names = ", ".join(_likely(found.steps[0], found.steps[0].rivals))
+            names = ", ".join(with_their_chances(found.steps[0], found.steps[0].rivals))
             which = f"which of {names} it is (chances among those calibrated)"
             return "cannot-tell", f"Something is missing, but these data cannot tell {which}."
         single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
-        also = f" {_instruments(found.instruments)}" if found.instruments else ""
+        also = f" {instruments_in_words(found.instruments)}" if found.instruments else ""
         return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with it.{also}"
     if found.undecided:
         names = " or ".join(one.name for one in found.undecided[:3])
@@ -138,66 +139,6 @@ def _is_at_bound(suspect: Suspect) -> bool:
     return any(abs(amplitude.value - end) < margin for end in amplitude.support if end != amplitude.off)
 
 
-def _named(found: Findings, suspects: Sequence[Suspect]) -> str:
-    places = [_place_words(one) for one in found.places]
-    return "; and ".join([*places, *(_step_words(step, suspects) for step in found.steps)])
-
-
-def _place_words(place: Location) -> str:
-    what = {
-        "drag": "something holds the flow back" if place.amplitude > 0 else "something lets the flow pass",
-        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
-        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
-        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
-    }[place.term]
-    rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
-    against = [
-        f"{_odds(odds)} to 1 against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]
-    ]
-    low, high = place.interval95
-    unit = f" {place.unit}"
-    at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
-    told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
-    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
-
-
-def _give_or_take(error: float) -> str:
-    """(give or take 4 m), where that is more than is told by a digit."""
-    return f" (give or take {error:.1f})" if error > TOLD_ERROR else ""
-
-
-def _odds(odds: float) -> str:
-    return "over 1,000" if odds > 1000 else f"{odds:.0f}"
-
-
-def _field_words(field: FieldFound) -> str:
-    what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
-    value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNITS[field.term]}"
-    return (
-        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
-        f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
-    )
-
-
-UNITS = {"bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
-
-
-def _instruments(instruments: Sequence[FaultyInstrument]) -> str:
-    return " ".join(f"{_instrument_words(one)}." for one in instruments)
-
-
-def _instrument_words(one: FaultyInstrument) -> str:
-    where = ", ".join(f"{name} = {value:.4g}" for name, value in (("x", one.x), ("y", one.y)) if np.isfinite(value))
-    what = {
-        "reading": f"One reading at {where} m is off",
-        "position": f"The probe at {where} m is off in all experiments",
-        "probe": f"The probe at {where} m is off in all sections",
-        "gauge": f"The gauge at {where} m is off in all experiments",
-    }[one.kind]
-    low, high = one.interval95
-    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}); it was set aside"
-
-
 def _told(misfit: Misfit) -> str:
     return f"chi2 is {misfit.chi2:.0f} for {misfit.freedom} degrees of freedom"
 
@@ -225,7 +166,7 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
         "twice a plausible size)."
     )
     if grounds.findings.instruments:
-        return "instrument", f"{_instruments(grounds.findings.instruments)} Nothing else is missing: {nothing}"
+        return "instrument", f"{instruments_in_words(grounds.findings.instruments)} Nothing else is missing: {nothing}"
     return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
 
 
@@ -251,55 +192,21 @@ def _unearned(grounds: Grounds) -> str:
     return ""
 
 
-def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
-    by_name = {suspect.name: suspect for suspect in suspects}
-    best = by_name[step.accepted]
-    low, high = best.amplitude.interval95
-    unit = "" if best.amplitude.unit == "-" else f" {best.amplitude.unit}"
-    words = f"{step.accepted} of {best.amplitude.value:.3g}{unit} ({low:.3g} to {high:.3g}; {best.title.lower()})"
-    alike = next(group for group in step.groups if step.accepted in group)
-    same = [name for name in alike if name != step.accepted]
-    rest = [name for name in step.rivals if name not in alike]
-    own = sum(step.chance[name] for name in alike)
-    if same:
-        words += f", which leaves the same trace in these data as {', '.join(same)}"
-    if rest or own < STATED_BELOW:
-        words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
-    others = [f"{name} ({chance:.0%})" for name, chance in step.others.items()]
-    return words + (f", or else {' or '.join([*_likely(step, rest), *others])}" if rest or others else "")
-
-
-def _likely(step: Step, names: Sequence[str]) -> list[str]:
-    """Names with their chances."""
-    return [f"{name} ({step.chance[name]:.0%})" for name in names]
-
-
 def _remarks(grounds: Grounds, suspects: Sequence[Suspect]) -> list[str]:
     errors, remarks = grounds.errors, []
     if grounds.model_error is not None:
-        remarks.append(_model_error_words(grounds.model_error))
+        remarks.append(model_error_in_words(grounds.model_error))
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
     if grounds.findings.instruments and (grounds.findings.places or grounds.field is not None):
-        remarks.append(_instruments(grounds.findings.instruments))
+        remarks.append(instruments_in_words(grounds.findings.instruments))
     hidden = [suspect for suspect in suspects if not suspect.detectability.testable]
     if hidden:
         names = ", ".join(_untestable(suspect) for suspect in hidden)
         remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
     return remarks
-
-
-def _model_error_words(used: ModelErrorUsed) -> str:
-    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 3 %."""
-    allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
-    needs = (
-        "none of it"
-        if used.needed == 0.0
-        else f"{used.needed * used.friction:.1%} and {100 * used.needed * used.bed:.2g} cm"
-    )
-    return f"The model is allowed to be wrong {allowed}; it needs {needs}."
 
 
 def _open(groups: Sequence[Sequence[str]]) -> list[str]:

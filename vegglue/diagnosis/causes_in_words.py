@@ -1,0 +1,118 @@
+"""What was found, in words: effects, places, fields, instruments, each with its size, and the model's own error."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vegglue.diagnosis.findings import Findings
+from vegglue.results.diagnosis import (
+    FaultyInstrument,
+    FieldFound,
+    Location,
+    ModelErrorUsed,
+    Step,
+    Suspect,
+)
+
+# Chance of what is named, below which it is stated: above, it would be told as 100 %.
+STATED_BELOW = 0.995
+# Standard error of a place [m] below which its digits say enough.
+TOLD_ERROR = 0.3
+
+
+def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
+    """Places, then effects."""
+    places = [_place_words(one) for one in found.places]
+    return "; and ".join([*places, *(_step_words(step, suspects) for step in found.steps)])
+
+
+def _place_words(place: Location) -> str:
+    what = {
+        "drag": "something holds the flow back" if place.amplitude > 0 else "something lets the flow pass",
+        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
+        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
+        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
+    }[place.term]
+    rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
+    against = [
+        f"{_odds(odds)} to 1 against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]
+    ]
+    low, high = place.interval95
+    unit = f" {place.unit}"
+    at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
+    told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
+    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
+
+
+def _give_or_take(error: float) -> str:
+    """(give or take 4 m), where that is more than is told by a digit."""
+    return f" (give or take {error:.1f})" if error > TOLD_ERROR else ""
+
+
+def _odds(odds: float) -> str:
+    return "over 1,000" if odds > 1000 else f"{odds:.0f}"
+
+
+def field_sentence(field: FieldFound) -> str:
+    """What varies, over which distance, and where most surely."""
+    what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
+    value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNIT_OF_TERM[field.term]}"
+    return (
+        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
+        f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
+    )
+
+
+# Units of fields by their terms.
+UNIT_OF_TERM = {"bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
+
+
+def instruments_in_words(instruments: Sequence[FaultyInstrument]) -> str:
+    """A sentence for each that is off."""
+    return " ".join(f"{_instrument_words(one)}." for one in instruments)
+
+
+def _instrument_words(one: FaultyInstrument) -> str:
+    where = ", ".join(f"{name} = {value:.4g}" for name, value in (("x", one.x), ("y", one.y)) if np.isfinite(value))
+    what = {
+        "reading": f"One reading at {where} m is off",
+        "position": f"The probe at {where} m is off in all experiments",
+        "probe": f"The probe at {where} m is off in all sections",
+        "gauge": f"The gauge at {where} m is off in all experiments",
+    }[one.kind]
+    low, high = one.interval95
+    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}); it was set aside"
+
+
+def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
+    by_name = {suspect.name: suspect for suspect in suspects}
+    best = by_name[step.accepted]
+    low, high = best.amplitude.interval95
+    unit = "" if best.amplitude.unit == "-" else f" {best.amplitude.unit}"
+    words = f"{step.accepted} of {best.amplitude.value:.3g}{unit} ({low:.3g} to {high:.3g}; {best.title.lower()})"
+    alike = next(group for group in step.groups if step.accepted in group)
+    same = [name for name in alike if name != step.accepted]
+    rest = [name for name in step.rivals if name not in alike]
+    own = sum(step.chance[name] for name in alike)
+    if same:
+        words += f", which leaves the same trace in these data as {', '.join(same)}"
+    if rest or own < STATED_BELOW:
+        words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
+    others = [f"{name} ({chance:.0%})" for name, chance in step.others.items()]
+    return words + (f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else "")
+
+
+def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
+    """Names with their chances."""
+    return [f"{name} ({step.chance[name]:.0%})" for name in names]
+
+
+def model_error_in_words(used: ModelErrorUsed) -> str:
+    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 3 %."""
+    allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
+    needs = (
+        "none of it"
+        if used.needed == 0.0
+        else f"{used.needed * used.friction:.1%} and {100 * used.needed * used.bed:.2g} cm"
+    )
+    return f"The model is allowed to be wrong {allowed}; it needs {needs}."
