@@ -37,7 +37,7 @@ TERM_OF: dict[str, Term] = {
 # next, a survey from one line of points to the next, about half a width. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
 # What a spot leaves of an object of another shape, over the size of the spot [-], and how far around it, over its size.
-# Chosen after open-f, where a spot left 0.3 of the trace of a smaller pier in neighbouring places.
+# Chosen, not measured, after open-f: beside the spot two more places were accepted there without it, and none with it.
 SHAPE_ERROR, AROUND = 0.5, 2.0
 # Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
 BUMP_CELLS = 1.5

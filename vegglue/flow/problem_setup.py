@@ -41,7 +41,9 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     setting = case.experiments[experiment]
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
-    added = _added_to_site(effects, geometry, share_under_water(case, site, setting)) if geometry else {}
+    added = _added_to_site(effects, geometry) if geometry else {}
+    if "inflow" in added:
+        added["inflow"] = _into_water(added["inflow"], share_under_water(case, site, setting))
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
@@ -160,22 +162,21 @@ def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
     return np.clip(expected_depth(case, site, setting) / WHERE_WATER_ENTERS, 0.0, 1.0)
 
 
-def _added_to_site(
-    effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, under_water: Array
-) -> dict[str, Array]:
-    """By how much members' beds lie higher [m] and what enters there [m/s], (nx, ny, m), as far as effects say so; what
-    would enter over land enters in the water beside it.
-    """
+def _into_water(entering: Array, under_water: Array) -> Array:
+    """What would enter over land enters in the water beside it, (nx, ny, m) [m/s]: each member's sum stays."""
+    wet = entering * under_water[..., None]
+    left = wet.sum(axis=(0, 1))
+    return np.asarray(wet * (entering.sum(axis=(0, 1)) / np.where(left == 0.0, 1.0, left)))
+
+
+def _added_to_site(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> dict[str, Array]:
+    """By how much members' beds lie higher [m] and what enters there [m/s], (nx, ny, m), as far as effects say so."""
     here = [active for active in effects if active.effect.stage == "site" and active.on.any()]
     if not here:
         return {}
     zero = np.zeros((*geometry.bed.shape[:2], len(next(iter(here[0].values.values())))))
     change = applied(effects, "site", geometry, {"bed": zero, "inflow": zero})
-    found = {name: np.ascontiguousarray(value) for name, value in change.items() if value is not zero}
-    if "inflow" in found:
-        total, wet = found["inflow"].sum(axis=(0, 1)), found["inflow"] * under_water[..., None]
-        found["inflow"] = wet * (total / np.where(wet.sum(axis=(0, 1)) == 0.0, 1.0, wet.sum(axis=(0, 1))))
-    return found
+    return {name: np.ascontiguousarray(value) for name, value in change.items() if value is not zero}
 
 
 def boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
