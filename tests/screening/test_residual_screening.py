@@ -1,7 +1,6 @@
 """Screening of a residual that is errors only: the whole way, errors estimated as for any other."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,9 +43,9 @@ def screened(values: Array, effects: int = EFFECTS, flagged: tuple[int, ...] = (
         for k, term in enumerate(EFFECT_AT_PLACE)
     )
     columns = [np.array([column]) for column in range(effects)]
-    tested = columns, [{}] * effects, AMPLITUDES[:effects], of_effects[:, :effects]
-    known = Fingerprints(base.fitted.point, [], *tested, places)
-    return screen(base, flagged, before=SimpleNamespace(fingerprints=known))
+    settings, amplitudes, tested = [{}] * effects, AMPLITUDES[:effects], of_effects[:, :effects]
+    known = Fingerprints(base.fitted.point, [], columns, settings, amplitudes, [], tested, places)
+    return screen(base, flagged, known)
 
 
 def measured(random: np.random.Generator, missing: Array | float = 0.0) -> Array:

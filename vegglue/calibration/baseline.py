@@ -82,15 +82,15 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
     start = None if z is None else linearise(model, z, near) or linearise(model, z)
-    first = _with_grid_error(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
-    base = _with_grid_error(_with_coarse_point(first))
+    first = with_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
+    base = with_error_of_grid(with_coarse_point(first))
     if near is not None and base.noise.model_error.any() and _is_near(base, near.z):
-        return _with_coarse_point(base)
+        return with_coarse_point(base)
     # The model's own error moves the best place, and is another there.
     return with_own_error(base)
 
 
-def _with_coarse_point(base: Baseline) -> Baseline:
+def with_coarse_point(base: Baseline) -> Baseline:
     """With the point on coarse cells at the same z."""
     coarse, z = base.coarse, base.fitted.point.z
     return replace(base, on_coarse=None if coarse is None else linearise(coarse, z, base.on_coarse))
@@ -112,7 +112,7 @@ def _found(model: Model, start: Point | None) -> Point:
     return start
 
 
-def _with_grid_error(base: Baseline) -> Baseline:
+def with_error_of_grid(base: Baseline) -> Baseline:
     """The error of the grid from its point on coarse cells, and the model calibrated under it."""
     noise = with_grid_error(base.noise, grid_difference(base.fitted.point, base.on_coarse))
     return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
@@ -132,7 +132,7 @@ def with_own_error(base: Baseline) -> Baseline:
     search = search_model(base)
     noise = with_model_error(base.noise, model_error_columns(search.model, search.point, allowed))
     fitted = fit(base.model, noise, base.fitted.point)
-    return _with_coarse_point(replace(base, noise=noise, fitted=fitted))
+    return with_coarse_point(replace(base, noise=noise, fitted=fitted))
 
 
 def log_evidence(base: Baseline) -> float:

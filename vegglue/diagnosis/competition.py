@@ -22,7 +22,7 @@ from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.progress import Say
 from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import HypothesisKind, log_factors
+from vegglue.screening.evidence import HypothesisKind, log_factors, prior_shrinkage
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
@@ -32,6 +32,9 @@ from vegglue.screening.second_look import SecondLook, second_look
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
 MOST_REFITTED, REACH = 8, 6.0
+# Odds by which the best must lead, or others are followed too, and by which what is vaguer, a place or a field, must
+# beat the rest: 10 to 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091).
+LEAST_ODDS = 10.0
 # Shares of the size that its score promises from which something at a place is refitted: at all of it a flow may not be
 # found. Chosen, not measured.
 START_SHARES = (1.0, 0.3)
@@ -152,8 +155,7 @@ def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
     kind = next(kind for kind in screening.kinds if kind.name == places.term)
     shapes = places.shapes(spot)
     candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[places.term]], shapes, places.plausible)
-    size = kind.size[spot]
-    gain = kind.scores[spot] * places.plausible / max(size, 1e-300) * size**2 / (1.0 + size**2)
+    gain = kind.scores[spot] * places.plausible / max(kind.size[spot], 1e-300) * prior_shrinkage(kind.size[spot])
     starts = (start_with(case, candidate, shapes, search.point.z, share * float(gain)) for share in START_SHARES)
     return RefitTrial(candidate, shapes, tuple(starts))
 

@@ -1,17 +1,14 @@
 """What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
-import scipy.linalg
 import scipy.stats
 
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, interval95
-from vegglue.calibration.noise import covariance_of
-from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.field_scan import best_field, map_of_field
+from vegglue.diagnosis.competition import LEAST_ODDS, tempering
+from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
@@ -39,8 +36,6 @@ from vegglue.version import VERSION
 
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
-# Odds by which a field must beat all that was accepted: 10 to 1, as a place an effect.
-FIELD_ODDS = 10.0
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -125,17 +120,12 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
     """By how much the model may be wrong, and the share of it that the residual makes likeliest; None where none is
     allowed.
     """
-    noise, allowed, search = screening.search.noise, screening.base.model.case.model_error, screening.search
+    search, allowed = screening.search, screening.base.model.case.model_error
+    noise = search.noise
     if not noise.model_error.any():
         return None
-    slope = noise.used(search.point.slope)
-    residual = noise.residual(search.point.prediction) + slope @ search.point.z
-    without = covariance_of(replace(noise, model_error=np.zeros_like(noise.model_error))) + slope @ slope.T
-    logs = []
-    for share in ERROR_SHARES:
-        factor = scipy.linalg.cho_factor(without + share**2 * noise.model_error, lower=True)
-        misfit = residual @ scipy.linalg.cho_solve(factor, residual)
-        logs.append(-0.5 * misfit - np.log(np.diag(factor[0])).sum())
+    whole, residual = free_of_prior(search)
+    logs = [log_density(whole + (share**2 - 1.0) * noise.model_error, residual) for share in ERROR_SHARES]
     best = int(np.argmax(logs))
     gained = float(logs[best] - logs[ERROR_SHARES.index(1.0)])
     return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
@@ -155,7 +145,7 @@ def _field(
     gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
     ahead = (best.log_factor - gained) / tempering(np.array(best.log_factor))
     told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
-    if best.log_factor <= 0.0 or ahead < np.log(FIELD_ODDS) or best.term in told_as_place:
+    if best.log_factor <= 0.0 or ahead < np.log(LEAST_ODDS) or best.term in told_as_place:
         return None, None
     mapped, grid = map_of_field(screening.search, responses, best), responses.grid
     i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)

@@ -8,18 +8,25 @@ and from the last screening.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_offset
-from vegglue.diagnosis.competition import Contender, chances_of, contenders_of, tempered_chances, tempering
+from vegglue.diagnosis.competition import (
+    LEAST_ODDS,
+    Contender,
+    chances_of,
+    contenders_of,
+    tempered_chances,
+    tempering,
+)
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import instrument_found, location_found, step_found, with_chances
+from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -28,7 +35,7 @@ from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import in_threads
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
-from vegglue.screening.candidates import candidates_in_case
+from vegglue.screening.candidates import candidate_in_case
 from vegglue.screening.evidence import alarm_p
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.residual_screening import Screening, screen
@@ -42,12 +49,17 @@ MISPLACED_SHARE = 0.1
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 # Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
 MOST_FOLLOWED = 3
-# Odds by which the best must lead, or others are followed too, and by which a place must then beat every other: 10 to
-# 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091); it is the vaguer
-# answer.
-LEAST_ODDS = 10.0
 # Odds within which another of the same kind is followed: the grid that hypotheses are searched on decides no closer.
 SAME_KIND_ODDS = 3.0
+
+
+@dataclass(frozen=True)
+class Following:
+    """What is found with one contender more, the model that follows, and its screening where it is at hand."""
+
+    found: Findings
+    base: Baseline
+    screening: Screening | None = None
 
 
 def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None) -> Diagnosis:
@@ -73,15 +85,16 @@ def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None)
         if following is None:
             found = replace(found, undecided=tuple(contenders))
             break
-        more = following[0].accepted > found.accepted
-        found, base = following
+        more, base = following.found.accepted > found.accepted, following.base
+        found = following.found
         if more:
             base, steps = with_rivals_again(base, found.steps, suspects, say)
             found = replace(found, steps=steps)
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
         say("looking for what is missing with it")
-        screening = screen(base, found.flagged)
+        at_hand = following.screening if base is following.base else None
+        screening = at_hand or screen(base, found.flagged)
     return concluded(first, screening, found, suspects, unseen)
 
 
@@ -91,9 +104,7 @@ def _with_alarm(screening: Screening, found: Findings) -> Findings:
     return replace(found, p=alarm_p(screening.kinds, screening.errors, 1, slack), rate=rate)
 
 
-def _following(
-    screening: Screening, contenders: Sequence[Contender], found: Findings, say: Say
-) -> tuple[Findings, Baseline] | None:
+def _following(screening: Screening, contenders: Sequence[Contender], found: Findings, say: Say) -> Following | None:
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
@@ -103,34 +114,40 @@ def _following(
     odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
     rivals = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
     branches = in_threads(_branch, [(screening, contenders, j, found, say) for j in rivals])
-    possible = [(j, *one) for j, one in zip(rivals, branches, strict=True) if one is not None]
+    possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
-        return possible[0][1:] if possible else None
-    ends = in_threads(_prospect, [(following, base, found) for _, following, base in possible])
-    score = np.array(ends) - log_evidence(screening.base)
+        return possible[0][1] if possible else None
+    ends = in_threads(_screened, [(one,) for _, one in possible])
+    score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
     best = int(np.argmax(score))
-    _, following, base = possible[best]
-    if len(following.places) > len(found.places):
+    following = ends[best]
+    if len(following.found.places) > len(found.places):
         clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
-        return (following, base) if clear else None
-    if len(following.steps) > len(found.steps):
-        names = [contenders[j].name for j, _, _ in possible]
-        last = with_chances(following.steps[-1], names, tempered_chances(score))
-        following = replace(following, steps=(*following.steps[:-1], last))
-    return following, base
+        return following if clear else None
+    if len(following.found.steps) > len(found.steps):
+        *earlier, last = following.found.steps
+        names = [contenders[j].name for j, _ in possible]
+        last = followed_further(last, names, tempered_chances(score))
+        following = replace(following, found=replace(following.found, steps=(*earlier, last)))
+    return following
 
 
-def _prospect(following: Findings, base: Baseline, found: Findings) -> float:
+def _screened(one: Following) -> Following:
+    return replace(one, screening=screen(one.base, one.found.flagged))
+
+
+def _prospect(one: Following, found: Findings) -> float:
     """ln evidence of a model and of the best that could come next, to first order, less that of the prior so far."""
-    screening = screen(base, following.flagged)
-    p = _with_alarm(screening, following)
-    further = max(kind.total for kind in screening.kinds) if p.alarmed else 0.0
-    return log_evidence(base) + following.log_prior - found.log_prior + max(further, 0.0)
+    assert one.screening is not None
+    further = 0.0
+    if _with_alarm(one.screening, one.found).alarmed:
+        further = max(0.0, *(kind.total for kind in one.screening.kinds))
+    return log_evidence(one.base) + one.found.log_prior - found.log_prior + further
 
 
 def _branch(
     screening: Screening, contenders: Sequence[Contender], j: int, found: Findings, say: Say
-) -> tuple[Findings, Baseline] | None:
+) -> Following | None:
     """What is found with one contender, and the model that follows; None when there are enough, or no flow with it."""
     one = contenders[j]
     if isinstance(one.what, Instrument):
@@ -141,7 +158,7 @@ def _branch(
 
 def _without_instrument(
     screening: Screening, best: Contender, instrument: Instrument, found: Findings, say: Say
-) -> tuple[Findings, Baseline]:
+) -> Following:
     """One instrument set aside, and the model calibrated without what its readings share."""
     say(f"setting aside a {best.kind} that is off")
     base, readings = screening.base, instrument.readings
@@ -151,12 +168,12 @@ def _without_instrument(
     following = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
     # An offset is all but free in the covariance: its prior is charged here, as it was in the competition.
     charge = best.log_evidence - (log_evidence(following) - log_evidence(base))
-    return replace(found, instruments=faulty, flagged=flagged, log_prior=found.log_prior + charge), following
+    return Following(replace(found, instruments=faulty, flagged=flagged, log_prior=found.log_prior + charge), following)
 
 
 def _with_accepted(
     screening: Screening, contenders: Sequence[Contender], j: int, refit: Refit, found: Findings, say: Say
-) -> tuple[Findings, Baseline] | None:
+) -> Following | None:
     """An effect or place accepted, and the model with it; None when it explains less than nothing does, has so many
     rivals that they say nothing, or no flow is found with it.
     """
@@ -174,13 +191,15 @@ def _with_accepted(
         log_prior=found.log_prior + one.log_evidence - refit.log_factor,
     )
     if one.kind != "effect":
-        return replace(found, places=(*found.places, location_found(screening, contenders, j, refit))), further
+        return Following(
+            replace(found, places=(*found.places, location_found(screening, contenders, j, refit))), further
+        )
     step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None
     further, unneeded = pruned(further, [one.accepted for one in found.steps], say)
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
-    return replace(found, steps=(*kept, step)), further
+    return Following(replace(found, steps=(*kept, step)), further)
 
 
 def _kept(suspects: Mapping[str, Suspect], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
@@ -199,6 +218,6 @@ def _calibrated(contenders: Sequence[Contender], tested: Mapping[str, Suspect]) 
 
 def _in_model(suspect: Suspect, base: Baseline) -> Suspect:
     """An accepted suspect with its amplitude in the model as it is now."""
-    one = next(one for one in candidates_in_case(base.model.case).values() if one.name == suspect.name)
+    one = candidate_in_case(base.model.case, suspect.name)
     value, low, high = interval95(base.model, base.fitted, one.parameter)
     return replace(suspect, amplitude=replace(suspect.amplitude, value=value, interval95=(low, high)))

@@ -57,8 +57,8 @@ class FieldMap:
 def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
     """Every field that is tried, the one with the most evidence first, and the responses that they were made of."""
     responses = cell_responses(search.model, search.point, tuple(FIELD_SIZES))
-    whole, residual = _without_field(search)
-    nothing = _log_density(whole, residual)
+    whole, residual = free_of_prior(search)
+    nothing = log_density(whole, residual)
     found = []
     for term, sizes in FIELD_SIZES.items():
         for length, width in FIELD_SHAPES:
@@ -66,7 +66,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
             columns = search.noise.used(field_columns(responses, term, over))
             gram = columns @ columns.T
             for size in sizes:
-                gained = _log_density(whole + size**2 * gram, residual) - nothing
+                gained = log_density(whole + size**2 * gram, residual) - nothing
                 found.append(FieldHypothesis(term, over, size, gained))
     return sorted(found, key=lambda one: -one.log_factor), responses
 
@@ -90,7 +90,7 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
 
     L L' = F F' + C + J J', and sizes a ~ N(0, 1) before the data.
     """
-    whole, residual = _without_field(search)
+    whole, residual = free_of_prior(search)
     along, across = one.over.along, one.over.across
     scale = np.sqrt((along**2).sum(axis=0).mean() * (across**2).sum(axis=0).mean())
     columns = search.noise.used(field_columns(responses, one.term, one.over)) * one.size
@@ -105,14 +105,15 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
     return FieldMap(unit * (along.T @ sizes @ across), unit * np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _without_field(search: SearchModel) -> tuple[Array, Array]:
+def free_of_prior(search: SearchModel) -> tuple[Array, Array]:
     """C + J J' (n, n), and the residual at the middle of the prior to first order (n,)."""
     noise, point = search.noise, search.point
     slope = noise.used(point.slope)
     return covariance_of(noise) + slope @ slope.T, noise.residual(point.prediction) + slope @ point.z
 
 
-def _log_density(covariance: Array, residual: Array) -> float:
+def log_density(covariance: Array, residual: Array) -> float:
+    """ln N(r; 0, covariance) of a residual (n,), up to a constant."""
     factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
     misfit = float(residual @ scipy.linalg.cho_solve((factor, lower), residual))
     return -0.5 * misfit - float(np.log(np.diag(factor)).sum())

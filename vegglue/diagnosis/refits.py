@@ -13,16 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, grid_difference, with_own_error
+from vegglue.calibration.baseline import (
+    Baseline,
+    SearchModel,
+    with_coarse_point,
+    with_error_of_grid,
+    with_own_error,
+)
 from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_under
-from vegglue.calibration.noise import with_grid_error
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise
 from vegglue.parallel import in_threads
 from vegglue.progress import Say
 from vegglue.results.diagnosis import Suspect
-from vegglue.screening.candidates import Candidate, candidates_in_case, start_amplitude, with_effect
+from vegglue.screening.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 
 # Steps that a refit may take. Chosen, not measured: most need four.
 REFIT_STEPS = 10
@@ -70,11 +75,6 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial]) -> list[Refit |
     return found
 
 
-def changed_case(case: Case, trial: RefitTrial) -> Case:
-    """The case with what is tried."""
-    return with_effect(case, trial.candidate, trial.shapes)
-
-
 def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z: Array, gain: float) -> Array:
     """z (p + 1,) of the changed case: z (p,) and the amplitude of that gain."""
     changed = with_effect(case, candidate, shapes)
@@ -83,13 +83,13 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
 
 
 def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
-    model = replace(search.model, case=changed_case(search.model.case, trial))
+    model = _with(search.model, trial)
     point = linearise(model, start, search.point) or linearise(model, start)
     return None if point is None else fit(model, search.noise, point, REFIT_STEPS)
 
 
 def _refit(search: SearchModel, trial: RefitTrial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
-    model = replace(search.model, case=changed_case(search.model.case, trial))
+    model = _with(search.model, trial)
     amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
     gained = log_evidence_under(fitted) - log_evidence_under(nothing)
     return Refit(trial.candidate, trial.shapes, fitted, gained, amplitude, (low, high))
@@ -106,14 +106,12 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     start = linearise(model, place.z, place) or linearise(model, place.z)
     if start is None:
         return None
-    fitted, coarse = fit(model, base.noise, start), _with(base.coarse, best)
-    on_coarse = linearise(coarse, fitted.point.z, base.on_coarse)
-    noise = with_grid_error(base.noise, grid_difference(fitted.point, on_coarse))
-    return with_own_error(Baseline(model, noise, fit(model, noise, fitted.point), coarse, on_coarse))
+    trial = Baseline(model, base.noise, fit(model, base.noise, start), _with(base.coarse, best), base.on_coarse)
+    return with_own_error(with_error_of_grid(with_coarse_point(trial)))
 
 
-def _with(model: Model, best: Refit) -> Model:
-    return replace(model, case=with_effect(model.case, best.candidate, best.shapes))
+def _with(model: Model, tried: RefitTrial | Refit) -> Model:
+    return replace(model, case=with_effect(model.case, tried.candidate, tried.shapes))
 
 
 # An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
@@ -124,7 +122,7 @@ def pruned(base: Baseline, earlier: list[str], say: Say) -> tuple[Baseline, list
     """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
     unneeded: list[str] = []
     for name in earlier:
-        one = next(one for one in candidates_in_case(base.model.case).values() if one.name == name)
+        one = candidate_in_case(base.model.case, name)
         j = base.model.names.index(one.parameter)
         spread = float(np.sqrt(base.fitted.covariance[j, j]))
         off = z_of(base.model.case.parameters[one.parameter], one.effect.amplitude.off)
@@ -150,7 +148,6 @@ def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
     start = linearise(less(base.model), base.fitted.point.z[kept], base.fitted.point)
     if start is None:
         return None
-    fitted = fit(less(base.model), base.noise, start)
     coarse = None if base.coarse is None else less(base.coarse)
-    on_coarse = None if coarse is None else linearise(coarse, fitted.point.z, base.on_coarse)
-    return Baseline(less(base.model), base.noise, fitted, coarse, on_coarse)
+    fitted = fit(less(base.model), base.noise, start)
+    return with_coarse_point(Baseline(less(base.model), base.noise, fitted, coarse, base.on_coarse))

@@ -1,6 +1,6 @@
 """The winner of a competition as a finding, with what may be it instead and how likely that is."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from vegglue.diagnosis.refits import Refit
 from vegglue.measurements.kinds import kind_of
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 from vegglue.screening import score_test
+from vegglue.screening.evidence import prior_shrinkage
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.residual_screening import Screening
 
@@ -37,8 +38,8 @@ def step_found(
     columns = [contenders[j].column for j in listed]
     cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
     found, groups = rivals_among(names, chance[listed], cosine)
-    base = screening.base
-    return Step(
+    base, others = screening.base, _others(contenders, chance, "effect")
+    step = Step(
         accepted=contenders[accepted].name,
         rivals=tuple(found),
         chances=tuple(found.values()),
@@ -46,23 +47,34 @@ def step_found(
         chi2_before=chi2(base.noise, base.fitted.point),
         chi2_after=further.fitted.chi2,
         p_family=p,
-        others=_others(contenders, chance, "effect"),
+        others=others,
     )
+    # What is accepted on trial may lie outside the set of the likeliest.
+    return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
 
 
-def with_chances(step: Step, followed: Sequence[str], chance: Array) -> Step:
+def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
     """The step once some contenders have been followed further: the chances that they have together are shared anew.
 
     chance (k,): of each contender followed, by name, the accepted one among them.
     """
     told = step.chance | step.others
     together = sum(told.get(name, 0.0) for name in followed)
-    told |= {name: float(p) * together for name, p in zip(followed, chance, strict=True) if name in told}
+    told |= {name: float(p) * together for name, p in zip(followed, chance, strict=True)}
+    return with_chances(step, step.accepted, told)
+
+
+def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
+    """The step with an accepted rival and other chances, by name; without what has become negligible."""
     least = HARDLY * max(told.values())
-    rivals = tuple(sorted((name for name in step.rivals if told[name] >= least), key=lambda name: -told[name]))
-    groups = tuple(group for old in step.groups if (group := tuple(name for name in old if name in rivals)))
-    others = {name: told[name] for name in step.others if told[name] >= least}
-    return replace(step, rivals=rivals, chances=tuple(told[name] for name in rivals), groups=groups, others=others)
+    possible = sorted({accepted, *(name for name in told if told[name] >= least)}, key=lambda name: -told[name])
+    rivals = tuple(name for name in possible if name in step.rivals or name == accepted)
+    groups = [group for old in step.groups if (group := tuple(name for name in old if name in rivals))]
+    if not any(accepted in group for group in groups):
+        groups.append((accepted,))
+    others = {name: told[name] for name in step.others if name in possible and name not in rivals}
+    chances = tuple(told[name] for name in rivals)
+    return replace(step, accepted=accepted, rivals=rivals, chances=chances, groups=tuple(groups), others=others)
 
 
 def location_found(screening: Screening, contenders: Sequence[Contender], accepted: int, refit: Refit) -> Location:
@@ -105,7 +117,7 @@ def instrument_found(screening: Screening, best: Contender, one: Instrument) -> 
     noise = screening.base.noise
     kind = next(of for of in screening.kinds if of.name == best.kind)
     length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
-    shrunk = kind.size[best.column] ** 2 / (1.0 + kind.size[best.column] ** 2)
+    shrunk = float(prior_shrinkage(kind.size[best.column]))
     offset, spread = shrunk * score / length, np.sqrt(shrunk) / length
     station = screening.base.model.station.iloc[noise.rows[one.readings[0]]]
     return FaultyInstrument(

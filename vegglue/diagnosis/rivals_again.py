@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.diagnosis.competition import tempered_chances
 from vegglue.diagnosis.refits import Refit, RefitTrial, calibrated_with, refits_of, start_with, without_effect
-from vegglue.diagnosis.rivals import IN_SET
+from vegglue.diagnosis.rivals import with_chances
 from vegglue.progress import Say
 from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening.candidates import candidates_in_case, candidates_of
+from vegglue.screening.candidates import candidate_in_case, candidates_of
 
 
 def with_rivals_again(
@@ -33,7 +32,7 @@ def with_rivals_again(
 def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], say: Say) -> tuple[Baseline, Step] | None:
     """One step; None when no flow is found without its effect, or with any of its rivals."""
     say(f"comparing {', '.join(step.rivals)} again")
-    own = next(one for one in candidates_in_case(base.model.case).values() if one.name == step.accepted)
+    own = candidate_in_case(base.model.case, step.accepted)
     less = without_effect(base, own)
     if less is None:
         return None
@@ -42,10 +41,12 @@ def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], say: Say
         return None
     best = max(refits, key=lambda one: one.log_factor)
     chance = tempered_chances(np.array([one.log_factor for one in refits]))
+    told = {one.candidate.name: float(p) for one, p in zip(refits, chance, strict=True)}
+    again = with_chances(replace(step, others={}), best.candidate.name, told)
     if best.candidate.name == step.accepted:
-        return base, _with_chances(step, step.accepted, refits, chance)
+        return base, again
     further = calibrated_with(less, best)
-    return None if further is None else (further, _with_chances(step, best.candidate.name, refits, chance))
+    return None if further is None else (further, again)
 
 
 def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[Refit]:
@@ -58,14 +59,3 @@ def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect
         gain = one.amplitude.gain(suspect.amplitude.value)
         trials.append(RefitTrial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
     return [refit for refit in refits_of(search_model(less), trials) if refit is not None]
-
-
-def _with_chances(step: Step, accepted: str, refits: Sequence[Refit], chance: Array) -> Step:
-    """The step with those of its rivals that hold IN_SET of the chances, the likeliest first."""
-    names = [one.candidate.name for one in refits]
-    order = [int(j) for j in np.argsort(-chance)]
-    enough = int(np.searchsorted(np.cumsum(chance[order]), IN_SET)) + 1
-    rivals = tuple(names[j] for j in order[:enough])
-    groups = tuple(group for old in step.groups if (group := tuple(name for name in old if name in rivals)))
-    chances = tuple(float(chance[j]) for j in order[:enough])
-    return replace(step, accepted=accepted, rivals=rivals, chances=chances, groups=groups, others={})

@@ -112,6 +112,11 @@ def candidates_in_case(case: Case) -> dict[str, Candidate]:
     return {key: _candidate_of(case, key, entry) for key, entry in case.effects.items()}
 
 
+def candidate_in_case(case: Case, name: str) -> Candidate:
+    """The effect of a case that has this name as a candidate."""
+    return next(one for one in candidates_in_case(case).values() if one.name == name)
+
+
 def _candidate_of(case: Case, key: str, entry: EffectEntry) -> Candidate:
     effect = effect_of(case, key)
     if effect.each == "patch":

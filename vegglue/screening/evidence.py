@@ -66,8 +66,12 @@ def kind_of_hypotheses(
 
 def log_factors(scores: Array, size: Array) -> Array:
     """ln B (..., c) of scores (..., c) and sizes a (c,)."""
-    square = size**2
-    return np.asarray(0.5 * scores**2 * (square / (1.0 + square)) - 0.5 * np.log1p(square))
+    return np.asarray(0.5 * scores**2 * prior_shrinkage(size) - 0.5 * np.log1p(size**2))
+
+
+def prior_shrinkage(size: Array) -> Array:
+    """a^2 / (1 + a^2) (c,) [-]: by how much the prior draws an estimate of that size towards nothing."""
+    return np.asarray(size**2 / (1.0 + size**2))
 
 
 def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: float = 0.0) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
 from vegglue.effects.definition import Amplitude
-from vegglue.engine.interface import Point, responses
+from vegglue.engine.interface import Cause, Point, responses
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of
 from vegglue.screening.places import Places, places_of
 
@@ -17,7 +17,7 @@ from vegglue.screening.places import Places, places_of
 class Fingerprints:
     """values (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain, one column per setting.
 
-    columns: for each candidate, its columns; settings, amplitudes: shapes and amplitude of each column (c,).
+    columns: for each candidate, its columns; settings, amplitudes, causes: of each column (c,).
     """
 
     point: Point
@@ -25,6 +25,7 @@ class Fingerprints:
     columns: list[np.ndarray]
     settings: list[dict[str, float]]
     amplitudes: list[Amplitude]
+    causes: list[Cause]
     values: Array
     places: tuple[Places, ...]
 
@@ -45,12 +46,14 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     candidates = candidates_of(model.case, model.station)
     tried = [one.settings() for one in candidates]
     every = [(one, shapes) for one, settings in zip(candidates, tried, strict=True) for shapes in settings]
+    causes = [cause_of(model.case, one, shapes) for one, shapes in every]
     return Fingerprints(
         point=point,
         candidates=candidates,
         columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
         settings=[shapes for _, shapes in every],
         amplitudes=[one.amplitude for one, _ in every],
-        values=responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every]),
+        causes=causes,
+        values=responses(model, point, causes),
         places=places_of(model, point, half_width),
     )

@@ -9,7 +9,6 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.case.parameter_space import z_of
-from vegglue.engine.interface import Point
 from vegglue.flow.local_changes import Term
 from vegglue.screening import score_test
 from vegglue.screening.candidates import start_amplitude, with_effect
@@ -42,7 +41,7 @@ class Screening:
     base: with the noise as estimated here; search: its model that is fitted again and again; flagged: readings of
     instruments found to be off, indices among the used ones.
     whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
-    projected out. effects, spots: score tests of candidates and of drag anywhere. kinds: evidence of all kinds, that of
+    projected out. effects: score tests of candidates. kinds: evidence of all kinds, that of
     listed effects first, then of places by term, then of `instruments`; errors (draws, n): whitened errors alone.
     """
 
@@ -54,7 +53,6 @@ class Screening:
     whitened_fingerprints: Array
     projected: score_test.Projected
     effects: Family
-    spots: Family
     kinds: tuple[HypothesisKind, ...]
     instruments: dict[str, tuple[Instrument, ...]]
     errors: Array
@@ -82,15 +80,17 @@ class Screening:
         return self.fingerprints.allowed(length / np.maximum(self.projected.length, 1e-300), most)
 
 
-def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | None = None, seed: int = 1) -> Screening:
+def screen(
+    base: Baseline, flagged: tuple[int, ...] = (), known: Fingerprints | None = None, seed: int = 1
+) -> Screening:
     """Score tests of the residual against all candidates, places everywhere and instruments.
 
-    The correlation of the errors is estimated first. before: an earlier screening, whose fingerprints are used again if
-    they belong to the same point; seed: of the draws of errors alone.
+    The correlation of the errors is estimated first. known: fingerprints at the point of the search model, where they
+    are at hand; seed: of the draws of errors alone.
     """
     search = search_model(base)
     point = search.point
-    fingerprints = _earlier(before, point) or fingerprints_of(search, half_width(base.model.site))
+    fingerprints = known or fingerprints_of(search, half_width(base.model.site))
     slope, of_effects = (base.noise.used(values) for values in (point.slope, fingerprints.values))
     residual, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
     instruments = instruments_of(base.model.station.iloc[base.noise.rows])
@@ -103,7 +103,6 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
     projected, with_noise = against(of_effects), replace(base, noise=noise)
     in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
     of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
-    drag = in_places["drag"]
     return Screening(
         base=with_noise,
         search=search_model(with_noise),
@@ -113,7 +112,6 @@ def screen(base: Baseline, flagged: tuple[int, ...] = (), before: Screening | No
         whitened_fingerprints=noise.whiten(of_effects),
         projected=projected,
         effects=family_of(projected, fingerprints.one_sided, errors, seed),
-        spots=family_of(drag, np.zeros(drag.length.size, bool), errors, seed),
         kinds=(
             _kind_of_effects(fingerprints, projected),
             *_kinds_of_places(fingerprints, in_places),
@@ -174,11 +172,6 @@ def _plausible(
         columns = offset_columns(instruments[name], noise.rows.size)
         parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))
     return np.hstack(parts)
-
-
-def _earlier(before: Screening | None, point: Point) -> Fingerprints | None:
-    """Fingerprints of an earlier screening, if they are those of this point."""
-    return before.fingerprints if before is not None and before.fingerprints.point is point else None
 
 
 def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:

@@ -13,7 +13,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.fit import objective
 from vegglue.engine.interface import Point, linearise, responses
 from vegglue.screening import score_test
-from vegglue.screening.candidates import cause_of
+from vegglue.screening.evidence import log_factors, prior_shrinkage
 from vegglue.screening.residual_screening import Screening
 
 # Where the second place lies, over the best one on the scale of z [-]. Chosen, not measured.
@@ -36,18 +36,12 @@ def second_look(screening: Screening) -> SecondLook | None:
     point = linearise(model, SHARE_OF_BEST * search.point.z, search.point)
     if point is None:
         return None
-    every = [
-        (one, fingerprints.settings[column])
-        for one, columns in zip(fingerprints.candidates, fingerprints.columns, strict=True)
-        for column in columns
-    ]
-    found = responses(model, point, [cause_of(model.case, one, shapes) for one, shapes in every])
+    found = responses(model, point, fingerprints.causes)
     slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
     projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(found)))
     score = score_test.scores(projected, fingerprints.one_sided)
     size = projected.length * np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     nothing = float(projected.residual @ projected.residual)
-    explained = score**2 * size**2 / (1.0 + size**2)
-    log_factor = 0.5 * (objective(noise, search.point) - nothing + explained) - 0.5 * np.log1p(size**2)
-    gain = score / np.maximum(projected.length, 1e-300) * size**2 / (1.0 + size**2)
+    log_factor = 0.5 * (objective(noise, search.point) - nothing) + log_factors(score, size)
+    gain = score / np.maximum(projected.length, 1e-300) * prior_shrinkage(size)
     return SecondLook(point, log_factor, gain)
