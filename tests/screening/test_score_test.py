@@ -51,34 +51,6 @@ def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.n
     assert score_test.scores(projected, ~one_sided)[3] < -5.0
 
 
-def test_the_likeliest_rival_is_true_as_often_as_told(
-    problem: tuple[np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Eight effects that look alike, fingerprints without error, lengths from 3 to 9: told 0.79, true 0.81.
-
-    With half or twice the exponent 0.62 and 0.89 are told.
-    """
-    monkeypatch.setattr(score_test, "FINGERPRINT_ERROR", 0.0)
-    slopes, fingerprints = problem
-    random, tries = np.random.default_rng(12), 2000
-    fingerprints = fingerprints[:, :1] + 0.6 * fingerprints
-    projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
-    told, right = 0.0, 0
-    for _ in range(tries):
-        true, length = int(random.integers(PRINTS)), random.uniform(3.0, 9.0)
-        residual = length * projected.units[:, true] + random.standard_normal(ROWS + SLOPES)
-        chance = score_test.chances_of_rivals((projected.units.T @ residual) ** 2)
-        told, right = told + chance.max(), right + (int(np.argmax(chance)) == true)
-    assert told == pytest.approx(right, abs=0.03 * tries)
-
-
-def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
-    """15 % of a fingerprint of 40 standard errors are 6: a misfit 37 larger proves as little as 1 for a short one."""
-    assert score_test.chances_of_rivals(np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
-    assert score_test.chances_of_rivals(np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
-    assert score_test.chances_of_rivals(np.array([46.0, 9.0]))[1] < 1e-5
-
-
 def test_the_fewest_groups_hold_what_is_asked() -> None:
     chance = np.array([0.5, 0.04, 0.3, 0.16])
     assert score_test.fewest_groups([[0, 1], [2], [3]], chance, 0.5) == [[0, 1]]

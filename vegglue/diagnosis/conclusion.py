@@ -8,7 +8,7 @@ import scipy.stats
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, interval95
 from vegglue.diagnosis.competition import LEAST_ODDS, tempering
-from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density, map_of_field
+from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
@@ -125,7 +125,7 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
     if not noise.model_error.any():
         return None
     whole, residual = free_of_prior(search)
-    logs = [log_density(whole + (share**2 - 1.0) * noise.model_error, residual) for share in ERROR_SHARES]
+    logs = [log_density_of_residual(whole + (share**2 - 1.0) * noise.model_error, residual) for share in ERROR_SHARES]
     best = int(np.argmax(logs))
     gained = float(logs[best] - logs[ERROR_SHARES.index(1.0)])
     return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)

@@ -58,7 +58,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
     """Every field that is tried, the one with the most evidence first, and the responses that they were made of."""
     responses = cell_responses(search.model, search.point, tuple(FIELD_SIZES))
     whole, residual = free_of_prior(search)
-    nothing = log_density(whole, residual)
+    nothing = log_density_of_residual(whole, residual)
     found = []
     for term, sizes in FIELD_SIZES.items():
         for length, width in FIELD_SHAPES:
@@ -66,7 +66,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
             columns = search.noise.used(field_columns(responses, term, over))
             gram = columns @ columns.T
             for size in sizes:
-                gained = log_density(whole + size**2 * gram, residual) - nothing
+                gained = log_density_of_residual(whole + size**2 * gram, residual) - nothing
                 found.append(FieldHypothesis(term, over, size, gained))
     return sorted(found, key=lambda one: -one.log_factor), responses
 
@@ -112,7 +112,7 @@ def free_of_prior(search: SearchModel) -> tuple[Array, Array]:
     return covariance_of(noise) + slope @ slope.T, noise.residual(point.prediction) + slope @ point.z
 
 
-def log_density(covariance: Array, residual: Array) -> float:
+def log_density_of_residual(covariance: Array, residual: Array) -> float:
     """ln N(r; 0, covariance) of a residual (n,), up to a constant."""
     factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
     misfit = float(residual @ scipy.linalg.cho_solve((factor, lower), residual))

@@ -22,6 +22,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 
+# What an effect does: what is to be seen at its stage and its parameters -> what it changes, by name.
+Act = Callable[..., Mapping[str, Array]]
 Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage hands on, and whether an effect adds to it or takes its place.
@@ -109,7 +111,7 @@ class Effect:
     stage: Stage
     title: str
     equation: str
-    act: Callable[..., Mapping[str, Array]]
+    act: Act
     amplitude: Amplitude
     shapes: tuple[Shape, ...] = ()
     source: str = ""

@@ -7,7 +7,7 @@ Every one of them is a spot exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) in one t
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.definition import Act, Amplitude, Effect, Shape, Stage
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 
 
@@ -45,57 +45,46 @@ PLACE = (
     Shape("width", "m", "its half width w", 0.5, 0.01, 1e4),
 )
 SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
+
+
+def _at_place(name: str, stage: Stage, title: str, equation: str, act: Act, amplitude: Amplitude) -> Effect:
+    return Effect(
+        name, stage, title, equation, act, amplitude, PLACE,
+        source="definition", checked=True, mirrored=False, tags=("search",),
+    )  # fmt: skip
+
+
 EFFECTS = (
-    Effect(
-        name="unlisted_object",
-        stage="resistance",
-        title="Something holds the flow back (or lets it pass) at one place",
-        equation=f"k -> k + c {SPOT}",
-        act=unlisted_object,
-        amplitude=Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0),
-        shapes=PLACE,
-        source="definition",
-        checked=True,
-        mirrored=False,
-        tags=("search",),
+    _at_place(
+        "unlisted_object",
+        "resistance",
+        "Something holds the flow back (or lets it pass) at one place",
+        f"k -> k + c {SPOT}",
+        unlisted_object,
+        Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0),
     ),
-    Effect(
-        name="unlisted_bed",
-        stage="site",
-        title="The bed lies higher (or lower) than surveyed at one place",
-        equation=f"z_b -> z_b + dz {SPOT}",
-        act=unlisted_bed,
-        amplitude=Amplitude("rise", "m", "how much higher the bed lies there than surveyed", 0.1, -2.0, 2.0),
-        shapes=PLACE,
-        source="definition",
-        checked=True,
-        mirrored=False,
-        tags=("search",),
+    _at_place(
+        "unlisted_bed",
+        "site",
+        "The bed lies higher (or lower) than surveyed at one place",
+        f"z_b -> z_b + dz {SPOT}",
+        unlisted_bed,
+        Amplitude("rise", "m", "how much higher the bed lies there than surveyed", 0.1, -2.0, 2.0),
     ),
-    Effect(
-        name="unlisted_inflow",
-        stage="site",
-        title="Water enters (or leaves) at one place",
-        equation=f"q -> q + Q/(pi l w) {SPOT}, without momentum",
-        act=unlisted_inflow,
-        amplitude=Amplitude("discharge", "m3/s", "discharge Q that enters there", 0.1, -50.0, 50.0),
-        shapes=PLACE,
-        source="definition",
-        checked=True,
-        mirrored=False,
-        tags=("search",),
+    _at_place(
+        "unlisted_inflow",
+        "site",
+        "Water enters (or leaves) at one place",
+        f"q -> q + Q/(pi l w) {SPOT}, without momentum",
+        unlisted_inflow,
+        Amplitude("discharge", "m3/s", "discharge Q that enters there", 0.1, -50.0, 50.0),
     ),
-    Effect(
-        name="unlisted_viscosity",
-        stage="exchange",
-        title="The water mixes more (or less) at one place",
-        equation=f"nu -> nu + n {SPOT}",
-        act=unlisted_viscosity,
-        amplitude=Amplitude("viscosity", "m2/s", "additional viscosity n in the middle of it", 0.03, -0.5, 5.0),
-        shapes=PLACE,
-        source="definition",
-        checked=True,
-        mirrored=False,
-        tags=("search",),
+    _at_place(
+        "unlisted_viscosity",
+        "exchange",
+        "The water mixes more (or less) at one place",
+        f"nu -> nu + n {SPOT}",
+        unlisted_viscosity,
+        Amplitude("viscosity", "m2/s", "additional viscosity n in the middle of it", 0.03, -0.5, 5.0),
     ),
 )

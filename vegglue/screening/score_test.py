@@ -17,8 +17,6 @@ from vegglue.arrays import Array
 Name = TypeVar("Name", str, int)
 # Residuals drawn of errors alone [-]: 150 of them lie beyond the 95 % point, so that p = 0.05 is known to 8 %.
 NULL_DRAWS = 3000
-# Relative error of a fingerprint [-]: on cells of two thirds of the size, those of mixing differ by 10 to 25 %.
-FINGERPRINT_ERROR = 0.15
 # Cosine [-] between projected fingerprints above which the data cannot tell them apart. Chosen, not measured: at
 # 0.9 the score of the wrong one is 90 % of that of the right one.
 ALIKE = 0.9
@@ -65,21 +63,6 @@ def null_draws(projected: Projected, one_sided: np.ndarray, errors: Array, seed:
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), projected.residual.size - errors.shape[1]))
     noise = np.hstack([errors, of_prior]).astype(np.float32)
     return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
-
-
-def chances_of_rivals(fall: Array) -> Array:
-    """Chance of each of a few calibrated rivals (k,) to be what is missing, were it one of them [-].
-
-        p_j ~ exp(-(max F - F_j) / 2 w_j),    w_j = 1 + FINGERPRINT_ERROR^2 F_j
-
-    fall (k,): F, by how much j lowers the least objective: about the square of what it explains, in standard errors.
-    All are as likely before; what separates them beside F, the settings tried and the widths of priors and posteriors,
-    is left out, as by Schwarz (1978, doi:10.1214/aos/1176344136; not checked against it). The fingerprint of j in
-    nature differs from the model's, whose cells and laws are not nature's: where it differs from that of the best,
-    errors count as w_j^(1/2) times as large.
-    """
-    weight = np.exp(-0.5 * (fall.max() - fall) / (1.0 + FINGERPRINT_ERROR**2 * np.maximum(fall, 0.0)))
-    return np.asarray(weight / weight.sum())
 
 
 def chances(projected: Projected, family: Sequence[np.ndarray], allowed: np.ndarray, length: float) -> Array:

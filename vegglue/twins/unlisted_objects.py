@@ -1,15 +1,11 @@
 """Effects that stand in no list: what `vegglue twin --hide unlisted:NAME` hides, so that no named effect is right."""
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.effects.definition import Amplitude, Effect, Shape, Stage
+from vegglue.effects.definition import Act, Amplitude, Effect, Shape, Stage
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.resistance.physical_constants import GRAVITY
-
-Act = Callable[..., Mapping[str, Array]]
 
 
 def _away(geometry: ChannelGeometry, x: Array, y: Array, radius: Array) -> Array:
