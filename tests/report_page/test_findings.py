@@ -1,0 +1,104 @@
+"""What a report says was found, and which of it limits the use of the result."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from posteriors import changed
+from report_runs import MEMBERS
+
+from vegglue.report_page.findings import findings
+from vegglue.report_page.key_numbers import key_numbers, verdict_of
+from vegglue.report_page.run import Run
+from vegglue.report_page.tables import parameter_rows
+
+pytestmark = pytest.mark.slow  # whole pages
+
+
+def said(run: Run, subject: str, **changes: object) -> tuple[str, bool]:
+    other = replace(run, posterior=changed(run.posterior, **changes))
+    found = [finding for finding in findings(other) if finding.subject == subject]
+    return " ".join(finding.text for finding in found).replace("\u202f", " "), any(finding.doubt for finding in found)
+
+
+def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    known = {"n_b": True, "k_s": True, "phi": False}
+    text, doubt = said(run, "parameter", identified=known, width_ratio={"n_b": 0.1, "k_s": 0.1, "phi": 0.96})
+    assert "is not identified: its 95 % range" in text
+    assert "is still 96 % of the prior's (identified means below 50 %)" in text
+    assert doubt
+    sentence = re.sub(
+        "<[^>]*>", "", verdict_of(run.case, changed(run.posterior, identified=known, effective_size=500.0))
+    )
+    assert sentence.startswith("nb and ks are identified by these 20 stations; φ is not.")
+
+
+def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
+    manning, drag = (row.posterior for row in parameter_rows(toy[0])[:2])
+    assert float(manning.split()[0]) == pytest.approx(toy[0].posterior.marginals.median["n_b"], rel=0.01)
+    assert drag.startswith("10<sup>")
+
+
+def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    hit = run.posterior.marginals.bound_hit | {"phi": np.array([False, True])}
+    mass = run.posterior.marginals.bound_mass | {"phi": np.array([0.0, 0.14])}
+    text, doubt = said(run, "parameter", bound_hit=hit, bound_mass=mass)
+    assert "presses against the upper bound of its prior, 100: 0.14 of the posterior lies within 2 %" in text
+    assert "The data bound it from below only" in text
+    assert doubt
+
+
+@pytest.mark.parametrize(("size", "provisional"), [(30.0, True), (3000.0, False)])
+def test_says_when_few_members_carry_the_weight(d3a: tuple[Run, str], size: float, provisional: bool) -> None:
+    run, _ = d3a
+    text, doubt = said(run, "weights", effective_size=size, pareto_k=0.2)
+    assert ("no posterior is claimed" in text) == doubt == provisional
+    posterior = changed(run.posterior, effective_size=size)
+    sentence = verdict_of(run.case, posterior)
+    assert sentence.startswith("A first look only") == provisional
+    assert ("too few to say what is identified" in sentence) == provisional
+    assert key_numbers(run.case, posterior)[0].remark.startswith("too few members to tell") == provisional
+    assert parameter_rows(replace(run, posterior=posterior))[0].identified.startswith("too few members") == provisional
+
+
+@pytest.mark.parametrize(("error", "hides"), [(0.001, True), (0.5, False)])
+def test_says_whether_the_residual_exceeds_the_measurement_error(
+    d3a: tuple[Run, str], error: float, hides: bool
+) -> None:
+    run, _ = d3a
+    station = run.posterior.station.assign(standard_error=error)
+    text, doubt = said(run, "residual", station=station)
+    assert ("something the model does not have hides in the residual" in text) == doubt == hides
+    assert f"measurement error of {error:g} m/s" in text.replace("0.0010", "0.001").replace("0.50", "0.5")
+
+
+def test_says_when_nothing_is_known_of_the_measurement_error(toy: tuple[Run, str]) -> None:
+    text, doubt = said(toy[0], "residual")
+    assert "without standard errors nothing can be said" in text
+    assert not doubt
+
+
+def test_says_when_water_is_lost(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    leaking = replace(run, ensemble=replace(run.ensemble, mass_error=np.full(MEMBERS, 3e-3)))
+    for each, doubt in ((run, False), (leaking, True)):
+        mass = next(finding for finding in findings(each) if finding.subject == "mass")
+        assert mass.doubt == doubt
+
+
+def test_doubts_come_first(d3a: tuple[Run, str]) -> None:
+    doubts = [finding.doubt for finding in findings(d3a[0])]
+    assert doubts == sorted(doubts, reverse=True)
+
+
+def test_compares_with_rigid_cylinders(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    assert run.cylinder is not None
+    text, _ = said(run, "plants", identified=run.posterior.marginals.identified | {"phi": True})
+    ratio = run.posterior.marginals.median["phi"] / run.cylinder.quantile(0.5)
+    assert f"the flow asks for {ratio:.0f} times as much" in text
+    text, _ = said(run, "plants", identified=run.posterior.marginals.identified | {"phi": False})
+    assert "cannot tell whether that is so" in text
