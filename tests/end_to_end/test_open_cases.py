@@ -1,4 +1,4 @@
-"""The loop on data that another code made. They lie in a folder `shared` beside the repository, else: skipped.
+"""The loop on data that another code made.
 
 As a user has it: `vegglue import`, and nothing edited by hand. That code has Baptist's law, the floor of 1.3 in the
 bank law and the rule for emergent plants in common with vegglue, and kappa was chosen on open-a: not tested here.
@@ -7,30 +7,18 @@ bank law and the rule for emergent plants in common with vegglue, and kappa was 
 from pathlib import Path
 
 import pytest
-import yaml
+from open_cases import imported
 
-from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import held_out_rmse
-from vegglue.importers.field_folder import case_from_folder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
 EDDIES = {"viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures", "edge_mixing"}
 # Largest error of velocities that no calibration has seen, once the effect is added [m/s].
 WANTED = 0.010
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository"),
-]
-
-
-def imported(name: str, folder: Path) -> Case:
-    target = folder / f"{name}.yaml"
-    target.write_text(yaml.safe_dump(case_from_folder(CASES / name, target)), encoding="utf-8")
-    return load_case(target)
+pytestmark = pytest.mark.slow
 
 
 def looked_into(case: Case, folder: Path) -> Diagnosis:

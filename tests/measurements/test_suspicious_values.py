@@ -7,18 +7,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
+from open_cases import imported
 from reach import write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
-from vegglue.importers.field_folder import case_from_folder
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.suspicious_values import absurd_values, is_mark
 from vegglue.site.gridded_site import build_site
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
-published = pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository")
 LEVELS = [(8.0, 0.97), (14.5, 0.965), (20.0, 0.955)]  # x, level [m]
 Change = Callable[[pd.DataFrame], pd.DataFrame]
 
@@ -171,20 +168,12 @@ def test_marks_for_a_missing_value_are_known(value: float, mark: bool) -> None:
     assert is_mark(value) == mark
 
 
-def imported(name: str, folder: Path) -> Case:
-    target = folder / f"{name}.yaml"
-    target.write_text(yaml.safe_dump(case_from_folder(CASES / name, target)), encoding="utf-8")
-    return load_case(target)
-
-
-@published
 @pytest.mark.parametrize("name", [f"open-{letter}" for letter in "abcdefghijklmnop"])
 def test_campaigns_with_any_effect_are_passed_in_silence(tmp_path: Path, name: str) -> None:
     case = imported(name, tmp_path)
     assert absurd_values(case, build_site(case), read_observations(case).table) == []
 
 
-@published
 @pytest.mark.parametrize(
     ("change", "expected"),
     [

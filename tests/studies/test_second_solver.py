@@ -1,17 +1,16 @@
-"""The second solver by itself, and against the open cases where their folder `shared` lies beside the repository."""
+"""The second solver by itself, and against an open case."""
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from open_cases import OPEN_CASES
 from second_kernels import BED, DRY, GRAVITY
 from second_solver import Ends, Flow, Reach, march, rates, steady
 from site_reach import Truth, at, centres, reach_of, steady_flow
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
 BAR = {"scour": [47.0, -0.5, -0.22, 1.6, 0.5]}
 LARGE = (1.0, 0.375)
 SITE = Truth(nb=0.04, ks=0.6, phi=3.0, hd=0.8, settings={})
@@ -85,12 +84,11 @@ def test_every_section_passes_the_discharge():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository")
 def test_the_fourth_flow_of_open_a_is_met():
     """0.0008 m/s root mean square with dx 0.5 m, 0.0012 with 0.25 m; kappa and the depth that shears are from it."""
-    truth = json.loads((CASES / "open-a" / "answer.json").read_text(encoding="utf-8"))["truth"]
+    truth = json.loads((OPEN_CASES / "open-a" / "answer.json").read_text(encoding="utf-8"))["truth"]
     site = Truth(**{name: truth[name] for name in ("nb", "ks", "phi", "hd")}, settings={})
-    there = pd.read_csv(CASES / "open-a" / "holdout.csv")
+    there = pd.read_csv(OPEN_CASES / "open-a" / "holdout.csv")
     cells = (0.5, 0.1875)
     flow = steady_flow(site, 3.3, 1.12, cells)
     found = at(flow.u, cells, 1.12, there["x"].to_numpy(), there["y"].to_numpy())

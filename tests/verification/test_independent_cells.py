@@ -1,4 +1,4 @@
-"""How far the data of `open-e` lie from what their own equations say. They are in a folder `shared`, else: skipped.
+"""How far the data of `open-e` lie from what their own equations say.
 
     h u du/dx + q du/dy = g h S - c_f u^2 + d/dy((nu + l^2 |du/dy|) h du/dy),    dq/dy = -d(h u)/dx
 
@@ -10,22 +10,20 @@ cell is 0.07 m deep.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
 from channels import GRAVITY, centres
+from open_cases import OPEN_CASES
 from scipy.linalg import solve_banded
 
 from vegglue.arrays import Array
 
-FOLDER = Path(__file__).parents[3] / "shared" / "cases" / "open-e"
+FOLDER = OPEN_CASES / "open-e"
 # Width of the data's cells, step along x, half the width that holds all water, least depth of their wet cells, depth
 # above the strip where the law is held [m].
 WIDTH, STEP, HALF, FILM, STRIP = 0.1875, 0.25, 3.75, 0.01, 0.035
 DEPTHS = np.arange(1.24, 1.281, 0.01)  # on the floor; what it was is not among the data
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="no folder `shared/cases` beside the repository")
 
 
 def section(width: float, depth: float, film: float, truth: dict[str, float]) -> tuple[Array, Array, Array, Array]:

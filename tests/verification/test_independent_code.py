@@ -1,8 +1,9 @@
-"""Against flows that other codes computed. Their files lie in a folder `shared` beside the repository, else: skipped.
+"""Against flows that other codes computed.
 
 open-a, open-e: an explicit finite-volume code, truth given; Baptist's law, the floor of 1.3 and phi as it is where
 plants emerge are its conventions too, and kappa was chosen on open-a, so that agreement does not test these. delft3d:
-Delft3D-FLOW 6.04 on the channel of the paper, with another floor and another emergent rule.
+Delft3D-FLOW 6.04 on the channel of the paper, with another floor and another emergent rule; its flows lie in a folder
+`shared` beside the repository, else that test is skipped.
 """
 
 import json
@@ -12,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from channels import centres, even_geometry, make_problem, mixed, plants_at, solved, trapezoid
+from open_cases import OPEN_CASES
 
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import LEVEL
@@ -19,9 +21,8 @@ from vegglue.flow.sensor import read_sensors
 from vegglue.resistance import bed_laws
 from vegglue.site.grid import Grid
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
+DELFT3D = Path(__file__).parents[3] / "shared" / "cases" / "delft3d"
 CELL = (0.5, 0.375)
-pytestmark = pytest.mark.skipif(not CASES.is_dir(), reason="no folder `shared/cases` beside the repository")
 
 
 def rms(values):
@@ -93,7 +94,7 @@ def test_true_parameters_reproduce_the_holdout(case, finer, smallest, everywhere
     gets worse with the depth of the point: `test_independent_cells`. On cells of the coarser size the other code is
     0.006 (inside) and 0.016 m/s (banks) from its own result, on cells of half the finer size 0.002 and 0.003 (open-a).
     """
-    folder = CASES / case
+    folder = OPEN_CASES / case
     grid, problem, state = with_the_truth(folder, finer, smallest)
     station = pd.read_csv(folder / "holdout.csv").assign(kind="velocity")
     read = read_sensors(problem, state, grid, station, ()).prediction[0]
@@ -129,6 +130,7 @@ def papers_channel(case, switched):
     return make_problem(bed, CELL, 2.66, 1.1 - 0.171, **changes)
 
 
+@pytest.mark.skipif(not DELFT3D.is_dir(), reason="no folder `shared/cases/delft3d` beside the repository")
 @pytest.mark.parametrize("switched", [False, True])
 @pytest.mark.parametrize("case", ["manning", "paper_laws"])
 def test_delft3d(case, switched):
@@ -138,7 +140,7 @@ def test_delft3d(case, switched):
     What differs: roughness on cell faces there, one depth a cell, the smaller of two depths on a face, land where
     12 h < 1.0129 k_s, inflow, advection. TELEMAC-2D and Delft3D differ by 0.002 beside a patch and 0.006 m/s in it.
     """
-    theirs = pd.read_csv(CASES / "delft3d" / f"{case}.csv")
+    theirs = pd.read_csv(DELFT3D / f"{case}.csv")
     problem = papers_channel(case, switched)
     state = solved(problem, 1e-8)
     now = faces(problem, state)
