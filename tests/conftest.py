@@ -1,9 +1,36 @@
-"""What all tests share."""
+"""What all tests share, and the order in which their files are begun."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from threadpoolctl import threadpool_limits
+
+TESTS = Path(__file__).parent
+# Files that take minutes: begun last, one of them would keep one process at work while the others wait.
+LONGEST = [
+    TESTS / name
+    for name in (
+        "end_to_end/test_open_pair.py",
+        "end_to_end/test_open_effects.py",
+        "end_to_end/test_open_places.py",
+        "importers/test_confluence.py",
+        "diagnosis/test_diagnose_statistics.py",
+        "end_to_end/test_open_instruments.py",
+        "verification/test_independent_code.py",
+    )
+]
+assert all(path.is_file() for path in LONGEST)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Files are handed out in the order below, not by their number of tests."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    place = {path: position for position, path in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(place)))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -5,7 +5,7 @@
 One line of JSON for each data set in runs/blind/<case>.jsonl. What stands there is not done again, so that the study
 may be stopped and go on, or grow by a larger --share of its data sets. Parameters are true at one of PLACES places of
 the prior; the errors are new in each data set. Calibration starts at the true parameters, where an `infer` would have
-led: a search from nowhere, which takes half of the time, is left to `tests/end_to_end/test_open_cases.py`.
+led: a search from nowhere, which takes half of the time, is left to `tests/end_to_end/test_open_*.py`.
 """
 
 import argparse

@@ -219,7 +219,7 @@ at parameters 0.3 to 1 standard deviations off the centre of their priors, with 
 large as makes it visible at the ratio stated (length of its trace, whitened, after what calibration can mimic is
 taken off) on the true flow; shapes lie between the values that the search tries. A diagnosis took {seconds} s of
 one core (median). The truth differs from the model in its grid, parameters and errors, not in its equations: data
-of another code are diagnosed in `tests/end_to_end/test_open_cases.py`; that code shares Baptist's law, the floor of
+of another code are diagnosed in `tests/end_to_end/test_open_*.py`; that code shares Baptist's law, the floor of
 the bank law and the rule for emergent plants, and kappa was chosen on one of its cases. The cells are those that
 `vegglue import` makes, 16 across the floor. On cells twice as wide the difference between the grids alone made 14
 alarms in 134 sets with

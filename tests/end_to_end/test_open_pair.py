@@ -1,0 +1,11 @@
+"""The loop on data that another code made, with two effects of the library hidden at once. The longest of all tests."""
+
+from pathlib import Path
+
+import pytest
+from open_cases import assert_better, extended
+
+
+@pytest.mark.slow
+def test_two_effects_are_added(campaigns: Path) -> None:
+    assert_better(extended("open-l", campaigns), 2)
