@@ -9,27 +9,7 @@ GRAVITY, KARMAN = 9.81, 0.41
 DRY = 0.01
 # Squares under which a slope is taken as smooth, for levels [m2] and velocities [m2/s2]: 1 mm and 1 cm/s.
 SMOOTH_LEVEL, SMOOTH_VELOCITY = 1e-6, 1e-4
-BED, BANK, PLANTS = 0, 1, 2
 compiled = njit(cache=True, fastmath=True, error_model="numpy")
-
-
-@compiled
-def drag(h, u, v, kind, phi, extra, nb, ks, hd, chi, k):
-    """k [1/m] of all cells, so that friction is k |U| u."""
-    for i in range(h.shape[0]):
-        for j in range(h.shape[1]):
-            depth = max(h[i, j], DRY)
-            if kind[i, j] == BED:
-                chezy = depth ** (1.0 / 6.0) / nb
-            elif kind[i, j] == BANK:
-                chezy = 18.0 * np.log10(max(12.0 * depth / ks, 1.3))
-            else:
-                speed = max(np.sqrt(u[i, j] ** 2 + v[i, j] ** 2), 0.02)
-                bent = phi[i, j] * (speed / 0.35) ** chi
-                chezy = 1.0 / np.sqrt(1.0 / 3600.0 + bent / (2.0 * GRAVITY))
-                if depth > hd:
-                    chezy += np.sqrt(GRAVITY) / KARMAN * np.log(depth / hd)
-            k[i, j] = GRAVITY / (chezy * chezy * depth) + extra[i, j]
 
 
 @compiled
@@ -185,7 +165,12 @@ def mixing_x(h, u, v, dx, dy, nu, length, ru, rv):
             if min(h[i, j], h[i + 1, j]) > DRY:
                 a, b = max(j - 1, 0), min(j + 1, ny - 1)
                 shear = abs(u[i, b] - u[i, a] + u[i + 1, b] - u[i + 1, a]) / (2.0 * (b - a) * dy)
-                rate = (nu + length * length * shear) * 0.5 * (h[i, j] + h[i + 1, j]) / (dx * dx)
+                rate = (
+                    (0.5 * (nu[i, j] + nu[i + 1, j]) + length * length * shear)
+                    * 0.5
+                    * (h[i, j] + h[i + 1, j])
+                    / (dx * dx)
+                )
                 du, dv = rate * (u[i + 1, j] - u[i, j]), rate * (v[i + 1, j] - v[i, j])
                 ru[i, j] += du
                 ru[i + 1, j] -= du
@@ -201,7 +186,8 @@ def mixing_y(h, u, v, dy, nu, length, twist, ru, rv):
         for j in range(ny - 1):
             if min(h[i, j], h[i, j + 1]) > DRY:
                 depth, shallow = 0.5 * (h[i, j] + h[i, j + 1]), min(h[i, j], h[i, j + 1])
-                rate = (nu + length * length * abs(u[i, j + 1] - u[i, j]) / dy) * shallow / (dy * dy)
+                eddy = 0.5 * (nu[i, j] + nu[i, j + 1]) + length * length * abs(u[i, j + 1] - u[i, j]) / dy
+                rate = eddy * shallow / (dy * dy)
                 mean = 0.5 * (u[i, j] + u[i, j + 1])
                 du = rate * (u[i, j + 1] - u[i, j]) - twist[j + 1] * depth * mean * mean / dy
                 dv = rate * (v[i, j + 1] - v[i, j])

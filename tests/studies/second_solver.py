@@ -8,6 +8,7 @@ doi:10.1137/S1064827503431090) about a bed known at the faces, slopes after van 
 in each cell. Arrays are (nx, ny), x downstream, y to the left; SI throughout.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ import second_kernels as kernels
 Field = np.ndarray
 # Share of the largest stable step: 1 is the limit of Heun's steps with second order.
 COURANT = 0.8
-# Steps between two evaluations of the friction laws: some 0.1 s, under the time of friction among plants.
+# Steps between two evaluations of the closures: some 0.1 s, under the time of friction among plants.
 LAWS_EVERY = 5
 # Steady: velocities change by less [m/s2]. What is left fades by e in some 40 s, so that it is 2e-4 m/s.
 STEADY, LONGEST = 4e-6, 6000.0
@@ -24,11 +25,28 @@ LOOK_EVERY = 200
 
 
 @dataclass(frozen=True)
-class Reach:
-    """A channel on cells dx by dy [m]: bed at centres z, at faces zx (nx+1, ny) and zy (nx, ny+1) [m], and its drag.
+class Closure:
+    """What acts on the flow in cells: drag k [1/m], viscosity nu [m2/s], and pushes along x and y [m2/s2]."""
 
-    kind: BED (Manning's n), BANK (18 log10(max(12 h/ks, 1.3))) or PLANTS (Baptist, bed of 60 m^1/2/s); phi [-];
-    extra: k added everywhere [1/m]; source: water added [m/s]; twist: K at y faces (ny+1) [-].
+    drag: Field
+    viscosity: Field
+    push_x: Field
+    push_y: Field
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Depth [m] and velocities [m/s] of all cells."""
+
+    h: Field
+    u: Field
+    v: Field
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A channel on cells dx by dy [m]: bed at centres z, at faces zx (nx+1, ny) and zy (nx, ny+1) [m]; source: water
+    added [m/s]; twist: K at y faces (ny+1) [-]; mixing: l [m] of nu + l^2 |du/dy|; closure: of a flow.
     """
 
     dx: float
@@ -36,16 +54,9 @@ class Reach:
     z: Field
     zx: Field
     zy: Field
-    kind: Field
-    phi: Field
-    extra: Field
     source: Field
     twist: Field
-    nb: float
-    ks: float
-    hd: float
-    chi: float = 0.0
-    nu: float = 0.01
+    closure: Callable[[Flow], Closure]
     mixing: float = 0.0
 
 
@@ -58,20 +69,11 @@ class Ends:
     share: Field
 
 
-@dataclass(frozen=True)
-class Flow:
-    """Depth [m] and velocities [m/s] of all cells."""
-
-    h: Field
-    u: Field
-    v: Field
-
-
-def rates(reach: Reach, ends: Ends, flow: Flow) -> tuple[Field, Field, Field]:
+def rates(reach: Reach, ends: Ends, flow: Flow, acting: Closure) -> tuple[Field, Field, Field]:
     """dh/dt [m/s], d(hu)/dt and d(hv)/dt [m2/s2] without friction."""
     h, u, v = flow.h, flow.u, flow.v
     eta = h + reach.z
-    rh, ru, rv = reach.source.copy(), np.zeros_like(h), np.zeros_like(h)
+    rh, ru, rv = reach.source.copy(), acting.push_x.copy(), acting.push_y.copy()
     slopes = tuple(np.zeros_like(h) for _ in range(3))
     kernels.slopes_x(h, eta, u, v, *slopes)
     kernels.rates_x(h, eta, u, v, *slopes, reach.zx, reach.dx, rh, ru, rv)
@@ -80,8 +82,8 @@ def rates(reach: Reach, ends: Ends, flow: Flow) -> tuple[Field, Field, Field]:
     kernels.rates_y(h, eta, u, v, *slopes, reach.zy, reach.dy, rh, ru, rv)
     kernels.walls(h, eta, reach.zy, reach.dy, rv)
     kernels.ends(h, eta, u, v, reach.zx, reach.dx, reach.dy, ends.discharge, ends.level, ends.share, rh, ru, rv)
-    kernels.mixing_x(h, u, v, reach.dx, reach.dy, reach.nu, reach.mixing, ru, rv)
-    kernels.mixing_y(h, u, v, reach.dy, reach.nu, reach.mixing, reach.twist, ru, rv)
+    kernels.mixing_x(h, u, v, reach.dx, reach.dy, acting.viscosity, reach.mixing, ru, rv)
+    kernels.mixing_y(h, u, v, reach.dy, acting.viscosity, reach.mixing, reach.twist, ru, rv)
     return rh, ru, rv
 
 
@@ -92,14 +94,6 @@ def largest_step(reach: Reach, flow: Flow) -> float:
     return COURANT / float(per.max())
 
 
-def friction(reach: Reach, flow: Flow) -> Field:
-    """k [1/m] of all cells."""
-    k = np.empty_like(flow.h)
-    laws = (reach.kind, reach.phi, reach.extra, reach.nb, reach.ks, reach.hd, reach.chi)
-    kernels.drag(flow.h, flow.u, flow.v, *laws, k)
-    return k
-
-
 def march(reach: Reach, ends: Ends, flow: Flow, steps: int) -> tuple[Flow, float]:
     """The flow after some steps, and the seconds they took."""
     flow = Flow(flow.h.copy(), flow.u.copy(), flow.v.copy())
@@ -108,9 +102,13 @@ def march(reach: Reach, ends: Ends, flow: Flow, steps: int) -> tuple[Flow, float
     passed = 0.0
     for step in range(steps):
         if step % LAWS_EVERY == 0:
-            k, dt = friction(reach, flow), largest_step(reach, flow)
-        kernels.advance(flow.h, flow.u, flow.v, *rates(reach, ends, flow), k, dt, later.h, later.u, later.v)
-        kernels.advance(later.h, later.u, later.v, *rates(reach, ends, later), k, dt, latest.h, latest.u, latest.v)
+            acting, dt = reach.closure(flow), largest_step(reach, flow)
+        kernels.advance(
+            flow.h, flow.u, flow.v, *rates(reach, ends, flow, acting), acting.drag, dt, later.h, later.u, later.v
+        )
+        kernels.advance(
+            later.h, later.u, later.v, *rates(reach, ends, later, acting), acting.drag, dt, latest.h, latest.u, latest.v
+        )
         kernels.mean(flow.h, flow.u, flow.v, latest.h, latest.u, latest.v)
         passed += dt
     return flow, passed

@@ -1,22 +1,23 @@
-"""A site as the second solver sees it: the paper's channel, 100 m long, with what may be hidden in it.
+"""A site as the second solver sees it: a channel with patches, at its true numbers, with what may be hidden in it.
 
-Floor 3 m, banks 1:1.5, slope 0.001, seven alternating patches. `SETTINGS` says what may be hidden.
+`SETTINGS` says what may be hidden, besides the effects of `second_effects`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from second_kernels import BANK, BED, DRY, PLANTS
+from second_channel import PAPER, Channel, Range, lie_of
+from second_effects import BED, changes
+from second_kernels import DRY
+from second_laws import USUAL, Formulation, Ground, closure_of
 from second_solver import STEADY, Ends, Field, Flow, Reach, steady
 
-LENGTH, HALF, RISE, SLOPE = 100.0, 1.5, 2.0 / 3.0, 0.001
 FINE = (0.25, 0.1875)
 # Water may rise so much over the level at the outlet [m] before it meets the wall of the grid.
 MARGIN = 0.35
-STEMS = (22.0, 22.0, 22.0, 22.0, 7.3, 7.3, 7.3)
-PATCHES = tuple(((40 + 8 * n, 44 + 8 * n), (0, 1.5) if n % 2 == 0 else (-1.5, 0)) for n in range(7))
 EDDY_VISCOSITY = 0.01
 SETTINGS = {
     "chi": "phi (|U|/0.35)^chi with |U| the local depth-averaged speed (at least 0.02 m/s)",
@@ -31,6 +32,7 @@ SETTINGS = {
     "gauge": "x of the gauge that reads too high by shift in all experiments [m]",
     "shift": "m",
     "seep": "[x0, x1, y0, y1, Q]: water that enters over this part of the bed, without momentum",
+    "lateral": "the same, as much as enters along the whole floor",
     "skew": "the inflow is spread by h^(5/3) (1 + skew y/1.5), at least 0.1 h^(5/3)",
     "banktrend": "drag in 1/m, added on |y| > 1.5 m: banktrend (x/100 - 0.5) + |banktrend|/2",
 }
@@ -40,34 +42,50 @@ BED_ERROR, BED_LENGTHS = 0.01, (2.0, 0.5)
 
 @dataclass(frozen=True)
 class Truth:
-    """What is so on a site: parameters, hidden settings, and imperfections (stems and discharges as factors)."""
+    """What is so on a site: parameters, what is hidden, and imperfections (stems and discharges as factors).
+
+    settings: by SETTINGS; effects: numbers of effects by name; spread: of the inflow, numbers by name; edges: where
+    patches truly are, if not where they were mapped.
+    """
 
     nb: float
     ks: float
     phi: float
     hd: float
-    settings: dict[str, Any]
+    settings: Mapping[str, Any]
     nu: float = EDDY_VISCOSITY
     stems: tuple[float, ...] = (1.0,) * 7
     discharges: tuple[float, ...] = (1.0,) * 4
     bed_seed: int | None = None
+    channel: Channel = PAPER
+    edges: tuple[tuple[Range, Range], ...] = ()
+    formulation: Formulation = USUAL
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    spread: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def planted(self) -> Channel:
+        """The channel with its patches where they truly are."""
+        return replace(self.channel, patches=self.edges or self.channel.patches)
 
 
 def bed_level(x: Field, y: Field, truth: Truth) -> Field:
     """z at places [m]."""
-    bed = np.maximum(np.abs(y) - HALF, 0.0) * RISE - SLOPE * x
+    channel = truth.channel
+    bed = np.maximum(np.abs(y) - channel.half, 0.0) * channel.rise - channel.slope * x
     if "scour" in truth.settings:
         px, py, depth, lx, ly = truth.settings["scour"]
         bed = bed - depth * np.exp(-(((x - px) / lx) ** 2) - ((y - py) / ly) ** 2)
-    return bed + _survey_error(x, y, truth.bed_seed)
+    rises: list[Field] = changes(BED, truth.effects, lie_of(truth.planted, x, y))
+    return sum(rises, bed) + _survey_error(x, y, truth)
 
 
-def _survey_error(x: Field, y: Field, seed: int | None) -> Field:
+def _survey_error(x: Field, y: Field, truth: Truth) -> Field:
     """Smooth noise of one site, the same at every place whatever the grid [m]."""
-    if seed is None:
+    if truth.bed_seed is None:
         return np.zeros(np.broadcast(x, y).shape)
     step = 0.125
-    noise = np.random.default_rng(seed).standard_normal((int(LENGTH / step) + 1, 81))
+    noise = np.random.default_rng(truth.bed_seed).standard_normal((int(truth.channel.length / step) + 1, 81))
     # a Gaussian filter of width s correlates over exp(-d^2/(4 s^2)): 1/e at the stated lengths
     smooth = gaussian_filter(noise, [0.5 * length / step for length in BED_LENGTHS], mode="nearest")
     smooth *= BED_ERROR / smooth.std()
@@ -76,64 +94,68 @@ def _survey_error(x: Field, y: Field, seed: int | None) -> Field:
     return smooth[i, j]
 
 
-def centres(cells: tuple[float, float], level: float) -> tuple[Field, Field]:
+def centres(cells: tuple[float, float], level: float, channel: Channel = PAPER) -> tuple[Field, Field]:
     """x (nx, 1) and y (1, ny) of the cells that may become wet [m]."""
     dx, dy = cells
-    side = int(np.ceil((HALF + (level + SLOPE * LENGTH + MARGIN) / RISE) / 0.75)) * round(0.75 / dy)
-    x = (np.arange(round(LENGTH / dx)) + 0.5) * dx
+    reach = channel.half + (level + channel.slope * channel.length + MARGIN) / channel.rise
+    side = int(np.ceil(reach / 0.75)) * round(0.75 / dy)
+    x = (np.arange(round(channel.length / dx)) + 0.5) * dx
     y = (np.arange(-side, side) + 0.5) * dy
     return x[:, None], y[None, :]
 
 
 def reach_of(truth: Truth, cells: tuple[float, float], level: float) -> Reach:
     """The site on cells of this size [m]."""
-    (dx, dy), (x, y) = cells, centres(cells, level)
-    settings = truth.settings
-    kind = np.where(np.abs(y) < HALF, BED, BANK) + np.zeros(x.shape, dtype=int)
-    phi = np.zeros(kind.shape)
-    for (along, across), stems, factor in zip(PATCHES, STEMS, truth.stems, strict=True):
-        inside = (x > along[0]) & (x < along[1]) & (y > across[0]) & (y < across[1])
-        kind[inside] = PLANTS
-        phi[inside] = truth.phi * factor * stems / STEMS[0]
+    (dx, dy), (x, y) = cells, centres(cells, level, truth.channel)
+    settings, channel = truth.settings, truth.planted
     x_faces, y_faces = np.arange(len(x) + 1)[:, None] * dx, np.append(y[0] - dy / 2, y[0, -1] + dy / 2)[None, :]
     edges = y_faces[0]
+    effects = dict(truth.effects)
+    if "chi" in settings:
+        effects["streamlining"] = {"vogel_exponent": float(settings["chi"]), "reference_speed": 0.35}
+    ground = Ground(truth.nb, truth.ks, truth.phi, truth.hd, truth.nu, truth.stems, truth.formulation, effects)
+    extra = _extra_drag(x, y, truth)
     return Reach(
         dx=dx, dy=dy, z=bed_level(x, y, truth), zx=bed_level(x_faces, y, truth), zy=bed_level(x, y_faces, truth),
-        kind=kind, phi=phi,
-        extra=_extra_drag(x, y, settings), source=_source(x, y, cells, settings),
+        source=_source(x, y, cells, truth),
         twist=settings.get("ervine", 0.0) * np.sin(np.pi * edges / 1.5) * np.exp(-((edges / 2.2) ** 4)),
-        nb=truth.nb, ks=truth.ks, hd=truth.hd, chi=float(settings.get("chi", 0.0)), nu=truth.nu,
+        closure=closure_of(ground, channel, lie_of(channel, x, y, dx, dy), cells, extra),
         mixing=float(settings.get("mixk", 0.0)),
     )  # fmt: skip
 
 
-def _extra_drag(x: Field, y: Field, settings: dict[str, Any]) -> Field:
-    extra = np.zeros(np.broadcast(x, y).shape)
+def _extra_drag(x: Field, y: Field, truth: Truth) -> Field:
+    settings, extra = truth.settings, np.zeros(np.broadcast(x, y).shape)
     if "pier" in settings:
         px, py, strength = settings["pier"]
         extra += strength * np.exp(-(((x - px) / 0.35) ** 2) - ((y - py) / 0.3) ** 2)
-    trend = settings.get("banktrend", 0.0)
-    return extra + np.where(np.abs(y) > HALF, trend * (x / LENGTH - 0.5) + abs(trend) / 2, 0.0)
+    trend, channel = settings.get("banktrend", 0.0), truth.channel
+    along = trend * (x / channel.length - 0.5) + abs(trend) / 2
+    return extra + np.where(np.abs(y) > channel.half, along, 0.0)
 
 
-def _source(x: Field, y: Field, cells: tuple[float, float], settings: dict[str, Any]) -> Field:
-    if "seep" not in settings:
-        return np.zeros(np.broadcast(x, y).shape)
-    x0, x1, y0, y1, discharge = settings["seep"]
-    inside = ((x > x0) & (x < x1) & (y > y0) & (y < y1)).astype(float)
-    return inside * discharge / (inside.sum() * cells[0] * cells[1])
+def _source(x: Field, y: Field, cells: tuple[float, float], truth: Truth) -> Field:
+    """Water that enters [m/s]: over a part of the bed, or evenly over the floor."""
+    source = np.zeros(np.broadcast(x, y).shape)
+    for x0, x1, y0, y1, discharge in (truth.settings.get(key) for key in ("seep", "lateral") if key in truth.settings):
+        inside = ((x > x0) & (x < x1) & (y > y0) & (y < y1)).astype(float)
+        source += inside * discharge / (inside.sum() * cells[0] * cells[1])
+    return source
 
 
-def steady_flow(truth: Truth, discharge: float, level: float, cells: tuple[float, float] = FINE) -> Flow:
+def steady_flow(
+    truth: Truth, discharge: float, level: float, cells: tuple[float, float] = FINE, change: float = STEADY
+) -> Flow:
     """The steady flow on cells of this size, by way of cells that are larger in x and y, and in x."""
     dx, dy = cells
-    sizes = ((2 * dx, 2 * dy), (2 * dx, dy), cells)
+    sizes, channel = ((2 * dx, 2 * dy), (2 * dx, dy), cells), truth.channel
     reach, ends = _problem(truth, discharge, level, sizes[0])
-    flow = _first_guess(reach, discharge, level + SLOPE * (LENGTH - centres(sizes[0], level)[0]))
+    surface = level + channel.slope * (channel.length - centres(sizes[0], level, channel)[0])
+    flow = _first_guess(reach, discharge, surface)
     for size in sizes:
         before, (reach, ends) = reach, _problem(truth, discharge, level, size)
         # the flows on larger cells are only starts
-        flow = steady(reach, ends, _on_cells_of(reach, before, flow), STEADY if size == cells else 10 * STEADY)
+        flow = steady(reach, ends, _on_cells_of(reach, before, flow), change if size == cells else 10 * change)
     if flow.h[:, [0, -1]].max() > DRY:
         raise RuntimeError("the water stands at the wall of the grid: a larger MARGIN is needed")
     return flow
@@ -157,14 +179,17 @@ def _on_cells_of(finer: Reach, coarse: Reach, flow: Flow) -> Flow:
 
 
 def _problem(truth: Truth, discharge: float, level: float, cells: tuple[float, float]) -> tuple[Reach, Ends]:
-    y = centres(cells, level)[1][0]
-    share = np.maximum(1.0 + truth.settings.get("skew", 0.0) * y / HALF, 0.1)
+    y = centres(cells, level, truth.channel)[1][0]
+    share = np.maximum(1.0 + truth.settings.get("skew", 0.0) * y / truth.channel.half, 0.1)
+    s = y / truth.channel.inflow
+    share = share * (1.0 + truth.spread.get("skew", 0.0) * s)
+    share = share * (1.0 + truth.spread.get("excess", 0.0) * (1.0 - 3.0 * s**2) / 2.0)
     return reach_of(truth, cells, level), Ends(discharge, level, share)
 
 
-def at(field: Field, cells: tuple[float, float], level: float, x: Field, y: Field) -> Field:
+def at(field: Field, cells: tuple[float, float], level: float, x: Field, y: Field, channel: Channel = PAPER) -> Field:
     """A field at stations, linear in x and y between centres of cells."""
-    along, across = (axis.ravel() for axis in centres(cells, level))
+    along, across = (axis.ravel() for axis in centres(cells, level, channel))
     i = np.clip(np.searchsorted(along, x) - 1, 0, along.size - 2)
     j = np.clip(np.searchsorted(across, y) - 1, 0, across.size - 2)
     s, t = (x - along[i]) / cells[0], (y - across[j]) / cells[1]

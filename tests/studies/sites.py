@@ -12,19 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from second_channel import PAPER
 from second_solver import Flow
 from site_reach import (
     BED_ERROR,
     BED_LENGTHS,
     EDDY_VISCOSITY,
     FINE,
-    HALF,
-    LENGTH,
-    PATCHES,
-    RISE,
     SETTINGS,
-    SLOPE,
-    STEMS,
     Truth,
     at,
     centres,
@@ -37,6 +32,8 @@ HOLDOUT = {"hold": (3.3, 1.12)}
 SECTIONS = {"D0": 36.0, "D3": 42.0, "D5": 46.0, "D7": 50.0}
 HELD = {"D0": 36.0, "D3": 42.0, "D6": 47.5, "D7": 50.0, "D11": 66.0}
 GAUGES = (10.0, 30.0, 45.0, 60.0, 80.0)
+# As counted [1/m2].
+STEMS = (22.0, 22.0, 22.0, 22.0, 7.3, 7.3, 7.3)
 STATIONS = tuple(round(0.3 * n, 1) for n in range(-13, 14))
 # Probes need so much water [m]: the open cases have none in less.
 WADED = 0.164
@@ -59,7 +56,7 @@ def truth_of(seed: int, settings: dict[str, Any], nature: bool) -> Truth:
         **drawn,
         settings=settings,
         nu=EDDY_VISCOSITY * float(np.exp(rng.uniform(*np.log(VISCOSITIES)))),
-        stems=tuple(float(value) for value in 1.0 + STEMS_ERROR * rng.standard_normal(len(STEMS))),
+        stems=tuple(float(value) for value in 1.0 + STEMS_ERROR * rng.standard_normal(len(PAPER.patches))),
         discharges=tuple(float(value) for value in 1.0 + DISCHARGE_ERROR * rng.standard_normal(4)),
         bed_seed=seed,
     )
@@ -120,7 +117,7 @@ def _velocities(
     depth = flow.h[:, [flow.h.shape[1] // 2 - 1, flow.h.shape[1] // 2]].mean(axis=1)
     for section, place in sections.items():
         deep = np.interp(place, x[:, 0], depth)
-        stations = np.array([at_y for at_y in STATIONS if deep - max(abs(at_y) - HALF, 0.0) * RISE > WADED])
+        stations = np.array([at_y for at_y in STATIONS if deep - max(abs(at_y) - PAPER.half, 0.0) * PAPER.rise > WADED])
         probed, error, standard_error = stations, 0.0, 0.0
         if errors is not None:
             rng, nature = errors
@@ -145,11 +142,12 @@ def _levels(name: str, flow: Flow, truth: Truth, level: float, rng: np.random.Ge
 def _site(truth: Truth, rng: np.random.Generator) -> dict[str, Any]:
     """What a field team knows."""
     channel = {
-        "length_m": LENGTH, "bottom_width_m": 2 * HALF, "bank_slope_v_per_h": RISE, "bed_slope": SLOPE,
+        "length_m": PAPER.length, "bottom_width_m": 2 * PAPER.half,
+        "bank_slope_v_per_h": PAPER.rise, "bed_slope": PAPER.slope,
         "bed_level": "z = -0.001 x on the channel floor",
         "axis": "y = 0, y positive to the left looking downstream",
     }  # fmt: skip
-    places = zip(PATCHES, STEMS, strict=True)
+    places = zip(PAPER.patches, STEMS, strict=True)
     noise = {"velocity_m_s": VELOCITY_ERROR, "level_m": LEVEL_ERROR}
     return {
         "channel": channel,

@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from open_cases import OPEN_CASES
-from second_kernels import BED, DRY, GRAVITY
+from second_channel import Channel, lie_of
+from second_kernels import DRY, GRAVITY
+from second_laws import Ground, closure_of
 from second_solver import Ends, Flow, Reach, march, rates, steady
 from site_reach import Truth, at, centres, reach_of, steady_flow
 
@@ -16,15 +18,17 @@ LARGE = (1.0, 0.375)
 SITE = Truth(nb=0.04, ks=0.6, phi=3.0, hd=0.8, settings={})
 
 
-def strip(slope=0.002, length=60.0):
+def strip(slope=0.002, length=60.0, patches=()):
     """A straight strip of 60 m by 1 m between smooth walls."""
+    channel = Channel(length, 1.0, 1.0, slope, patches, (1.0,) * len(patches), 1.0)
+    ground = Ground(0.03, 1.0, 2.0, 0.6, 0.01, (1.0,) * len(patches))
     x = np.arange(30)[:, None] * 2.0 + 1.0
-    zeros = np.zeros((30, 4))
+    y, zeros = np.arange(4)[None, :] * 0.25 - 0.375, np.zeros((30, 4))
     z = -slope * x + zeros
     zx = -slope * np.arange(31)[:, None] * length / 30 + np.zeros((31, 4))
     return Reach(
-        dx=2.0, dy=0.25, z=z, zx=zx, zy=-slope * x + np.zeros((30, 5)), kind=np.full((30, 4), BED), phi=zeros,
-        extra=zeros, source=zeros, twist=np.zeros(5), nb=0.03, ks=1.0, hd=1.0,
+        dx=2.0, dy=0.25, z=z, zx=zx, zy=-slope * x + np.zeros((30, 5)), source=zeros, twist=np.zeros(5),
+        closure=closure_of(ground, channel, lie_of(channel, x, y, 2.0, 0.25), (2.0, 0.25), zeros),
     )  # fmt: skip
 
 
@@ -34,7 +38,7 @@ def test_a_lake_stays_at_rest():
         reach = reach_of(replace(SITE, settings=BAR, bed_seed=3), LARGE, 1.0)
         still = np.maximum(level - reach.z, 0.0)
         lake = Flow(still, 0 * still, 0 * still)
-        for rate in rates(reach, Ends(0.0, level, np.ones(still.shape[1])), lake):
+        for rate in rates(reach, Ends(0.0, level, np.ones(still.shape[1])), lake, reach.closure(lake)):
             assert np.abs(rate).max() < 1e-12
 
 
@@ -51,8 +55,7 @@ def test_uniform_flow_is_that_of_manning():
 
 def test_drag_of_plants_is_baptists():
     """U = C (h S)^(1/2) in a strip with plants under 1 m of water."""
-    reach = strip()
-    reach = replace(reach, kind=np.full((30, 4), 2), phi=np.full((30, 4), 2.0), hd=0.6)
+    reach = strip(patches=(((0.0, 60.0), (-0.5, 0.5)),))
     chezy = (1 / 3600 + 2.0 / (2 * GRAVITY)) ** -0.5 + GRAVITY**0.5 / 0.41 * np.log(1.0 / 0.6)
     speed = chezy * 0.002**0.5
     start = Flow(*(np.full((30, 4), value) for value in (1.0, 0.8 * speed, 0.0)))

@@ -78,15 +78,17 @@ def test_nature_is_small_and_stated(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "field", "place"),
     [
-        ({"pier": [27.0, 0.7, 2.5]}, "extra", (27.1, 0.7)),
+        ({"pier": [27.0, 0.7, 2.5]}, "drag", (27.1, 0.7)),
         ({"seep": [14.0, 26.0, 2.0, 2.6, 0.12]}, "source", (20.1, 2.3)),
         ({"scour": [58.0, -0.5, 0.2, 1.5, 0.5]}, "z", (58.1, -0.5)),
-        ({"banktrend": -0.025}, "extra", (0.1, 2.0)),
+        ({"banktrend": -0.025}, "drag", (0.1, 2.0)),
     ],
 )
 def test_what_is_hidden_is_where_it_is_said_to_be(settings, field, place):
     plain, hidden = (reach_of(Truth(0.04, 0.6, 3.0, 0.8, given), FINE, 1.0) for given in ({}, settings))
-    change = np.abs(getattr(hidden, field) - getattr(plain, field))
+    still = Flow(*(np.ones(plain.z.shape) for _ in range(3)))
+    fields = [reach.closure(still).drag if field == "drag" else getattr(reach, field) for reach in (plain, hidden)]
+    change = np.abs(fields[1] - fields[0])
     x, y = (axis.ravel() for axis in centres(FINE, 1.0))
     here = change[np.abs(x - place[0]).argmin(), np.abs(y - place[1]).argmin()]
     assert here > 0.9 * change.max() > 0

@@ -1,0 +1,180 @@
+"""Truths of the blind study: what instruments would show at a site of the second solver that hides something."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import second_effects as effects
+from second_channel import PAPER, SHORT, Channel
+from second_kernels import GRAVITY, KARMAN
+from second_laws import Formulation
+from second_solver import Field, Flow
+from site_reach import EDDY_VISCOSITY, Truth, at, reach_of, steady_flow
+
+from vegglue.case.schema import Case
+
+CHANNELS = {"twin": SHORT, "campaign": PAPER}
+# Cells of the truth [m]: with half of these predictions in the short channel move by 0.0015 m/s. The long one is given
+# wider cells, since its flows take four times as long; there they move by 0.003 m/s.
+CELLS = {"twin": (0.5, 0.125), "campaign": (0.5, 0.1875)}
+# Change at which a flow counts as steady [m/s2]; what is left is about 5e-4 m/s.
+SETTLED = 1e-5
+# Small imperfections of a site, standard deviations or ranges: stems and discharges [share], probes and edges of
+# patches [m], eddy viscosity over the stated one, floor of the bank law, logarithm above plants, bed among them.
+STEMS, DISCHARGE, PROBE, EDGE, VISCOSITY = 0.12, 0.01, 0.02, 0.1, (0.5, 2.5)
+BANK_FLOOR, UPPER, BARE = (1.1, 1.6), (0.85, 1.15), (45.0, 75.0)
+# An imperfection is named rightly where it is as large: discharges [share], stems [share]; any viscosity.
+NAMED_DISCHARGE, NAMED_STEMS = 0.004, 0.03
+EDDIES = ("viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures")
+Numbers = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A site: what is true of it, discharges of its experiments as factors, where each station truly stood across [m],
+    and names of what a diagnosis may rightly find missing though nothing was hidden.
+    """
+
+    truth: Truth
+    discharges: Mapping[str, float]
+    shifts: Field
+    also_true: tuple[str, ...]
+
+
+def perfect_site(case: Case, study: str, theta: Numbers, stations: int) -> Site:
+    """The site as its config has it."""
+    channel = CHANNELS[study]
+    truth = Truth(
+        theta["n_b"], theta["k_s"], theta["phi"], theta["canopy_height"], {}, stems=(1.0,) * len(channel.patches),
+        channel=channel,
+    )  # fmt: skip
+    return Site(truth, dict.fromkeys(case.experiments, 1.0), np.zeros(stations), ())
+
+
+def site_of_nature(perfect: Site, case: Case, seed: int) -> Site:
+    """A site like that with small imperfections, drawn anew for each seed."""
+    random = np.random.default_rng((seed, 11))
+    truth, patches = perfect.truth, [patch.name for patch in case.plants.patches]
+    stems = 1.0 + STEMS * random.standard_normal(len(patches))
+    discharges = 1.0 + DISCHARGE * random.standard_normal(len(case.experiments))
+    emergent = float(random.integers(2))
+    formulation = Formulation(
+        bank_floor=float(random.uniform(*BANK_FLOOR)), emergent=emergent, upper=float(random.uniform(*UPPER)),
+        bare=float(random.uniform(*BARE)),
+    )  # fmt: skip
+    named = [f"patch_density[{name}]" for name, each in zip(patches, stems, strict=True) if abs(each - 1) > NAMED_STEMS]
+    named += [
+        f"discharge_error[{name}]"
+        for name, each in zip(case.experiments, discharges, strict=True)
+        if abs(each - 1) > NAMED_DISCHARGE
+    ]
+    return Site(
+        replace(
+            truth,
+            nu=EDDY_VISCOSITY * float(np.exp(random.uniform(*np.log(VISCOSITY)))),
+            stems=tuple(float(each) for each in stems),
+            bed_seed=seed,
+            edges=_moved(truth.channel, random),
+            formulation=formulation,
+        ),
+        dict(zip(case.experiments, (float(each) for each in discharges), strict=True)),
+        PROBE * random.standard_normal(perfect.shifts.size),
+        (*EDDIES, *named, *(["emergent_part"] if emergent else [])),
+    )
+
+
+def _moved(
+    channel: Channel, random: np.random.Generator
+) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
+    """Patches, each side of which lies up to EDGE off."""
+    off = random.uniform(-EDGE, EDGE, (len(channel.patches), 4))
+    return tuple(
+        ((x[0] + a, x[1] + b), (y[0] + c, y[1] + d))
+        for (x, y), (a, b, c, d) in zip(channel.patches, off.tolist(), strict=True)
+    )
+
+
+def true_values(site: Site, case: Case, study: str, station: pd.DataFrame, hidden: Mapping[str, Numbers]) -> Field:
+    """What error-free instruments would show (station,), with numbers of each hidden effect by its name."""
+    value = np.full(len(station), np.nan)
+    for name, setting in case.experiments.items():
+        here = (station["experiment"] == name).to_numpy()
+        discharge = float(next(iter(setting.discharge.values()))) * site.discharges[name]
+        truth, discharge, level = _hiding(site.truth, name, discharge, float(setting.level), hidden)
+        flow = steady_flow(truth, discharge, level, CELLS[study], SETTLED)
+        shifts = site.shifts if site.shifts.size == len(station) else np.zeros(len(station))
+        value[here] = _readings(truth, flow, level, CELLS[study], station[here], shifts[here], hidden)
+    return value
+
+
+def _hiding(
+    truth: Truth, experiment: str, discharge: float, level: float, hidden: Mapping[str, Numbers]
+) -> tuple[Truth, float, float]:
+    """Truth, discharge and level at the outlet of an experiment with what is hidden."""
+    spread: dict[str, float] = {}
+    settings, acting = dict(truth.settings), dict(truth.effects)
+    for label, numbers in hidden.items():
+        name, where = label.partition("[")[0], label.partition("[")[2].rstrip("]")
+        if name == "discharge_error" and where == experiment:
+            discharge *= 1.0 + numbers["relative_error"]
+        elif name == "outlet_level_error" and where == experiment:
+            level += numbers["rise"]
+        elif name in ("inflow_skew", "inflow_core"):
+            spread |= numbers
+        elif name == "lateral_inflow":
+            half = truth.channel.half
+            settings["lateral"] = (0.0, truth.channel.length, -half, half, numbers["share"] * discharge)
+        elif name in KNOWN_TO_THE_FLOW:
+            acting[name] = numbers
+        elif name not in SENSORS and name not in ("discharge_error", "outlet_level_error"):
+            raise ValueError(f"{label}: the second solver has no such effect")
+    return replace(truth, settings=settings, effects=acting, spread=spread), discharge, level
+
+
+TABLES: tuple[Mapping[str, object], ...] = (
+    effects.PLANTS, effects.DRAG, effects.MIXING, effects.STRESS, effects.FORCE, effects.BED,
+)  # fmt: skip
+KNOWN_TO_THE_FLOW = {name for table in TABLES for name in table}
+SENSORS = ("probe_gain", "station_shift", "partial_depth", "among_plants", "gauge_datum", "gauge_head")
+
+
+def _readings(
+    truth: Truth, flow: Flow, level: float, cells: tuple[float, float], station: pd.DataFrame, shifts: Field,
+    hidden: Mapping[str, Numbers],
+) -> Field:  # fmt: skip
+    """Velocities and levels at stations of one experiment, by instruments that may be off."""
+    reach = reach_of(truth, cells, level)
+    acting = reach.closure(flow)
+    x, y = station["x"].to_numpy(float), station["y"].to_numpy(float) + shifts
+    section, gauge = station["section"].astype(str).to_numpy(), (station["kind"] == "level").to_numpy()
+
+    def seen(field: Field) -> Field:
+        return at(field, cells, level, x, y, truth.channel)
+
+    for label, numbers in hidden.items():
+        if label.startswith("station_shift["):
+            y = y + numbers["shift"] * (section == label[14:-1])
+    u, h = seen(flow.u), seen(flow.h)
+    surface = seen(flow.h + reach.z)
+    plants = _share_of_canopy(truth, flow, x, y, h)
+    for label, numbers in hidden.items():
+        if label.startswith("probe_gain["):
+            u = u * (1.0 + numbers["gain"] * (section == label[11:-1]))
+        elif label == "partial_depth":
+            u = u * (1.0 + numbers["excess"] * np.sqrt(seen(acting.drag) * h) / KARMAN * (1.0 - plants))
+        elif label == "among_plants":
+            u = u * (1.0 + numbers["gain"] * plants)
+        elif label == "gauge_datum":
+            surface = surface + numbers["shift"]
+        elif label == "gauge_head":
+            surface = surface + numbers["share"] * u**2 / (2.0 * GRAVITY)
+    return np.where(gauge, surface, u)
+
+
+def _share_of_canopy(truth: Truth, flow: Flow, x: Field, y: Field, h: Field) -> Field:
+    """min(h_d/h, 1) at stations among plants, else 0."""
+    inside = np.zeros(x.size, dtype=bool)
+    for along, across in truth.planted.patches:
+        inside |= (x > along[0]) & (x < along[1]) & (y > across[0]) & (y < across[1])
+    return inside * np.minimum(truth.hd / np.maximum(h, 0.01), 1.0)
