@@ -1,135 +1,121 @@
 """The figures of docs/blind.md."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-import scipy.stats
+from blind_definitions import Record, error_of
+from blind_lines import Line, Told, hidden_and_named, interval
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, styled
 
-Record = dict[str, Any]
-Counted = tuple[float, int, int]  # ratio, met, of
-# Score above which an effect stands out, about: a chance of 5 % over all effects together.
-STANDS_OUT = 3.2
-# Groups from which sets are counted as one.
-MANY = 6
-
-
-def interval(successes: int, trials: int) -> tuple[float, float]:
-    """95 % interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404)."""
-    if trials == 0:
-        return 0.0, 1.0
-    low = scipy.stats.beta.ppf(0.025, successes, trials - successes + 1) if successes else 0.0
-    high = scipy.stats.beta.ppf(0.975, successes + 1, trials - successes) if successes < trials else 1.0
-    return float(low), float(high)
+# By truth: what it is called, and its colour.
+TRUTHS = {"second": ("stranger's truth", COLOUR["measured"]), "own": ("own equations", COLOUR["model"])}
+Counted = tuple[int, int]  # met, of
 
 
 @styled
-def draw_shares(counted: Sequence[tuple[str, int, int]]) -> Figure:
-    """Every share with its interval, those that were studied."""
-    shown = [(label, good, size) for label, good, size in counted if size]
-    figure = Figure(figsize=(2 * WIDTH, 0.8 + 0.24 * len(shown)), layout="constrained")
+def draw_shares(shares: Sequence[tuple[Line, Mapping[str, Counted]]]) -> Figure:
+    """Every share with its interval for both truths, and the share that is wanted."""
+    figure = Figure(figsize=(2.1 * WIDTH, 1.1 + 0.25 * len(shares)), layout="constrained")
     axes = figure.subplots()
-    for row, (_, good, size) in enumerate(shown):
-        axes.plot(interval(good, size), [-row, -row], color=COLOUR["narrow"], linewidth=3, solid_capstyle="butt")
-        axes.plot([good / size], [-row], "o", color=COLOUR["model"], markersize=4)
-    axes.set_yticks([-row for row in range(len(shown))], [f"{label} ({size})" for label, _, size in shown], fontsize=8)
-    axes.set_xlim(0, 1)
+    for (truth, (_, colour)), aside in zip(TRUTHS.items(), (0.17, -0.17), strict=True):
+        for row, (_, counted) in enumerate(shares):
+            good, size = counted[truth]
+            if size:
+                here = [aside - row] * 2
+                axes.plot(interval(good, size), here, color=colour, linewidth=2, alpha=0.4, solid_capstyle="butt")
+                axes.plot([good / size], here[:1], "o", color=colour, markersize=3.5)
+    for row, (line, _) in enumerate(shares):
+        if line.wanted is not None:
+            axes.plot([line.wanted] * 2, [-row - 0.4, 0.4 - row], color=COLOUR["ink"], linewidth=1)
+    labels = [f"{line.label} ({counted['second'][1]}, {counted['own'][1]})" for line, counted in shares]
+    axes.set_yticks([-row for row in range(len(shares))], labels, fontsize=SMALL)
+    axes.set(xlim=(-0.01, 1.01), ylim=(0.6 - max(len(shares), 1), 0.6))
     axes.grid(axis="x")
-    axes.set_xlabel("share of data sets (their number), 95 % interval")
+    axes.set_xlabel("share of data sets (their numbers: stranger's, own), 95 % interval")
+    _explain(axes)
     return figure
 
 
+def _explain(axes: Axes) -> None:
+    """A legend above the panel: it covers nothing there."""
+    for label, colour in TRUTHS.values():
+        axes.plot([], [], "o-", color=colour, markersize=3.5, label=label)
+    axes.plot([], [], "|", color=COLOUR["ink"], markersize=8, label="wanted")
+    axes.legend(frameon=False, fontsize=SMALL, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
 @styled
-def draw_over_ratio(counted: Mapping[str, Sequence[Counted]]) -> Figure:
-    """Shares against the length of the hidden effect's trace, and what one score would pass."""
-    figure = Figure(figsize=(1.4 * WIDTH, 3.4), layout="constrained")
+def draw_chances(told: Mapping[str, Sequence[Told]]) -> Figure:
+    """Chances that were told against what came true, by bins of the chance."""
+    figure = Figure(figsize=(WIDTH, 3.9), layout="constrained")
     axes = figure.subplots()
-    for number, ((label, points), colour) in enumerate(
-        zip(counted.items(), ("stems", "model", "measured"), strict=True)
-    ):
-        _paint_shares(axes, points, label, COLOUR[colour], 0.04 * (number - 1))
-    ratio = np.linspace(1.5, 6.5, 101)
-    axes.plot(ratio, scipy.stats.norm.sf(STANDS_OUT - ratio), color=COLOUR["muted"], linewidth=1, linestyle=":",
-              label=f"a score of {STANDS_OUT} passed, in theory")  # fmt: skip
-    axes.set(xlabel="length of the trace [standard errors]", ylabel="share of data sets", ylim=(0, 1.02))
-    axes.grid(axis="y")
-    axes.legend(frameon=False, fontsize=SMALL)
-    return figure
-
-
-def _paint_shares(axes: Axes, points: Sequence[Counted], label: str, colour: str, aside: float) -> None:
-    known = [(ratio + aside, good / size, *interval(good, size)) for ratio, good, size in points if size]
-    if not known:
-        return
-    x, share, low, high = np.array(known).T
-    axes.errorbar(x, share, [share - low, high - share], fmt="o-", color=colour, markersize=4, linewidth=1.2,
-                  elinewidth=1, capsize=2, label=label)  # fmt: skip
-
-
-@styled
-def draw_sizes(records: Sequence[Record], size_of: Callable[[Record], int]) -> Figure:
-    """Groups in a set at both ratios: where something stands out, and of what is not excluded where nothing does."""
-    figure = Figure(figsize=(2 * WIDTH, 2.8), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, group in zip(panels, ("snr3", "snr6"), strict=True):
-        chosen = [record for record in records if record["group"] == group]
-        named = [size_of(record) for record in chosen if record["steps"]]
-        still = [len(record["not_excluded"]) for record in chosen if not record["steps"]]
-        bins = np.arange(1, MANY + 1)
-        heights = [
-            np.bincount(np.clip(np.array(sizes, int), 0, MANY), minlength=MANY + 1)[1:] for sizes in (named, still)
-        ]
-        axes.bar(bins, heights[0], color=COLOUR["model"], width=0.8, label="named")
-        axes.bar(bins, heights[1], bottom=heights[0], color=COLOUR["narrow"], width=0.8, label="not excluded")
-        axes.set_xticks(bins, [*(str(size) for size in bins[:-1]), f"{MANY} or more"])
-        axes.set(title=f"ratio {group[-1]}", xlabel="groups in the set")
-    panels[0].set_ylabel("data sets")
-    panels[0].yaxis.set_major_locator(MaxNLocator(integer=True))
-    panels[0].legend(frameon=False, fontsize=SMALL)
-    return figure
-
-
-@styled
-def draw_gains(records: Sequence[Record]) -> Figure:
-    """Error of held-out sections without and with what was accepted."""
-    pairs = 1e3 * np.array([record["held_out"] for record in records if "held_out" in record]).reshape(-1, 2)
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    axes = figure.subplots()
-    ends = (0.8 * pairs.min(), 1.25 * pairs.max()) if len(pairs) else (1.0, 100.0)
-    axes.plot(ends, ends, color=COLOUR["muted"], linewidth=1)
-    axes.loglog(pairs[:, 0], pairs[:, 1], "o", color=COLOUR["model"], markersize=4, markeredgewidth=0, alpha=0.7)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    axes.set(xlim=ends, ylim=ends, xlabel="error of held-out sections, without what was accepted [mm/s]",
-             ylabel="with it [mm/s]")  # fmt: skip
+    axes.plot([0, 1], [0, 1], color=COLOUR["muted"], linewidth=1)
+    for truth, bins in told.items():
+        label, colour = TRUTHS[truth]
+        x, share, low, high = np.array(
+            [(one.mean, one.true / one.count, *interval(one.true, one.count)) for one in bins]
+        ).reshape(-1, 4).T  # fmt: skip
+        axes.errorbar(x, share, [share - low, high - share], fmt="o", color=colour, markersize=4, elinewidth=1,
+                      capsize=2, label=f"{label} ({sum(one.count for one in bins)} names)")  # fmt: skip
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), xlabel="chance told", ylabel="share that came true")
     axes.set_aspect("equal")
+    axes.grid()
+    axes.legend(frameon=False, fontsize=SMALL, loc="upper left")
     return figure
+
+
+@styled
+def draw_held_out(records: Mapping[str, Sequence[Record]]) -> Figure:
+    """Errors of sections that were not measured, without and with what was accepted, one panel for each truth."""
+    pairs = {truth: _errors(chosen) for truth, chosen in records.items()}
+    every = np.concatenate(list(pairs.values()))
+    ends = (0.8 * every.min(), 1.25 * every.max()) if len(every) else (1.0, 100.0)
+    figure = Figure(figsize=(1.9 * WIDTH, 4.3), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (truth, (label, colour)) in zip(panels, TRUTHS.items(), strict=True):
+        before, after = pairs[truth].T
+        axes.plot(ends, ends, color=COLOUR["muted"], linewidth=1)
+        axes.loglog(before, after, "o", color=colour, markersize=4, markeredgewidth=0, alpha=0.5)
+        axes.set(title=f"{label} ({len(before)})", xlim=ends, ylim=ends, xlabel="without what was accepted [mm/s]")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
+        axes.set_aspect("equal")
+    panels[0].set_ylabel("held-out error with it [mm/s]")
+    return figure
+
+
+def _errors(records: Sequence[Record]) -> np.ndarray:
+    """Before and after [mm/s] (n, 2), where something was accepted."""
+    pairs = [(error_of(one, "before"), error_of(one, "after")) for one in records]
+    return 1e3 * np.array([pair for pair in pairs if None not in pair], dtype=float).reshape(-1, 2)
 
 
 @styled
 def draw_confusion(records: Sequence[Record]) -> Figure:
-    """Hidden effects against what was accepted first: rows the hidden ones, columns the accepted ones, ratio 6."""
-    pairs = [
-        (record["hidden"][0]["name"], record["steps"][0]["accepted"] if record["steps"] else "(nothing)")
-        for record in records
-        if record["group"] == "snr6"
-    ]
-    hidden, said = sorted({a for a, _ in pairs}), sorted({b for _, b in pairs})
-    table = np.zeros((len(hidden), max(len(said), 1)))
+    """Hidden effects against what was named first, ratio 6; what was right lies on the falling line of squares."""
+    pairs = hidden_and_named(records)
+    hidden, said = sorted({a for a, _ in pairs}), {b for _, b in pairs}
+    columns = [name for name in hidden if name in said] + sorted(
+        said - set(hidden), key=lambda name: (name[0] == "(", name)
+    )
+    table = np.zeros((max(len(hidden), 1), max(len(columns), 1)))
     for a, b in pairs:
-        table[hidden.index(a), said.index(b)] += 1
-    figure = Figure(figsize=(9, 9), layout="constrained")
+        table[hidden.index(a), columns.index(b)] += 1
+    size = (max(2.4 + 0.11 * len(columns), 4.0), max(2.4 + 0.11 * len(hidden), 4.0))
+    figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots()
     axes.imshow(table / np.maximum(table.sum(axis=1, keepdims=True), 1), cmap="Blues", vmin=0, vmax=1)
-    axes.set_xticks(range(len(said)), said, rotation=90, fontsize=6)
+    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=6)
     axes.set_yticks(range(len(hidden)), hidden, fontsize=6)
-    axes.set_xlabel("accepted first")
-    axes.set_ylabel("hidden, ratio 6")
+    axes.set(xlabel="named first", ylabel="hidden, ratio 6")
+    axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
+    axes.set_yticks(np.arange(len(hidden) + 1) - 0.5, minor=True)
+    axes.grid(which="minor", linewidth=0.3)
+    axes.tick_params(which="minor", length=0)
     return figure

@@ -3,70 +3,199 @@
 from pathlib import Path
 from typing import Any
 
+import blind_definitions as what
 import pytest
-from blind_figures import interval
-from blind_page import (
-    caught,
-    counts,
-    covered,
-    one_too_many,
-    pair_printed,
-    rightly_told_apart,
-    set_size,
-    told_apart,
-    write_page,
-    wrongly_named,
-)
+from blind_lines import LINES, Line, chances_told, counts, distances, instead, interval, is_met, shares_that_reach
+from blind_page import AFFORDED, wanted_of, write_page
 from scipy import stats
 
 
-def record(group: str, verdict: str, *rivals: str, **changes: Any) -> dict[str, Any]:
-    """The hidden effect is `eddies`; each rival is a group of its own."""
-    chances = [0.6, 0.2, 0.15, 0.03][: len(rivals)]
-    step = {"rivals": list(rivals), "chances": chances, "groups": [[name] for name in rivals]}
-    steps = [{"accepted": rivals[0], **step}] if rivals else []
-    inside = "eddies" in rivals
-    mark = {
-        "hidden": {"name": "eddies"}, "found": inside, "inside": inside, "named": rivals == ("eddies",),
-        "amplitude": None, "away": None,
-    }  # fmt: skip
+def listed(name: str = "eddies") -> dict[str, Any]:
+    return {"name": name, "kind": "listed", "x": None, "y": None, "term": None, "stations": []}
+
+
+def step(*rivals: str) -> dict[str, Any]:
+    """Each rival is a group of its own; the first is accepted."""
+    chances = [0.65, 0.2, 0.1, 0.05][: len(rivals)]
+    return {"accepted": rivals[0], "rivals": list(rivals), "chances": chances, "groups": [[name] for name in rivals]}
+
+
+def record(group: str, verdict: str, *steps: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """The hidden effect is `eddies`, where nothing else is said."""
     return {
-        "key": f"{group}/0", "group": group, "hide": ["eddies"], "hidden": [{"name": "eddies"}], "marks": [mark],
-        "verdict": verdict, "steps": steps, "set": list(rivals), "not_excluded": [], "alike": {}, "seconds": 3.0,
-        "gain": 1e-4 if rivals else None, "signal": 6.0, "flagged": 0, "threshold": 3.17, "held_out": [0.02, 0.01],
+        "key": f"second/twin/{group}/0", "truth": "second", "case": "twin", "group": group, "number": 0,
+        "noise": "white", "imperfect": False, "signal": 6.0, "hidden": [listed()], "also_true": [],
+        "verdict": verdict, "set": [name for one in steps for name in one["rivals"]], "not_excluded": [],
+        "steps": list(steps), "places": [], "instruments": [], "flagged": 0, "amplitudes": [], "held_out": None,
+        "seconds": 3.0,
     } | changes  # fmt: skip
 
 
-NAMED = record("snr6", "identified", "eddies")
-WRONG = record("snr6", "identified", "wind")
-MANY = record("snr6", "cannot-tell", "wind", "eddies", "sun", "moon")
-SILENT = record("snr6", "nothing-missing")
-LEFT_OUT = {"key": "snr6/9", "group": "snr6", "hide": ["sun"], "left_out": "not visible"}
+PIER = {"name": "unlisted:pier", "kind": "unlisted", "x": 10.0, "y": 0.5, "term": "friction", "stations": []}
+PROBE = {"name": "position", "kind": "instrument", "x": None, "y": None, "term": None, "stations": [4, 7]}
+HERE = {"x": 11.0, "y": 1.0, "term": "friction"}
+AWAY = {"x": 11.2, "y": 1.5, "term": "friction"}
+READ, MISREAD = {"kind": "position", "stations": [7]}, {"kind": "gauge", "stations": [8]}
+
+NAMED = record("listed6", "identified", step("eddies"))
+WRONG = record("listed6", "identified", step("wind"))
+MANY = record("listed6", "cannot-tell", step("wind", "eddies", "sun", "moon"))
+SILENT = record("listed6", "nothing-missing", not_excluded=[["sun"], ["eddies", "moon"]])
+BESIDE = record("listed6", "identified", step("eddies"), step("wind"))
 
 
-def test_what_counts_as_what() -> None:
-    everything = [NAMED, WRONG, MANY, SILENT, LEFT_OUT]
-    assert counts(everything, ["snr6"], caught) == (2, 4)
-    assert counts(everything, ["snr6"], told_apart) == (2, 4)
-    assert counts(everything, ["snr6"], wrongly_named) == (1, 4)
-    assert counts(everything, ["snr3"], caught) == (0, 0)
-    hiding = SILENT | {"not_excluded": [["sun"], ["eddies"]]}
-    assert counts([*everything, hiding], ["snr6"], covered) == (3, 5), "not excluded where nothing stands out"
-    false = SILENT | {"not_excluded": [["sun"], ["moon"]]}
-    assert counts([hiding, false], ["snr6"], told_apart) == (2, 2)
-    assert counts([hiding, false], ["snr6"], rightly_told_apart) == (1, 2)
-    beside = record("snr6", "identified", "eddies", steps=[NAMED["steps"][0], WRONG["steps"][0]])
-    assert counts([*everything, beside], ["snr6"], one_too_many) == (2, 5)
-    assert counts([beside], ["snr6"], wrongly_named) == (0, 1)
-    assert [set_size(one) for one in (NAMED, MANY, SILENT)] == [1, 4, 0]
+def nothing(verdict: str, *steps: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    return record("null-site", verdict, *steps, **({"hidden": []} | changes))
 
 
-def test_a_pair_counts_where_there_is_one() -> None:
-    alike = {"alike": {"eddies": {"moon": 0.95, "sun": 0.91}}}
-    assert pair_printed(NAMED) is None
-    assert pair_printed(NAMED | alike) is False
-    assert pair_printed(MANY | alike) is True
-    assert pair_printed(WRONG | alike) is None, "missed, which counts elsewhere"
+def pier(verdict: str, *places: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    return record("unlisted", verdict, hidden=[PIER], places=list(places), **changes)
+
+
+def off(*found: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    return record("instrument", "instrument", hidden=[PROBE], instruments=list(found), **changes)
+
+
+def test_imperfections_of_the_site_are_true() -> None:
+    found = nothing("identified", step("viscosity"), also_true=["viscosity"])
+    assert what.truths(NAMED | {"also_true": ["elder"]}) == {"eddies", "elder"}
+    assert what.named(found)
+    assert not what.false_named(found)
+    assert what.false_named(nothing("identified", step("viscosity")))
+
+
+def test_what_is_named() -> None:
+    assert [what.named(one) for one in (NAMED, SILENT, MANY)] == [True, False, True]
+    assert not what.named(record("listed6", "cannot-tell"))
+    assert what.named(nothing("cannot-tell", places=[HERE])), "a place is named whatever the verdict"
+    assert what.named(nothing("instrument"))
+    assert what.named(nothing("none-of-these"))
+    assert not what.named(nothing("nothing-missing", flagged=1)), "a reading set aside is no name"
+
+
+def test_what_is_named_falsely() -> None:
+    assert [what.false_named(one) for one in (NAMED, WRONG, MANY, SILENT, BESIDE)] == [False, True, False, False, True]
+    assert what.false_named(nothing("none-of-these")), "no place, but nothing is hidden"
+    assert not what.false_named(pier("none-of-these")), "something is hidden"
+    assert [what.false_named(pier("none-of-these", place)) for place in (HERE, AWAY)] == [False, True]
+    assert [what.false_named(off(found)) for found in (READ, MISREAD)] == [False, True]
+    assert what.false_named(NAMED | {"instruments": [MISREAD]})
+    assert [what.only_false(one) for one in (NAMED, WRONG, BESIDE)] == [False, True, False]
+
+
+def test_a_hidden_effect_in_the_set() -> None:
+    everything = (NAMED, WRONG, MANY, SILENT)
+    assert [what.in_steps(one) for one in everything] == [True, False, True, False]
+    assert [what.in_set(one) for one in everything] == [True, False, True, True]
+    assert what.in_set(SILENT | {"not_excluded": [["sun"]]}) is False
+    assert what.in_set(SILENT | {"verdict": "none-of-these"}) is False, "something else stands out"
+    assert what.in_set(WRONG | {"not_excluded": [["eddies"]]}) is False, "what is named excludes it"
+    assert what.in_set(nothing("nothing-missing")) is None
+    two = {"hidden": [listed(), listed("wind")]}
+    assert [what.in_set(one | two) for one in (NAMED, BESIDE)] == [False, True]
+
+
+def test_at_most_three_groups() -> None:
+    assert [what.few_groups(one) for one in (NAMED, WRONG, MANY, SILENT)] == [True, True, False, True]
+    assert [what.few_and_true(one) for one in (NAMED, WRONG, MANY, SILENT)] == [True, False, False, True]
+    later = record("listed6", "one-of", step("a", "b", "c", "d"), step("eddies", "e"))
+    assert what.few_groups(later), "the step with the hidden effect counts"
+    assert not what.few_groups(SILENT | {"not_excluded": [["a"], ["b"], ["c"], ["d"]]})
+    assert not what.few_groups(SILENT | {"not_excluded": []})
+    assert not what.few_groups(SILENT | {"places": [HERE]}), "a place was named instead"
+
+
+def test_false_names_beside_true_ones_and_alone() -> None:
+    assert [what.false_beside_true(one) for one in (NAMED, WRONG, BESIDE)] == [False, False, True]
+    assert what.false_beside_true(NAMED | {"places": [HERE]})
+    assert [what.false_beside_true(pier("none-of-these", *places)) for places in ([HERE], [HERE, AWAY], [AWAY])] == [
+        False, True, False,
+    ]  # fmt: skip
+    assert what.false_beside_true(off(READ, MISREAD))
+    elder = record("listed6", "identified", step("elder"), step("wind"), also_true=["elder"])
+    assert not what.false_beside_true(elder), "what was hidden was not found"
+    assert not what.wrong_alone(elder)
+    assert [what.wrong_alone(one) for one in (NAMED, WRONG, MANY, BESIDE)] == [False, True, False, False]
+    assert not what.wrong_alone(WRONG | {"verdict": "one-of"})
+
+
+def test_an_object_in_no_list() -> None:
+    assert [what.none_of_these(one) for one in (pier("none-of-these"), pier("identified", AWAY))] == [True, True]
+    assert not what.none_of_these(pier("nothing-missing"))
+    assert [what.place_near(pier("none-of-these", place)) for place in (HERE, AWAY)] == [True, False]
+    assert what.right_term(pier("none-of-these", HERE))
+    assert not what.right_term(pier("none-of-these", HERE | {"term": "bed"}, AWAY)), "the right one is too far off"
+    assert what.right_term_if_near(pier("none-of-these", HERE | {"term": "bed"})) is False
+    assert what.right_term_if_near(pier("none-of-these", AWAY)) is None
+    assert [what.wrong_for_object(pier(verdict)) for verdict in ("identified", "instrument", "one-of")] == [
+        True, True, False,
+    ]  # fmt: skip
+    assert not what.wrong_for_object(pier("identified", HERE))
+
+
+def test_an_instrument_that_is_off() -> None:
+    assert [what.instrument_found(off(*found)) for found in ([READ], [MISREAD], [])] == [True, False, False]
+    assert what.instrument_found(NAMED) is None
+    gain = off(set=["probe_gain[C]"])
+    assert what.instrument_found(gain) is False
+    assert [what.sensor_in_set(one) for one in (gain, off(READ), off(set=["wind"]))] == [True, True, False]
+    assert [what.reading_set_aside(off(flagged=flagged)) for flagged in (0, 1)] == [False, True]
+
+
+def test_amplitudes_and_held_out_errors() -> None:
+    sizes = [{"name": "a", "low": 1.0, "high": 2.0, "true": 1.5}, {"name": "b", "low": 1.0, "high": 2.0, "true": 2.5}]
+    line = Line("", ("listed6",), what.amplitudes_held)
+    assert counts([NAMED | {"amplitudes": sizes}, NAMED], line) == (1, 2)
+    errors = {"before": 0.02, "after": 0.0125, "oracle": 0.012, "noise": 0.012}
+    looked = NAMED | {"held_out": errors}
+    assert what.error_fell(looked) is True
+    assert what.near_oracle(looked) is True
+    worse = NAMED | {"held_out": errors | {"after": 0.021}}
+    assert what.error_fell(worse) is False
+    assert what.near_oracle(worse) is False
+    unknown = SILENT | {"held_out": errors | {"after": None, "oracle": None}}
+    assert [what.error_fell(one) for one in (NAMED, unknown)] == [None, None]
+    assert [what.near_oracle(one) for one in (NAMED, unknown)] == [None, None]
+    assert what.silent_beside_error(unknown) is True
+    assert what.silent_beside_error(SILENT | {"held_out": errors | {"before": 0.015}}) is False
+    assert what.silent_beside_error(looked) is None, "it did not say that nothing is missing"
+
+
+def test_lines_count_their_groups_and_errors() -> None:
+    white, understated = nothing("identified", step("wind")), nothing("nothing-missing", noise="understated:1.5")
+    line = Line("", ("null-site",), what.named, 0.07, most=True)
+    assert counts([white, understated, NAMED], line) == (1, 2)
+    assert counts([white, understated], Line("", (), what.named, noise="white")) == (1, 1)
+    assert len({line.label for line in LINES}) == len(LINES)
+
+
+def test_a_line_is_met_when_its_interval_reaches() -> None:
+    most, least = Line("", (), what.named, 0.07, most=True), Line("", (), what.named, 0.9)
+    never = Line("", (), what.named, 0.0, most=True)
+    assert [is_met(most, good, 200) for good in (14, 20, 40)] == [True, True, False]
+    assert [is_met(least, good, 200) for good in (186, 172, 150)] == [True, True, False]
+    assert [is_met(never, good, 200) for good in (0, 1)] == [True, False]
+    assert is_met(Line("", (), what.named), 1, 2) is None
+    assert is_met(least, 0, 0) is None
+    found = [pier("none-of-these", HERE)] * 2 + [pier("none-of-these", AWAY)]
+    assert shares_that_reach(found) == (5, 3, 5), "place and term by their intervals only"
+    assert [wanted_of(line) for line in (most, least, never)] == ["at most 7 %", "at least 90 %", "never"]
+
+
+def test_chances_against_what_came_true() -> None:
+    told = chances_told([NAMED, WRONG, MANY, SILENT, nothing("identified", step("wind")), pier("none-of-these")])
+    assert [(one.low, one.count, one.true) for one in told] == [(0.0, 1, 0), (0.1, 1, 0), (0.2, 1, 1), (0.6, 3, 1)]
+    weighted, plain = distances(told) or (0.0, 0.0)
+    away = [0.05, 0.1, 0.8, 0.65 - 1.0 / 3.0]
+    assert weighted == pytest.approx((sum(away[:3]) + 3.0 * away[3]) / 6.0)
+    assert plain == pytest.approx(sum(away) / 4.0)
+    assert distances([]) is None
+
+
+def test_what_is_named_instead_of_what() -> None:
+    also = record("listed6", "identified", step("elder"), also_true=["elder"])
+    found = instead([NAMED, WRONG, WRONG, MANY, SILENT, also, SILENT | {"places": [HERE]}])
+    assert found == [("eddies", "wind", 3, 1, 7), ("eddies", "(place)", 1, 0, 7)]
 
 
 def test_an_interval_of_a_share() -> None:
@@ -78,15 +207,30 @@ def test_an_interval_of_a_share() -> None:
 
 
 def test_the_page(tmp_path: Path) -> None:
-    studies = {"twin": [NAMED, WRONG, MANY, SILENT, LEFT_OUT], "campaign": [NAMED]}
-    write_page(studies, {0.95: (0.96, 0.381), 0.9: (0.93, 0.532)}, tmp_path)
+    out = {"key": "second/twin/listed6/9", "truth": "second", "case": "twin", "group": "listed6"}
+    reason = "--hide sun: at no plausible size would it be as visible as --snr 6 in these data; ask for less."
+    records = [
+        NAMED, WRONG, MANY, SILENT, NAMED | {"truth": "own"}, NAMED | {"case": "campaign", "seconds": 20.0},
+        out | {"left_out": reason}, out | {"left_out": "no steady flow"},
+    ]  # fmt: skip
+    write_page(records, tmp_path)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
-    assert "Measured on 4 small twins" in page
-    assert "| Hidden effect in the set, ratio 6 | 2 | 4 | 50.0% |" in page
-    assert "| Hidden effect in the set, ratio 6 | 1 | 1 | 100.0% |" in page.partition("## A sample")[2]
-    assert "| 50% to 75% | 60% | 3 | 1 | 33% |" in page, "three names told at 60 %, one of them true"
-    assert "three groups in 38% of such data" in page
-    assert "`sun`" in page
-    for name in ("alarms", "ratio", "sizes", "gains", "sets"):
+    line = "| Listed effect in the set, ratio 6 | at least 90 % |"
+    assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | yes | 100.0 % (1) |" in page
+    assert f"{line} 100.0 % (1) |" in page.partition("## The field campaign")[2]
+    assert f"{line} 75.0 % (4) |" in page.partition("## The small channel")[2]
+    assert "ratio 3" not in page.partition("## The field campaign")[2], "lines without data are left out"
+    assert "| stranger's truth | the small channel | 4 | 2 | 3 |" in page
+    assert "at any plausible size: `sun`. Left out for other reasons: no steady flow (1)." in page
+    assert "| 60 to 70 % | 65.0 % | 4 | 2 | 50.0 % |" in page
+    assert "| `eddies` | `wind` | 2 | 1 | 5 |" in page
+    assert AFFORDED in page
+    for name in ("shares", "chances", "held-out", "confusion"):
         assert f"blind-{name}.svg" in page
         assert (tmp_path / f"blind-{name}.svg").stat().st_size > 1000
+
+
+def test_a_page_without_records(tmp_path: Path) -> None:
+    write_page([], tmp_path)
+    assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
+    assert len(list(tmp_path.glob("blind-*.svg"))) == 4

@@ -1,0 +1,201 @@
+"""What counts as what in the study: pure functions of one record. None where a question does not arise."""
+
+from typing import Any
+
+import numpy as np
+
+from vegglue.effects import sensor
+
+Record = dict[str, Any]
+Thing = dict[str, Any]  # a hidden one, a step, a place or an instrument
+
+# Verdicts that say that something is there.
+SAID = ("identified", "one-of", "none-of-these", "instrument")
+# A place further off points at something else [m].
+NEAR = 1.5
+FEW = 3
+ORACLE_SHARE, MISSED_SHARE = 1.1, 1.3
+SENSORS = {effect.name for effect in sensor.EFFECTS}
+
+
+def hidden_of(record: Record, kind: str) -> list[Thing]:
+    """Hidden things of one kind: listed, unlisted or instrument."""
+    return [one for one in record["hidden"] if one["kind"] == kind]
+
+
+def truths(record: Record) -> set[str]:
+    """Names that a diagnosis may rightly say."""
+    return {one["name"] for one in hidden_of(record, "listed")} | set(record["also_true"])
+
+
+def is_true_step(record: Record, step: Thing) -> bool:
+    """One of its rivals is so."""
+    return bool(truths(record) & set(step["rivals"]))
+
+
+def objects_near(record: Record, place: Thing) -> list[Thing]:
+    """Hidden unlisted objects within 1.5 m of a place that was found."""
+    known = [one for one in hidden_of(record, "unlisted") if one["x"] is not None]
+    return [one for one in known if np.hypot(place["x"] - one["x"], place["y"] - one["y"]) <= NEAR]
+
+
+def is_true_instrument(record: Record, found: Thing) -> bool:
+    """It shares a station with a hidden instrument."""
+    return any(set(one["stations"]) & set(found["stations"]) for one in hidden_of(record, "instrument"))
+
+
+def judged(record: Record) -> list[bool]:
+    """Whether each step, place and instrument found is true."""
+    return [
+        *(is_true_step(record, step) for step in record["steps"]),
+        *(bool(objects_near(record, place)) for place in record["places"]),
+        *(is_true_instrument(record, found) for found in record["instruments"]),
+    ]
+
+
+def named(record: Record) -> bool:
+    """Something was named: a step, a place, an instrument, or a verdict that says so."""
+    return bool(judged(record)) or record["verdict"] in SAID
+
+
+def false_named(record: Record) -> bool:
+    """Something that is not there was named; a verdict alone is false where nothing is hidden."""
+    found = judged(record)
+    return not all(found) if found else record["verdict"] in SAID and not record["hidden"]
+
+
+def only_false(record: Record) -> bool:
+    """Something that is not there was named, and nothing that is."""
+    return false_named(record) and not any(judged(record))
+
+
+def hidden_found(record: Record) -> bool:
+    """Some hidden thing was found, whatever else was named."""
+    listed = {one["name"] for one in hidden_of(record, "listed")}
+    return (
+        any(listed & set(step["rivals"]) for step in record["steps"])
+        or any(objects_near(record, place) for place in record["places"])
+        or instrument_found(record) is True
+    )
+
+
+def false_beside_true(record: Record) -> bool:
+    """Some hidden thing was found, and something false was named too."""
+    return hidden_found(record) and not all(judged(record))
+
+
+def in_steps(record: Record) -> bool | None:
+    """Every hidden listed effect is among the rivals of some step."""
+    rivals = {name for step in record["steps"] for name in step["rivals"]}
+    listed = hidden_of(record, "listed")
+    return all(one["name"] in rivals for one in listed) if listed else None
+
+
+def in_set(record: Record) -> bool | None:
+    """Every hidden listed effect is in a step, or, where nothing stands out, among what is not excluded."""
+    listed = hidden_of(record, "listed")
+    if record["steps"] or not listed or record["verdict"] not in ("nothing-missing", "cannot-tell"):
+        return in_steps(record)
+    left = {name for group in record["not_excluded"] for name in group}
+    return all(one["name"] in left for one in listed)
+
+
+def few_groups(record: Record) -> bool:
+    """At most three groups: in the step with the hidden effect, else the first, else in what is not excluded."""
+    if record["steps"]:
+        listed = {one["name"] for one in hidden_of(record, "listed")}
+        holding = [step for step in record["steps"] if listed & set(step["rivals"])]
+        return len((holding or record["steps"])[0]["groups"]) <= FEW
+    return not named(record) and 0 < len(record["not_excluded"]) <= FEW
+
+
+def few_and_true(record: Record) -> bool:
+    """At most three groups, and the hidden effect in them."""
+    return few_groups(record) and in_set(record) is True
+
+
+def wrong_alone(record: Record) -> bool:
+    """The verdict is one name, and no step is true."""
+    return record["verdict"] == "identified" and not any(is_true_step(record, step) for step in record["steps"])
+
+
+def wrong_for_object(record: Record) -> bool:
+    """A name or an instrument is the verdict on an unlisted object, and no place near it was found."""
+    return record["verdict"] in ("identified", "instrument") and not place_near(record)
+
+
+def none_of_these(record: Record) -> bool:
+    """The verdict is none of these, or a place was found."""
+    return record["verdict"] == "none-of-these" or bool(record["places"])
+
+
+def place_near(record: Record) -> bool:
+    """A place was found within 1.5 m of an unlisted object."""
+    return any(objects_near(record, place) for place in record["places"])
+
+
+def right_term(record: Record) -> bool:
+    """A place was found within 1.5 m of an unlisted object, with its term."""
+    return any(place["term"] == one["term"] for place in record["places"] for one in objects_near(record, place))
+
+
+def right_term_if_near(record: Record) -> bool | None:
+    """The term is right, of those found within 1.5 m."""
+    return right_term(record) if place_near(record) else None
+
+
+def instrument_found(record: Record) -> bool | None:
+    """Every hidden instrument shares a station with one found."""
+    hidden = hidden_of(record, "instrument")
+    stations = {row for found in record["instruments"] for row in found["stations"]}
+    return all(stations & set(one["stations"]) for one in hidden) if hidden else None
+
+
+def reading_set_aside(record: Record) -> bool | None:
+    """The bad reading was named as an instrument, or some station was set aside."""
+    known = instrument_found(record)
+    return None if known is None else known or record["flagged"] > 0
+
+
+def sensor_in_set(record: Record) -> bool:
+    """An effect of instruments is in the set, or the instrument was found."""
+    return instrument_found(record) is True or any(name.split("[")[0] in SENSORS for name in record["set"])
+
+
+def station_set_aside(record: Record) -> bool:
+    """Some station was set aside."""
+    return record["flagged"] > 0
+
+
+def amplitudes_held(record: Record) -> list[bool]:
+    """Whether the interval of each amplitude holds the true one."""
+    known = [one for one in record["amplitudes"] if None not in (one["low"], one["high"], one["true"])]
+    return [one["low"] <= one["true"] <= one["high"] for one in known]
+
+
+def error_of(record: Record, name: str) -> float | None:
+    """One of the held-out errors [m/s]: before, after, oracle or noise; None where it is not known."""
+    value = (record.get("held_out") or {}).get(name)
+    return float(value) if value is not None and np.isfinite(value) else None
+
+
+def error_fell(record: Record) -> bool | None:
+    """The held-out error is less with what was accepted."""
+    before, after = error_of(record, "before"), error_of(record, "after")
+    if before is None or after is None or not (record["steps"] or record["places"]):
+        return None
+    return after < before
+
+
+def near_oracle(record: Record) -> bool | None:
+    """The held-out error is at most 1.1 times that with the true effect."""
+    after, oracle = error_of(record, "after"), error_of(record, "oracle")
+    return None if after is None or oracle is None else after <= ORACLE_SHARE * oracle
+
+
+def silent_beside_error(record: Record) -> bool | None:
+    """Nothing is missing, it is said, while the held-out error is over 1.3 times the noise."""
+    before, noise = error_of(record, "before"), error_of(record, "noise")
+    if before is None or noise is None or record["verdict"] != "nothing-missing":
+        return None
+    return before > MISSED_SHARE * noise

@@ -1,0 +1,184 @@
+"""The lines of docs/blind.md: of which records each is counted, and which share is wanted."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import blind_definitions as what
+import numpy as np
+import scipy.stats
+from blind_definitions import Record
+
+Answer = bool | None | list[bool]
+Met = Callable[[Record], Answer]
+
+NULL = ("null-perfect", "null-site")
+NOISES = (
+    ("white errors", "white"),
+    ("neighbours correlated by 0.5", "ar1:0.5"),
+    ("errors 1.5 times as stated", "understated:1.5"),
+)  # fmt: skip
+RATIOS = (("ratio 3", ("listed3",)), ("ratio 6", ("listed6",)))
+LISTED, TWO = ("listed3", "listed6"), ("pair", "probe")
+# Bins of the stated chances, and the mean distance of what comes true that is wanted at most.
+BINS, DISTANCE = 10, 0.05
+
+
+@dataclass(frozen=True)
+class Line:
+    """One share: of records of these groups (all if empty) and errors (any if empty). most: `wanted` is at most so."""
+
+    label: str
+    groups: tuple[str, ...]
+    met: Met
+    wanted: float | None = None
+    most: bool = False
+    noise: str = ""
+
+
+@dataclass(frozen=True)
+class Told:
+    """Names told at chances in one bin: their mean chance, how many, and how many came true."""
+
+    low: float
+    mean: float
+    count: int
+    true: int
+
+
+LINES: tuple[Line, ...] = (
+    Line("Nothing hidden, perfect site: something named", ("null-perfect",), what.named, 0.07, True),
+    Line("Nothing hidden, small imperfections: something named", ("null-site",), what.named, 0.07, True),
+    Line("Nothing hidden: something named that is not there", NULL, what.false_named, 0.07, True),
+    *(Line(f"Nothing hidden, {label}: something named", NULL, what.named, 0.07, True, noise)
+      for label, noise in NOISES),
+    *(Line(f"Nothing hidden, {label}: something that is not there", NULL, what.false_named, 0.07, True, noise)
+      for label, noise in NOISES),
+    Line("Nothing hidden: a station set aside", NULL, what.station_set_aside),
+    *(Line(f"Listed effect in the set, {label}", groups, what.in_set, 0.9) for label, groups in RATIOS),
+    *(Line(f"Something named, {label}", groups, what.named) for label, groups in RATIOS),
+    *(Line(f"... the hidden effect among it, {label}", groups, what.in_steps) for label, groups in RATIOS),
+    Line("At most three groups, ratio 3", ("listed3",), what.few_groups, 0.4),
+    Line("... and the truth in them, ratio 3", ("listed3",), what.few_and_true),
+    Line("At most three groups, ratio 6", ("listed6",), what.few_groups, 0.85),
+    Line("... and the truth in them, ratio 6", ("listed6",), what.few_and_true),
+    *(Line(f"A false name beside a true one, {label}", groups, what.false_beside_true, 0.05, True)
+      for label, groups in (*RATIOS, ("unlisted object", ("unlisted",)), ("instrument off", ("instrument",)),
+                            ("two things hidden", TWO))),
+    *(Line(f"A wrong name alone, {label}", groups, what.wrong_alone, 0.02, True) for label, groups in RATIOS),
+    Line("A name or an instrument alone for an unlisted object", ("unlisted",), what.wrong_for_object, 0.05, True),
+    *(Line(f"Something named and nothing of it true, {label}", groups, what.only_false)
+      for label, groups in (*RATIOS, ("unlisted object", ("unlisted",)), ("instrument off", ("instrument",)))),
+    Line("Interval of an amplitude holds the true one", (*LISTED, *TWO), what.amplitudes_held, 0.9),
+    Line("Unlisted object: none of these", ("unlisted",), what.none_of_these, 0.85),
+    Line("... a place within 1.5 m of it, of all", ("unlisted",), what.place_near, 0.7),
+    Line("... and with the right term, of all", ("unlisted",), what.right_term, 0.7),
+    Line("... with the right term, of those within 1.5 m", ("unlisted",), what.right_term_if_near),
+    Line("Instrument off: named as an instrument", ("instrument",), what.instrument_found, 0.9),
+    Line("... or some effect of instruments in the set", ("instrument",), what.sensor_in_set),
+    Line("Two effects, ratio 6 each: both in the set", ("pair",), what.in_set),
+    Line("A bad reading beside an effect: the effect in the set", ("probe",), what.in_set),
+    Line("... the reading named as an instrument", ("probe",), what.instrument_found),
+    Line("... or some station set aside", ("probe",), what.reading_set_aside),
+    Line("Held-out error fell where something was named", (), what.error_fell, 0.95),
+    Line("... within 1.1 of that with the true effect", (), what.near_oracle, 0.8),
+    Line("Nothing missing, but held-out error over 1.3 of the noise", (), what.silent_beside_error, 0.0, True),
+)  # fmt: skip
+
+
+def interval(successes: int, trials: int) -> tuple[float, float]:
+    """95 % interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404)."""
+    if trials == 0:
+        return 0.0, 1.0
+    low = scipy.stats.beta.ppf(0.025, successes, trials - successes + 1) if successes else 0.0
+    high = scipy.stats.beta.ppf(0.975, successes + 1, trials - successes) if successes < trials else 1.0
+    return float(low), float(high)
+
+
+def made(records: Sequence[Record], truth: str, case: str = "") -> list[Record]:
+    """Data sets that were made of one truth, in one case or in all."""
+    return [
+        one for one in records if one["truth"] == truth and case in ("", one["case"]) and "left_out" not in one
+    ]  # fmt: skip
+
+
+def counts(records: Sequence[Record], line: Line) -> tuple[int, int]:
+    """Met, and of how many."""
+    good = size = 0
+    for record in records:
+        if (line.groups and record["group"] not in line.groups) or line.noise not in ("", record["noise"]):
+            continue
+        answer = line.met(record)
+        answers = answer if isinstance(answer, list) else [] if answer is None else [answer]
+        good, size = good + sum(answers), size + len(answers)
+    return good, size
+
+
+def is_met(line: Line, good: int, size: int) -> bool | None:
+    """The interval reaches the figure; None where there is none, or no data."""
+    if line.wanted is None or not size:
+        return None
+    low, high = interval(good, size)
+    return low <= line.wanted if line.most else high >= line.wanted
+
+
+def shares_that_reach(records: Sequence[Record]) -> tuple[int, int, int]:
+    """Lines with a figure and data, those whose share reaches it, and those whose interval does."""
+    counted = [(line, *counts(records, line)) for line in LINES if line.wanted is not None]
+    known = [(line, good, size) for line, good, size in counted if size]
+    alone = sum(good / size <= line.wanted if line.most else good / size >= line.wanted for line, good, size in known)
+    return len(known), alone, sum(is_met(*one) is True for one in known)
+
+
+def chances_told(records: Sequence[Record]) -> list[Told]:
+    """What first steps told, by bins of the chance, where one listed effect is hidden and nothing else."""
+    pairs = [
+        (chance, name in what.truths(record))
+        for record in records
+        if record["steps"] and [one["kind"] for one in record["hidden"]] == ["listed"]
+        for name, chance in zip(record["steps"][0]["rivals"], record["steps"][0]["chances"], strict=True)
+    ]
+    found = []
+    for number in range(BINS):
+        here = [(chance, true) for chance, true in pairs if min(int(BINS * chance), BINS - 1) == number]
+        if here:
+            mean = float(np.mean([chance for chance, _ in here]))
+            found.append(Told(number / BINS, mean, len(here), sum(true for _, true in here)))
+    return found
+
+
+def distances(told: Sequence[Told]) -> tuple[float, float] | None:
+    """Mean distance of mean chance and share true over the bins, weighted by names and not; None without bins."""
+    if not told:
+        return None
+    away = [abs(one.mean - one.true / one.count) for one in told]
+    return float(np.average(away, weights=[one.count for one in told])), float(np.mean(away))
+
+
+def first_named(record: Record) -> str:
+    """What was accepted first, else the kind of thing that was found."""
+    if record["steps"]:
+        return str(record["steps"][0]["accepted"])
+    return "(place)" if record["places"] else "(instrument)" if record["instruments"] else "(nothing)"
+
+
+def hidden_and_named(records: Sequence[Record]) -> list[tuple[str, str]]:
+    """The hidden listed effect and what was named first, at ratio 6."""
+    return [
+        (what.hidden_of(one, "listed")[0]["name"], first_named(one)) for one in records if one["group"] == "listed6"
+    ]
+
+
+def instead(records: Sequence[Record]) -> list[tuple[str, str, int, int, int]]:
+    """Hidden at ratio 6, named first instead, how often, the truth among its rivals, and sets with it hidden."""
+    chosen = [one for one in records if one["group"] == "listed6"]
+    pairs = hidden_and_named(chosen)
+    times: Counter[tuple[str, str]] = Counter()
+    inside: Counter[tuple[str, str]] = Counter()
+    for record, pair in zip(chosen, pairs, strict=True):
+        if pair[1] not in what.truths(record) and pair[1] != "(nothing)":
+            times[pair] += 1
+            inside[pair] += any(pair[0] in step["rivals"] for step in record["steps"][:1])
+    of = Counter(hidden for hidden, _ in pairs)
+    rows = [(*pair, number, inside[pair], of[pair[0]]) for pair, number in times.items()]
+    return sorted(rows, key=lambda row: (-row[2], row[0], row[1]))

@@ -1,0 +1,201 @@
+"""Data sets of the blind study: what is hidden in each, at which size, and the measurements that come of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from blind_truth import Numbers, Site, perfect_site, site_of_nature, true_values
+
+from vegglue.arrays import Array
+from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_grid_error, with_model_error
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import theta_at
+from vegglue.case.schema import Case, ModelError
+from vegglue.engine.interface import Model, linearise
+from vegglue.engine.model import coarser
+from vegglue.errors import InputError
+from vegglue.importers.config_parts import MODEL_ERROR
+from vegglue.screening import score_test
+from vegglue.twins.hidden_effect import TwinBase, candidate_of, case_hiding, chosen_effect
+from vegglue.twins.sealed_answer import UNLISTED, Hidden
+from vegglue.twins.twin import errors_named, finer, true_place
+from vegglue.workflow.run_folder import model_in
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+# True places of the prior, each seen by the model once.
+PLACES = 8
+NOISE = ("white", "ar1:0.5", "understated:1.5")
+# Every fifth set without a hidden effect has understated errors, two of five correlated ones.
+NULL_NOISE = ("white", "ar1:0.5", "white", "ar1:0.5", "understated:1.5")
+OBJECTS = {"pier": "friction", "fallen_tree": "friction", "sink": "friction", "jet": "friction", "scour_hole": "bed"}
+INSTRUMENTS = ("position", "gauge", "reading")
+# Pairs that leave different traces, so that both could be found.
+PAIRS = (
+    ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
+    ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
+)  # fmt: skip
+# A bad reading beside an effect is off by so many standard errors.
+BAD = 10.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One data set. truth: second or own; hide: names; noise: kind of errors; imperfect: whether the site is."""
+
+    truth: str
+    case: str
+    group: str
+    number: int
+    hide: tuple[str, ...]
+    signal: float
+    noise: str
+    imperfect: bool
+
+    @property
+    def key(self) -> str:
+        return f"{self.truth}/{self.case}/{self.group}/{self.number}"
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A model with what was measured, what was hidden as records say it, names that are true besides, and stations that
+    nobody measured with what is true there.
+    """
+
+    model: Model
+    hidden: tuple[dict[str, Any], ...]
+    also_true: tuple[str, ...]
+    unseen: pd.DataFrame
+
+
+@lru_cache
+def model_of(study: str) -> Model:
+    """The model with the error of its own that an imported case has."""
+    model = model_in(load_case(CONFIGS / f"{study}.yaml"))
+    case: Case = model.case.model_copy(update={"model_error": ModelError(**MODEL_ERROR["model_error"])})
+    return replace(model, case=case)
+
+
+@lru_cache(maxsize=PLACES)
+def place_of(study: str, number: int) -> tuple[TwinBase, Array]:
+    """The model at a true place, and the columns of its own error there. Nothing is seen of a finer grid."""
+    model = model_of(study)
+    z = true_place(len(model.names), number)
+    here, coarse = linearise(model, z), coarser(model)
+    on_coarse = None if coarse is None else linearise(coarse, z)
+    if here is None or on_coarse is None or coarse is None:
+        raise InputError(f"{study}: no steady flow at place {number}")
+    base = TwinBase(model, model, here, here, here.prediction - on_coarse.prediction)
+    return base, model_error_columns(coarse, on_coarse, model.case.model_error)
+
+
+def made(trial: Trial) -> DataSet:
+    """The data set of a trial. Errors: VisibilityError where an effect cannot be made visible, RuntimeError where the
+    second solver finds no steady flow.
+    """
+    base, columns = place_of(trial.case, (trial.number * 7 + len(trial.group)) % PLACES)
+    seed = abs(hash_of(trial.key))
+    random = np.random.default_rng((seed, 2))
+    correlation, scale = errors_named(trial.noise)
+    errors = with_correlation(noise_of(base.model.station), correlation, scale)
+    sizing = with_model_error(with_grid_error(errors, base.difference), columns)
+    found = [_hidden(base, sizing, name, trial.signal, random) for name in trial.hide]
+    flows = [one for one in found if not one["stations"]]
+    station, unseen = base.model.station, unseen_stations(trial.case, base.model)
+    everything = pd.concat([station, unseen], ignore_index=True)
+    truly, also_true = _truly(trial, base, everything, flows, seed)
+    value = truly[: len(station)].copy()
+    value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
+    for one in found:
+        value[one["stations"]] += one["amplitude"]
+    model = replace(base.model, station=station.assign(value=value))
+    return DataSet(model, tuple(found), also_true, unseen.assign(value=truly[len(station) :]))
+
+
+def hash_of(text: str) -> int:
+    """A number of a text, the same on every machine."""
+    return int.from_bytes(text.encode(), "big") % (2**61 - 1)
+
+
+def unseen_stations(study: str, model: Model) -> pd.DataFrame:
+    """The stations of velocities moved to sections halfway between those measured, and behind the last."""
+    velocity = model.station[model.station["kind"] == "velocity"]
+    places = np.unique(velocity["x"])
+    ends = np.append(places[1:], model.case.grid.x[1])
+    halfway = dict(zip(places, 0.5 * (places + ends), strict=True))
+    return velocity.assign(x=velocity["x"].map(halfway), section=velocity["section"].astype(str) + " and next")
+
+
+def _hidden(base: TwinBase, sizing: Noise, name: str, signal: float, random: np.random.Generator) -> dict[str, Any]:
+    """What is hidden, at its size, as the record has it."""
+    told = {"shapes": {}, "signal": signal, "x": None, "y": None, "term": None, "stations": []}
+    if name in (*INSTRUMENTS, "bad_probe"):
+        return told | {"name": name, "kind": "instrument"} | _instrument(base, sizing, name, signal, random)
+    candidate, one = chosen_effect(base, sizing, name, None, signal, random)
+    told |= {"name": one.name, "amplitude": one.amplitude, "shapes": one.shapes, "signal": one.signal}
+    told |= {"parameter": candidate.effect.amplitude.name, "kind": "listed"}
+    if one.listed:
+        return told
+    term = OBJECTS[name.removeprefix(UNLISTED)]
+    return told | {"kind": "unlisted", "term": term, "x": one.shapes["x"], "y": one.shapes["y"]}
+
+
+def _instrument(base: TwinBase, sizing: Noise, kind: str, signal: float, random: np.random.Generator) -> dict[str, Any]:
+    """Rows of one instrument, and by how much it is off: as visible as asked, a bad probe by BAD standard errors."""
+    station = base.model.station
+    rows = np.flatnonzero((station["kind"] == ("level" if kind == "gauge" else "velocity")).to_numpy())
+    one = station.iloc[int(random.choice(rows))]
+    same = (station["x"] == one["x"]) & (station["y"] == one["y"]) & (station["kind"] == one["kind"])
+    chosen = np.flatnonzero(same.to_numpy()) if kind in ("position", "gauge") else np.array([int(str(one.name))])
+    sign, error = float(random.choice([-1.0, 1.0])), float(one["standard_error"])
+    if kind == "bad_probe":
+        return {"amplitude": sign * BAD * error, "stations": chosen.tolist()}
+    trace = np.zeros(len(station))
+    trace[chosen] = 1.0
+    white, slopes = sizing.whiten(sizing.used(trace[:, None])), sizing.whiten(sizing.used(base.here.slope))
+    length = score_test.project(slopes, white[:, 0], np.zeros(slopes.shape[1]), white).length[0]
+    return {"amplitude": sign * signal / float(length), "stations": chosen.tolist()}
+
+
+def _truly(
+    trial: Trial, base: TwinBase, station: pd.DataFrame, hidden: Sequence[Mapping[str, Any]], seed: int
+) -> tuple[Array, tuple[str, ...]]:
+    """What is true at stations, and what may rightly be named besides what is hidden."""
+    if trial.truth == "own":
+        return _own_truth(base, station, hidden), ()
+    case, theta = base.model.case, theta_at(base.model.case, base.here.z)
+    site = perfect_site(case, trial.case, {name: float(values[0]) for name, values in theta.items()}, len(station))
+    if trial.imperfect:
+        site = site_of_nature(site, case, seed % 2**31)
+    numbers: dict[str, Numbers] = {one["name"]: {one["parameter"]: one["amplitude"], **one["shapes"]} for one in hidden}
+    return _kept_values(site, case, trial.case, station, numbers), site.also_true
+
+
+def _kept_values(site: Site, case: Case, study: str, station: pd.DataFrame, numbers: Mapping[str, Numbers]) -> Array:
+    """True values; those of a perfect site without anything hidden are kept in this process."""
+    if site.also_true or numbers:
+        return true_values(site, case, study, station, numbers)
+    if (known := _VALUES.get(repr(site.truth))) is None:
+        known = _VALUES[repr(site.truth)] = true_values(site, case, study, station, numbers)
+    return known
+
+
+_VALUES: dict[str, Array] = {}
+
+
+def _own_truth(base: TwinBase, station: pd.DataFrame, hidden: Sequence[Mapping[str, Any]]) -> Array:
+    """Predictions of the model itself on cells two thirds as long and wide."""
+    fine = replace(finer(base.model), station=station)
+    case = fine.case
+    for one in hidden:
+        what = Hidden(one["name"], one["amplitude"], one["shapes"], one["signal"])
+        case = case_hiding(case, candidate_of(base.model, one["name"]), what)
+    point = linearise(replace(fine, case=case), base.here.z)
+    if point is None:
+        raise RuntimeError("no steady flow of the model itself")
+    return point.prediction
