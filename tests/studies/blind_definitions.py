@@ -44,8 +44,17 @@ def is_true_instrument(record: Record, found: Thing) -> bool:
     return any(set(one["stations"]) & set(found["stations"]) for one in hidden_of(record, "instrument"))
 
 
+def is_true_field(record: Record, found: Thing) -> bool:
+    """It is of viscosity where that is truly off, or stands out most within 1.5 m of a hidden object."""
+    return bool(objects_near(record, found)) or (found["term"] == "viscosity" and "viscosity" in truths(record))
+
+
 def judged(record: Record) -> list[bool]:
-    """Whether each step, place and instrument found is true."""
+    """Whether each step, place and instrument that the verdict names is true; of a field, that alone."""
+    if not named(record):
+        return []
+    if record.get("field"):
+        return [is_true_field(record, record["field"])]
     return [
         *(is_true_step(record, step) for step in record["steps"]),
         *(bool(objects_near(record, place)) for place in record["places"]),
@@ -54,14 +63,14 @@ def judged(record: Record) -> list[bool]:
 
 
 def named(record: Record) -> bool:
-    """Something was named: a step, a place, an instrument, or a verdict that says so."""
-    return bool(judged(record)) or record["verdict"] in SAID
+    """The verdict says that something is there. Where it cannot tell, what it held up to then is no name."""
+    return record["verdict"] in SAID
 
 
 def false_named(record: Record) -> bool:
     """Something that is not there was named; a verdict alone is false where nothing is hidden."""
     found = judged(record)
-    return not all(found) if found else record["verdict"] in SAID and not record["hidden"]
+    return not all(found) if found else named(record) and not record["hidden"]
 
 
 def only_false(record: Record) -> bool:

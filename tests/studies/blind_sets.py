@@ -39,6 +39,8 @@ PAIRS = (
     ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
+# Sets of the first were seen when the errors of a site were chosen.
+EDITION = "second edition, part two: "
 # A bad reading beside an effect is off by so many standard errors.
 BAD = 10.0
 
@@ -99,7 +101,7 @@ def made(trial: Trial) -> DataSet:
     second solver finds no steady flow.
     """
     base, columns = place_of(trial.case, (trial.number * 7 + len(trial.group)) % PLACES)
-    seed = abs(hash_of(trial.key))
+    seed = hash_of(EDITION + trial.key)
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(trial.noise)
     errors = with_correlation(noise_of(base.model.station), correlation, scale)

@@ -65,9 +65,8 @@ def test_imperfections_of_the_site_are_true() -> None:
 
 
 def test_what_is_named() -> None:
-    assert [what.named(one) for one in (NAMED, SILENT, MANY)] == [True, False, True]
-    assert not what.named(record("listed6", "cannot-tell"))
-    assert what.named(nothing("cannot-tell", places=[HERE])), "a place is named whatever the verdict"
+    assert [what.named(one) for one in (NAMED, SILENT, MANY)] == [True, False, False]
+    assert not what.named(nothing("cannot-tell", places=[HERE])), "what cannot be told is no name"
     assert what.named(nothing("instrument"))
     assert what.named(nothing("none-of-these"))
     assert not what.named(nothing("nothing-missing", flagged=1)), "a reading set aside is no name"
@@ -81,6 +80,14 @@ def test_what_is_named_falsely() -> None:
     assert [what.false_named(off(found)) for found in (READ, MISREAD)] == [False, True]
     assert what.false_named(NAMED | {"instruments": [MISREAD]})
     assert [what.only_false(one) for one in (NAMED, WRONG, BESIDE)] == [False, True, False]
+
+
+def test_a_field_stands_for_all_that_was_found() -> None:
+    """It is true of viscosity that is off, or near a hidden object; steps beside it were said to be something else."""
+    mixed = {"field": {"term": "viscosity", "x": 3.0, "y": 0.0}}
+    assert what.false_named(nothing("none-of-these", **mixed))
+    assert not what.false_named(nothing("none-of-these", step("wind"), also_true=["viscosity"], **mixed))
+    assert [what.false_named(pier("none-of-these", field=HERE | {"x": x})) for x in (10.5, 20.0)] == [False, True]
 
 
 def test_a_hidden_effect_in_the_set() -> None:
@@ -102,7 +109,7 @@ def test_at_most_three_groups() -> None:
     assert what.few_groups(later), "the step with the hidden effect counts"
     assert not what.few_groups(SILENT | {"not_excluded": [["a"], ["b"], ["c"], ["d"]]})
     assert not what.few_groups(SILENT | {"not_excluded": []})
-    assert not what.few_groups(SILENT | {"places": [HERE]}), "a place was named instead"
+    assert not what.few_groups(SILENT | {"verdict": "none-of-these", "places": [HERE]}), "a place was named instead"
 
 
 def test_false_names_beside_true_ones_and_alone() -> None:
