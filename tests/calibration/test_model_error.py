@@ -1,33 +1,23 @@
 """The model's own error: a smooth random field of friction and bed, the same in all experiments."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse_twin import CASE, coarse_twin
 from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import with_own_error
-from vegglue.calibration.model_error import (
-    CellResponses,
-    bumps,
-    cell_responses,
-    field_columns,
-    model_error_columns,
-    responses_to_bumps,
-)
+from vegglue.calibration.cell_responses import CellResponses, cell_responses
+from vegglue.calibration.model_error import bumps, field_columns, model_error_columns, responses_to_bumps
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
-from vegglue.case.config import load_case
 from vegglue.case.schema import Case, ModelError
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point, linearise
-from vegglue.engine.model import coarser, model_of
-from vegglue.measurements.observations import read_observations
+from vegglue.engine.interface import Model, Point
 from vegglue.screening.candidates import effect_entry, place_candidate
 from vegglue.site.grid import Grid
 
-CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 CASE_ALLOWS = ModelError(friction=0.05, bed=0.01)
 NX, NY = 40, 24
 GRID = Grid(0.5 * np.arange(NX), 0.25 * np.arange(NY) - 3.0, 0.5, 0.25)
@@ -81,12 +71,7 @@ def test_responses_to_bumps_are_sums_over_cells() -> None:
 
 @pytest.fixture(scope="module")
 def flowing() -> tuple[Model, Point]:
-    """The channel of twins on cells of twice the size."""
-    model = coarser(model_of(CASE, read_observations(CASE)))
-    assert model is not None
-    point = linearise(model, np.zeros(len(model.names)))
-    assert point is not None
-    return model, point
+    return coarse_twin()
 
 
 def test_the_error_of_predictions_is_that_of_friction_and_of_bed(flowing: tuple[Model, Point]) -> None:

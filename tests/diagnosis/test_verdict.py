@@ -90,6 +90,24 @@ def test_an_instrument_alone_is_named_only_where_silence_is_earned(why: str) -> 
     assert "Nothing else is missing" in sentence
 
 
+def test_silence_is_not_earned_where_errors_of_the_site_blur_the_flow() -> None:
+    kind, sentence, _ = said(grounds(blur=1.5))
+    assert kind == "cannot-tell"
+    assert "blur its velocities to 1.5 times the errors of the data" in sentence
+    assert said(grounds(blur=1.2))[0] == "nothing-missing"
+
+
+def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_blurred() -> None:
+    """0.1 m/s is clear with a standard error of 0.010 m/s; with 0.026 it is 2.6 standard errors of blurred data."""
+    clear, faint = an_instrument(), an_instrument(interval95=(0.05, 0.15))
+    kind, sentence, _ = said(grounds(instruments=(clear,), blur=1.5))
+    assert kind == "instrument"
+    assert "it was set aside. Nothing else stands out, but errors of the model" in sentence
+    assert said(grounds(instruments=(faint,), blur=1.5))[0] == "cannot-tell"
+    assert said(grounds(instruments=(clear, faint), blur=1.5))[0] == "cannot-tell"
+    assert said(grounds(instruments=(faint,), blur=1.2))[0] == "instrument"
+
+
 @pytest.mark.parametrize(
     ("kind", "where", "words"),
     [

@@ -1,31 +1,20 @@
 """Spots of something unlisted: their fingerprints are responses to the effects that stand for them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from coarse_twin import CASE, coarse_twin
 
-from vegglue.case.config import load_case
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point, flow_at_centres, linearise, responses
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.interface import Model, Point, flow_at_centres, responses
 from vegglue.flow.local_changes import Term
-from vegglue.measurements.observations import read_observations
 from vegglue.screening.candidates import cause_of, place_candidate
 from vegglue.screening.places import EFFECT_AT_PLACE, SPOT_LENGTHS, Places, places_of, plausible_size
 from vegglue.site.channel_geometry import half_width
 
-CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
-
 
 @pytest.fixture(scope="module")
 def flowing() -> tuple[Model, Point]:
-    """The channel of twins on cells of twice the size."""
-    model = coarser(model_of(CASE, read_observations(CASE)))
-    assert model is not None
-    point = linearise(model, np.zeros(len(model.names)))
-    assert point is not None
-    return model, point
+    return coarse_twin()
 
 
 @pytest.fixture(scope="module")

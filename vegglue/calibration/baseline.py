@@ -7,7 +7,7 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, at_point, fit, log_evidence_under, objective
-from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.model_error import any_error, model_error_columns
 from vegglue.calibration.noise import (
     Noise,
     noise_of,
@@ -127,7 +127,7 @@ def _is_near(base: Baseline, z: Array) -> bool:
 def with_own_error(base: Baseline) -> Baseline:
     """The baseline with the model's own error as the case allows it, computed at its point, and calibrated under it."""
     allowed = base.model.case.model_error
-    if not (allowed.friction or allowed.bed):
+    if not any_error(allowed):
         return base
     search = search_model(base)
     noise = with_model_error(base.noise, model_error_columns(search.model, search.point, allowed))

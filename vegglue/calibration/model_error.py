@@ -1,6 +1,6 @@
 """The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
 
-    M = sum_k s_f^2 T_k T_k' + sum_k s_b^2 B_k B_k'
+    M = sum_k s_f^2 T_k T_k' + sum_k s_b^2 B_k B_k' + S                      S: see site_error.py
 
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
@@ -13,16 +13,16 @@ checked against it); the fields of bumps are a definition of this project.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.calibration.cell_responses import CellResponses, cell_responses
+from vegglue.calibration.site_error import site_error_columns
 from vegglue.case.case_effects import effect_of, value_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, ModelError
-from vegglue.engine.interface import Model, Point, responses_to_cells
+from vegglue.engine.interface import Model, Point
 from vegglue.flow.local_changes import Term
-from vegglue.parallel import in_threads
 from vegglue.site.channel_geometry import half_width
 from vegglue.site.grid import Grid
 
@@ -44,14 +44,6 @@ BUMP_CELLS = 1.5
 
 
 @dataclass(frozen=True)
-class CellResponses:
-    """How predictions of all stations answer to a term changed in each cell of a grid, (station, nx, ny) by term."""
-
-    grid: Grid
-    of: dict[Term, NDArray[np.float32]]
-
-
-@dataclass(frozen=True)
 class Bumps:
     """Bumps exp(-((x - x_k) / l)^2 - ((y - y_j) / w)^2) over a grid: along (k, nx) and across (j, ny) [-], their
     middles x, y [m], l and w [m].
@@ -63,17 +55,6 @@ class Bumps:
     width: float
     along: Array
     across: Array
-
-
-def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
-    """Those of all experiments, side by side."""
-    shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
-    found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
-    tasks = [(model, point, experiment, terms) for experiment in point.flows]
-    for experiment, of in zip(point.flows, in_threads(responses_to_cells, tasks), strict=True):
-        for term in terms:
-            found[term][model.rows[experiment]] = of[term]
-    return CellResponses(model.site.grid, found)
 
 
 def bumps(grid: Grid, length: float, width: float, cells: float = BUMP_CELLS) -> Bumps:
@@ -100,7 +81,7 @@ def field_columns(responses: CellResponses, term: Term, over: Bumps) -> Array:
 
 def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Array:
     """Columns (station, k) with M = columns columns', see the head of this file; none where no error is allowed."""
-    if not (allowed.friction or allowed.bed):
+    if not any_error(allowed):
         return np.zeros((len(model.station), 0))
     objects = unlisted_in(model.case)
     terms = dict.fromkeys(("friction", "bed", *(one.term for one in objects)))
@@ -112,8 +93,14 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
             allowed.friction * field_columns(responses, "friction", friction),
             allowed.bed * field_columns(responses, "bed", bed),
             *(_columns_of_shape(model, point, responses, one) for one in objects),
+            site_error_columns(model, point, allowed, responses),
         ]
     )
+
+
+def any_error(allowed: ModelError) -> bool:
+    """Whether any error of the model or of its site is allowed."""
+    return any(allowed.model_dump().values())
 
 
 @dataclass(frozen=True)

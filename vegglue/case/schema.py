@@ -130,10 +130,14 @@ class Infer(Part):
 
 
 class ModelError(Part):
-    """By how much the model itself may be wrong everywhere, the same in all experiments; 0 where nothing is said."""
+    """By how much the model and what is told of its site may be wrong; 0 where nothing is said."""
 
     friction: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="relative error of friction [-]")
     bed: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="error of the surveyed bed [m]")
+    stems: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="relative error of the stems of a patch [-]")
+    edges: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="error of where patches end [m]")
+    probes: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="error across of where probes stood [m]")
+    discharge: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="relative error of discharges [-]")
 
 
 class Validation(Part):

@@ -16,6 +16,7 @@ from vegglue.diagnosis.causes_in_words import (
     with_their_chances,
 )
 from vegglue.diagnosis.findings import Findings
+from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import (
     EstimatedErrors,
     FieldFound,
@@ -46,6 +47,9 @@ LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
 # ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
 # degree of freedom; and errors at what was not seen, over those expected, above which it disagrees.
 NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
+# Standard errors of blurred data that an instrument is to be off. Chosen after four false alarms of 3.1 to 3.4 standard
+# errors on sites with small imperfections.
+CLEARLY_OFF = 3.0
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 ABSURD, FAR_OFF = 4.0, 4.0
@@ -56,8 +60,10 @@ AT_BOUND = 0.01
 
 @dataclass(frozen=True)
 class Grounds:
-    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; neighbours:
-    whether readings side by side were set aside; strained: the parameter furthest off its prior, and how far.
+    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
+    neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
+    far; blur: errors of predicted velocities over those of the data [-], with as much of the model's own error as the
+    residual does not reject.
     """
 
     errors: EstimatedErrors
@@ -69,6 +75,7 @@ class Grounds:
     unseen: float
     neighbours: bool
     strained: tuple[str, float]
+    blur: float = 1.0
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
@@ -156,6 +163,8 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
     unearned = _unearned(grounds)
     if unearned:
         return "cannot-tell", f"Nothing stands out ({_told(misfit)}), but {unearned}."
+    if grounds.blur > UNSEEN_RATIO:
+        return _blurred(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
         return (
             "cannot-tell",
@@ -169,6 +178,24 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
     if grounds.findings.instruments:
         return "instrument", f"{instruments_in_words(grounds.findings.instruments)} Nothing else is missing: {nothing}"
     return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
+
+
+def _blurred(grounds: Grounds) -> tuple[VerdictKind, str]:
+    """Silence, or an instrument, where the model's own error may blur velocities by more than UNSEEN_RATIO."""
+    instruments = grounds.findings.instruments
+    blurred = (
+        "errors of the model and of what is told of its site, as they are allowed and not ruled out, blur its "
+        f"velocities to {grounds.blur:.1f} times the errors of the data: a missing effect may hide in them"
+    )
+    if instruments and all(_is_clear(one, grounds.blur) for one in instruments):
+        return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {blurred}."
+    return "cannot-tell", f"Nothing stands out ({_told(grounds.misfit)}), but {blurred}."
+
+
+def _is_clear(instrument: FaultyInstrument, blur: float) -> bool:
+    """Whether an instrument is off by CLEARLY_OFF standard errors of blurred data."""
+    low, high = instrument.interval95
+    return abs(instrument.offset) > CLEARLY_OFF * blur * (high - low) / 3.92
 
 
 def _unearned(grounds: Grounds) -> str:

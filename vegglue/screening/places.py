@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.model_error import TERM_OF, Bumps, CellResponses, bumps, cell_responses, responses_to_bumps
+from vegglue.calibration.cell_responses import CellResponses, cell_responses
+from vegglue.calibration.model_error import TERM_OF, Bumps, bumps, responses_to_bumps
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
