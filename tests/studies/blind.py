@@ -1,14 +1,15 @@
 """The study behind docs/blind.md: many data sets, something hidden in each, all diagnosed. `make blind`.
 
-    python tests/studies/blind.py [--jobs N] [--share S] [--only GROUP ...] [--page] [--runs FOLDER]
+    python tests/studies/blind.py [--jobs N] [--share S] [--only GROUP ...] [--page] [--runs FOLDER] [--anew]
 
 The truth is that of the second solver, on a site with small imperfections drawn anew for each data set; a part is made
 a second time with the truth of the model's own equations. Calibration starts where a user's does. One line of JSON for
-each data set in runs/blind.jsonl: what stands there is not done again, so that the study may be stopped and go on, or
-grow by a larger --share.
+each data set in runs/blind/records.jsonl: what stands there, or in data/blind, is not done again, so that the study may
+be stopped and go on, or grow by a larger --share. After a change of the diagnosis it has to be made --anew.
 """
 
 import argparse
+import gzip
 import json
 import time
 from collections.abc import Iterator
@@ -37,6 +38,8 @@ from vegglue.workflow.extend import found_additions
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"
+# Records of the study as far as it was made: data sets cost hours.
+KEPT = ROOT / "data" / "blind" / "records.jsonl.gz"
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
@@ -187,14 +190,16 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=[], help="kinds of data sets")
     parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
     parser.add_argument("--runs", type=Path, default=RUNS)
+    parser.add_argument("--anew", action="store_true", help="leave aside what data/blind holds")
     given = parser.parse_args()
     path = given.runs / "records.jsonl"
+    kept = [] if given.anew else list(records_in(KEPT))
     if not given.page:
-        run(path, given.jobs, given.share, given.only)
-    write_page(list(records_in(path)), ROOT / "docs")
+        run(path, {record["key"] for record in kept}, given.jobs, given.share, given.only)
+    write_page(list({record["key"]: record for record in (*kept, *records_in(path))}.values()), ROOT / "docs")
 
 
-def run(path: Path, jobs: int, share: float, only: list[str]) -> None:
+def run(path: Path, kept: set[str], jobs: int, share: float, only: list[str]) -> None:
     """Do what is not yet done of the first part of each kind."""
     path.parent.mkdir(parents=True, exist_ok=True)
     trials = [
@@ -202,7 +207,7 @@ def run(path: Path, jobs: int, share: float, only: list[str]) -> None:
         for one in planned_trials()
         if one.number < share * SIZES[one.truth, one.case][one.group] and (not only or one.group in only)
     ]
-    done = {record["key"] for record in records_in(path)}
+    done = kept | {record["key"] for record in records_in(path)}
     todo = [trial for trial in trials if trial.key not in done]
     with path.open("a", encoding="utf-8") as file:
         for count, record in enumerate(as_finished(study, ((trial,) for trial in todo), jobs), 1):
@@ -215,7 +220,8 @@ def records_in(path: Path) -> Iterator[dict[str, Any]]:
     """All whole lines; the last one of a study that was stopped may not be whole."""
     if not path.exists():
         return
-    for line in path.read_text(encoding="utf-8").splitlines():
+    packed = path.read_bytes()
+    for line in (gzip.decompress(packed) if path.suffix == ".gz" else packed).splitlines():
         try:
             yield json.loads(line)
         except ValueError:
