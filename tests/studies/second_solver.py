@@ -20,7 +20,7 @@ COURANT = 0.8
 # Steps between two evaluations of the closures: some 0.1 s, under the time of friction among plants.
 LAWS_EVERY = 5
 # Steady: velocities change by less [m/s2]. What is left fades by e in some 40 s, so that it is 2e-4 m/s.
-STEADY, LONGEST = 4e-6, 6000.0
+STEADY, LONGEST = 4e-6, 2000.0
 LOOK_EVERY = 200
 
 
