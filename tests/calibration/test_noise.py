@@ -12,7 +12,6 @@ from vegglue.calibration.noise import (
     noise_of,
     with_correlation,
     with_grid_error,
-    with_model_error,
     with_offset,
 )
 from vegglue.errors import InputError
@@ -95,22 +94,6 @@ def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
     left = correlated(0.0, random, error=0.02)
     noise = estimate_noise(noise_of(stations(0.01)), left, smooth())
     assert noise.scale == pytest.approx(2.0, rel=0.2)
-
-
-@pytest.mark.parametrize(("true", "least", "most"), [(1.0, 1.0, 1.0), (4.0, 2.5, 6.0)])
-def test_an_error_of_the_model_beyond_what_is_allowed_is_scaled(true: float, least: float, most: float) -> None:
-    """And neither the errors of the data, nor what physics could do, is taken for it."""
-    random = np.random.default_rng(8)
-    wrong = 0.01 * random.standard_normal((SECTIONS * STATIONS, 12))
-    allowed = with_model_error(noise_of(stations(0.01)), wrong)
-    missing = smooth() @ random.standard_normal(4 * SECTIONS) * 0.03
-    left = correlated(0.0, random) + true * wrong @ random.standard_normal(12) + missing
-    noise = estimate_noise(allowed, left, smooth())
-    assert noise.scale == 1.0
-    assert least <= noise.model_scale <= most
-    assert covariance_of(noise) - covariance_of(allowed) == pytest.approx(
-        (noise.model_scale**2 - 1.0) * wrong @ wrong.T, abs=1e-3 * 0.01**2
-    )
 
 
 def test_a_station_set_aside_counts_for_nothing() -> None:

@@ -2,8 +2,8 @@
 
     python tests/studies/blind.py [--jobs N] [--share S] [--only KEY ...] [--page] [--runs FOLDER] [--anew]
 
-The truth is that of the second solver, on a site with small imperfections drawn anew for each data set; a part is made
-a second time with the truth of the model's own equations. Calibration starts where a user's does. One line of JSON for
+The truth is that of the second solver, on a site with small imperfections drawn anew for each data set, or that of the
+model's own equations on a finer grid. Calibration starts where a user's does. One line of JSON for
 each data set in runs/blind/records.jsonl: what stands there, or in data/blind, is not done again, so that the study may
 be stopped and go on, or grow by a larger --share. After a change of the diagnosis it has to be made --anew.
 """
@@ -58,6 +58,8 @@ RATIO = {"listed3": 3.0}
 USUAL_RATIO = 6.0
 # Every so many data sets with a listed effect, the model with the true effect is calibrated too.
 LOOKED_INTO = 2
+# Effects are hidden in steps of so many names, a prime, so that few data sets already hold effects of every kind.
+STRIDE = 29
 
 
 def planned_trials() -> list[Trial]:
@@ -90,8 +92,7 @@ def _hide(case: str, group: str, number: int) -> tuple[str, ...]:
         return PAIRS[number % len(PAIRS)]
     model = model_of(case)
     names = [one.name for one in candidates_of(model.case, model.station)]
-    # In an order of their own, so that few data sets already hold effects of every kind.
-    name = names[(number * 23) % len(names)]
+    name = names[(number * STRIDE) % len(names)]
     return (name, "bad_probe") if group == "probe" else (name,)
 
 
@@ -125,6 +126,7 @@ def _said(data: DataSet, found: Diagnosis) -> dict[str, Any]:
         "steps": [asdict(step) for step in found.steps], "places": [asdict(place) for place in found.places],
         "instruments": [asdict(one) for one in found.instruments], "flagged": len(errors.flagged),
         "field": None if found.field is None else asdict(found.field),
+        "sizes": {name: found.suspect(name).amplitude.value - found.suspect(name).amplitude.off for name in found.set},
         "amplitudes": [row for one in data.hidden for row in _amplitude(one, found)],
         "p_misfit": found.misfit.p, "scale": errors.scale, "correlation": errors.correlation,
     }  # fmt: skip
@@ -187,7 +189,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--jobs", type=int, default=-1)
     parser.add_argument("--share", type=float, default=1.0, help="share of all data sets, 0 to 1")
-    parser.add_argument("--only", nargs="*", default=[""], help="how keys begin: second/twin, own/twin/listed6, ...")
+    parser.add_argument("--only", nargs="+", default=[""], help="how keys begin: second/twin, own/twin/listed6, ...")
     parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
     parser.add_argument("--runs", type=Path, default=RUNS)
     parser.add_argument("--anew", action="store_true", help="leave aside what data/blind holds")

@@ -23,9 +23,16 @@ def hidden_of(record: Record, kind: str) -> list[Thing]:
     return [one for one in record["hidden"] if one["kind"] == kind]
 
 
+def hidden_names(record: Record) -> set[str]:
+    """Names of hidden listed effects."""
+    return {one["name"] for one in hidden_of(record, "listed")}
+
+
 def truths(record: Record) -> set[str]:
-    """Names that a diagnosis may rightly say."""
-    return {one["name"] for one in hidden_of(record, "listed")} | set(record["also_true"])
+    """Names that a diagnosis may rightly say: what is hidden, and imperfections that it finds with their sign."""
+    sizes = record.get("sizes", {})
+    also = {name for name, size in record["also_true"].items() if size * sizes.get(name, size) > 0.0}
+    return hidden_names(record) | also
 
 
 def is_true_step(record: Record, step: Thing) -> bool:
@@ -133,19 +140,31 @@ def wrong_for_object(record: Record) -> bool:
     return record["verdict"] in ("identified", "instrument") and not place_near(record)
 
 
+def places_named(record: Record) -> list[Thing]:
+    """Places of the verdict; of a field, where it stands out most."""
+    if not named(record):
+        return []
+    return [record["field"]] if record.get("field") else list(record["places"])
+
+
 def none_of_these(record: Record) -> bool:
-    """The verdict is none of these, or a place was found."""
-    return record["verdict"] == "none-of-these" or bool(record["places"])
+    """The verdict is none of these."""
+    return record["verdict"] == "none-of-these"
 
 
 def place_near(record: Record) -> bool:
-    """A place was found within 1.5 m of an unlisted object."""
-    return any(objects_near(record, place) for place in record["places"])
+    """A place was named within 1.5 m of an unlisted object."""
+    return any(objects_near(record, place) for place in places_named(record))
 
 
 def right_term(record: Record) -> bool:
-    """A place was found within 1.5 m of an unlisted object, with its term."""
-    return any(place["term"] == one["term"] for place in record["places"] for one in objects_near(record, place))
+    """A place was named within 1.5 m of an unlisted object, with its term; a field of friction is one of drag."""
+    terms = [
+        ("drag" if place["term"] == "friction" else place["term"], one["term"])
+        for place in places_named(record)
+        for one in objects_near(record, place)
+    ]
+    return any(found == true for found, true in terms)
 
 
 def right_term_if_near(record: Record) -> bool | None:
@@ -154,9 +173,9 @@ def right_term_if_near(record: Record) -> bool | None:
 
 
 def instrument_found(record: Record) -> bool | None:
-    """Every hidden instrument shares a station with one found."""
+    """Every hidden instrument shares a station with one that the verdict names."""
     hidden = hidden_of(record, "instrument")
-    stations = {row for found in record["instruments"] for row in found["stations"]}
+    stations = {row for found in record["instruments"] for row in found["stations"]} if named(record) else set()
     return all(stations & set(one["stations"]) for one in hidden) if hidden else None
 
 

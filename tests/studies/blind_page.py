@@ -125,9 +125,8 @@ def _left_out(records: Sequence[Record]) -> str:
     for record in records:
         if "left_out" in record:
             found = re.match(r"--hide (\S+): at no plausible size", record["left_out"])
-            hide = found[1].split(",") if found else record.get("hide") or ()
-            names.update(hide)
-            others.update([] if hide else [record["left_out"].strip().rstrip(".")])
+            names.update(found[1].split(",") if found else ())
+            others.update([] if found else [record["left_out"].partition(":")[0]])
     told = "Left out, since the data would not show them at any plausible size: {}.".format(
         ", ".join(f"`{name}`" for name in sorted(names)) or "none"
     )

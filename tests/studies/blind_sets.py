@@ -29,18 +29,17 @@ from vegglue.workflow.run_folder import model_in
 CONFIGS = Path(__file__).parents[2] / "configs"
 # True places of the prior, each seen by the model once.
 PLACES = 8
-NOISE = ("white", "ar1:0.5", "understated:1.5")
 # Every fifth set without a hidden effect has understated errors, two of five correlated ones.
 NULL_NOISE = ("white", "ar1:0.5", "white", "ar1:0.5", "understated:1.5")
-OBJECTS = {"pier": "friction", "fallen_tree": "friction", "sink": "friction", "jet": "friction", "scour_hole": "bed"}
+OBJECTS = {"pier": "drag", "fallen_tree": "drag", "sink": "drag", "jet": "drag", "scour_hole": "bed"}
 INSTRUMENTS = ("position", "gauge", "reading")
 # Pairs that leave different traces, so that both could be found.
 PAIRS = (
     ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
-# Sets of the first were seen when the errors of a site were chosen.
-EDITION = "second edition, part two: "
+# Sets of the parts before were seen when the errors of a site were chosen.
+EDITION = "second edition, part three: "
 # A bad reading beside an effect is off by so many standard errors.
 BAD = 10.0
 
@@ -65,13 +64,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class DataSet:
-    """A model with what was measured, what was hidden as records say it, names that are true besides, and stations that
-    nobody measured with what is true there.
+    """A model with what was measured, what was hidden as records say it, names that are true besides with their sizes,
+    and stations that nobody measured with what is true there.
     """
 
     model: Model
     hidden: tuple[dict[str, Any], ...]
-    also_true: tuple[str, ...]
+    also_true: Mapping[str, float]
     unseen: pd.DataFrame
 
 
@@ -166,21 +165,21 @@ def _instrument(base: TwinBase, sizing: Noise, kind: str, signal: float, random:
 
 def _truly(
     trial: Trial, base: TwinBase, station: pd.DataFrame, hidden: Sequence[Mapping[str, Any]], seed: int
-) -> tuple[Array, tuple[str, ...]]:
+) -> tuple[Array, Mapping[str, float]]:
     """What is true at stations, and what may rightly be named besides what is hidden."""
     if trial.truth == "own":
-        return _own_truth(base, station, hidden), ()
-    case, theta = base.model.case, theta_at(base.model.case, base.here.z)
-    site = perfect_site(case, trial.case, {name: float(values[0]) for name, values in theta.items()}, len(station))
+        return _own_truth(base, station, hidden), {}
+    case, theta, measured = base.model.case, theta_at(base.model.case, base.here.z), len(base.model.station)
+    site = perfect_site(case, trial.case, {name: float(values[0]) for name, values in theta.items()}, measured)
     if trial.imperfect:
-        site = site_of_nature(site, case, seed % 2**31)
+        site = site_of_nature(site, case, seed % 2**31, trial.hide)
     numbers: dict[str, Numbers] = {one["name"]: {one["parameter"]: one["amplitude"], **one["shapes"]} for one in hidden}
     return _kept_values(site, case, trial.case, station, numbers), site.also_true
 
 
 def _kept_values(site: Site, case: Case, study: str, station: pd.DataFrame, numbers: Mapping[str, Numbers]) -> Array:
     """True values; those of a perfect site without anything hidden are kept in this process."""
-    if site.also_true or numbers:
+    if site.truth.bed_seed is not None or numbers:
         return true_values(site, case, study, station, numbers)
     if (known := _VALUES.get(repr(site.truth))) is None:
         known = _VALUES[repr(site.truth)] = true_values(site, case, study, station, numbers)

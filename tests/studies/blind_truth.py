@@ -1,6 +1,6 @@
 """Truths of the blind study: what instruments would show at a site of the second solver that hides something."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ SETTLED = 1e-5
 # patches [m], eddy viscosity over the stated one, floor of the bank law, logarithm above plants, bed among them.
 STEMS, DISCHARGE, PROBE, EDGE, VISCOSITY = 0.12, 0.01, 0.02, 0.1, (0.5, 2.5)
 BANK_FLOOR, UPPER, BARE = (1.1, 1.6), (0.85, 1.15), (45.0, 75.0)
-# An imperfection is named rightly where it is as large: discharges [share], stems [share]; any viscosity.
+# An imperfection is named rightly, with its sign, where it is as large: discharges, stems [share]; any viscosity.
 NAMED_DISCHARGE, NAMED_STEMS = 0.004, 0.03
 EDDIES = ("viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures")
 Numbers = Mapping[str, float]
@@ -32,14 +32,14 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Site:
-    """A site: what is true of it, discharges of its experiments as factors, where each station truly stood across [m],
-    and names of what a diagnosis may rightly find missing though nothing was hidden.
+    """A site: what is true of it, discharges of its experiments as factors, by how much the first stations stood off
+    across [m], and what a diagnosis may rightly find missing though nothing was hidden, by name with its size.
     """
 
     truth: Truth
     discharges: Mapping[str, float]
     shifts: Field
-    also_true: tuple[str, ...]
+    also_true: Mapping[str, float]
 
 
 def perfect_site(case: Case, study: str, theta: Numbers, stations: int) -> Site:
@@ -49,30 +49,39 @@ def perfect_site(case: Case, study: str, theta: Numbers, stations: int) -> Site:
         theta["n_b"], theta["k_s"], theta["phi"], theta["canopy_height"], {}, stems=(1.0,) * len(channel.patches),
         channel=channel,
     )  # fmt: skip
-    return Site(truth, dict.fromkeys(case.experiments, 1.0), np.zeros(stations), ())
+    return Site(truth, dict.fromkeys(case.experiments, 1.0), np.zeros(stations), {})
 
 
-def site_of_nature(perfect: Site, case: Case, seed: int) -> Site:
-    """A site like that with small imperfections, drawn anew for each seed."""
+def site_of_nature(perfect: Site, case: Case, seed: int, hide: Sequence[str] = ()) -> Site:
+    """A site like that with small imperfections, drawn anew for each seed; none of the kind that is hidden."""
     random = np.random.default_rng((seed, 11))
     truth, patches = perfect.truth, [patch.name for patch in case.plants.patches]
     stems = 1.0 + STEMS * random.standard_normal(len(patches))
     discharges = 1.0 + DISCHARGE * random.standard_normal(len(case.experiments))
-    emergent = float(random.integers(2))
+    emergent, viscosity = float(random.integers(2)), float(np.exp(random.uniform(*np.log(VISCOSITY))))
+    hidden = {name.partition("[")[0] for name in hide}
+    stems = np.ones_like(stems) if "patch_density" in hidden else stems
+    discharges = np.ones_like(discharges) if "discharge_error" in hidden else discharges
+    emergent = 0.0 if "emergent_part" in hidden else emergent
+    viscosity = 1.0 if "viscosity" in hidden else viscosity
     formulation = Formulation(
         bank_floor=float(random.uniform(*BANK_FLOOR)), emergent=emergent, upper=float(random.uniform(*UPPER)),
         bare=float(random.uniform(*BARE)),
     )  # fmt: skip
-    named = [f"patch_density[{name}]" for name, each in zip(patches, stems, strict=True) if abs(each - 1) > NAMED_STEMS]
-    named += [
-        f"discharge_error[{name}]"
-        for name, each in zip(case.experiments, discharges, strict=True)
-        if abs(each - 1) > NAMED_DISCHARGE
-    ]
+    mean = float(np.average(stems, weights=truth.channel.density))
+    sizes = {f"patch_density[{name}]": each / mean - 1.0 for name, each in zip(patches, stems, strict=True)}
+    sizes |= {f"discharge_error[{name}]": each - 1.0 for name, each in zip(case.experiments, discharges, strict=True)}
+    named = {
+        name: float(size)
+        for name, size in sizes.items()
+        if abs(size) > (NAMED_STEMS if name.startswith("patch") else NAMED_DISCHARGE)
+    }
+    named |= dict.fromkeys(EDDIES, viscosity - 1.0) if viscosity != 1.0 else {}
+    named |= {"emergent_part": emergent} if emergent else {}
     return Site(
         replace(
             truth,
-            nu=EDDY_VISCOSITY * float(np.exp(random.uniform(*np.log(VISCOSITY)))),
+            nu=EDDY_VISCOSITY * viscosity,
             stems=tuple(float(each) for each in stems),
             bed_seed=seed,
             edges=_moved(truth.channel, random),
@@ -80,7 +89,7 @@ def site_of_nature(perfect: Site, case: Case, seed: int) -> Site:
         ),
         dict(zip(case.experiments, (float(each) for each in discharges), strict=True)),
         PROBE * random.standard_normal(perfect.shifts.size),
-        (*EDDIES, *named, *(["emergent_part"] if emergent else [])),
+        named,
     )
 
 
@@ -103,7 +112,8 @@ def true_values(site: Site, case: Case, study: str, station: pd.DataFrame, hidde
         discharge = float(next(iter(setting.discharge.values()))) * site.discharges[name]
         truth, discharge, level = _hiding(site.truth, name, discharge, float(setting.level), hidden)
         flow = steady_flow(truth, discharge, level, CELLS[study], SETTLED)
-        shifts = site.shifts if site.shifts.size == len(station) else np.zeros(len(station))
+        shifts = np.zeros(len(station))
+        shifts[: site.shifts.size] = site.shifts
         value[here] = _readings(truth, flow, level, CELLS[study], station[here], shifts[here], hidden)
     return value
 

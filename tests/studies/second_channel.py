@@ -28,10 +28,10 @@ class Channel:
 
 @dataclass(frozen=True)
 class Lie:
-    """How cells lie: x, y; bank: 1 on the banks, else 0; cover: share of the cell under plants; patch: number of the
-    patch it lies in, -1 without; front: distance from the upstream end of its patch; edge: from the nearest side of a
-    patch, negative inside, infinite beside none; wake: from the end of the nearest patch upstream in this row; end: x
-    of the outlet.
+    """How cells lie: x, y; bank: 1 on the banks, else 0; cover: share of the cell under a patch; patch: number of the
+    one that covers most of it, -1 without; front: distance from the upstream end of its patch; edge: from the nearest
+    side of a patch, negative inside, infinite beside none; wake: from the end of the nearest patch upstream in this
+    row; end: x of the outlet.
     """
 
     x: Field
@@ -62,15 +62,16 @@ def lie_of(channel: Channel, x: Field, y: Field, dx: float = 0.0, dy: float = 0.
     cover, patch = np.zeros(shape), np.full(shape, -1)
     front, edge, wake = (np.full(shape, np.inf) for _ in range(3))
     for number, (along, across) in enumerate(channel.patches):
-        inside = (x > along[0]) & (x < along[1]) & (y > across[0]) & (y < across[1])
+        share = _share(x, dx, along) * _share(y, dy, across)
+        inside = share > cover
         patch[inside] = number
-        front = np.where(inside, x - along[0], front)
+        front = np.where(inside, np.maximum(x - along[0], 0.0), front)
         beside = (x > along[0]) & (x < along[1])
         out = np.maximum(across[0] - y, y - across[1])
         edge = np.where(beside & (np.abs(out) < np.abs(edge)), out, edge)
         behind = (x > along[1]) & (y > across[0]) & (y < across[1])
         wake = np.where(behind, np.minimum(wake, x - along[1]), wake)
-        cover = cover + _share(x, dx, along) * _share(y, dy, across)
+        cover = np.maximum(cover, share)
     bank = (np.abs(y) > channel.half) + np.zeros(shape)
     return Lie(x + np.zeros(shape), y + np.zeros(shape), bank, cover, patch, front, edge, wake, channel.length)
 

@@ -76,13 +76,7 @@ def _before(ground: Ground, channel: Channel, lie: Lie, spacing: tuple[float, fl
         if name in effects.PLANTS:
             new = effects.PLANTS[name](state, **numbers)
             state = replace(state, phi=new[0], hd=new[1])
-    bare = GRAVITY / (ground.formulation.bare**2 * h)
-    cover = lie.cover
-    return replace(
-        state,
-        k=(1.0 - cover) * bed + cover * _plants(ground.formulation, state),
-        bed_k=(1.0 - cover) * bed + cover * bare,
-    )
+    return replace(state, k=(1.0 - lie.cover) * bed + lie.cover * _plants(ground.formulation, state))
 
 
 def _plants(formulation: Formulation, state: State) -> Field:

@@ -24,17 +24,17 @@ def record(group: str, verdict: str, *steps: dict[str, Any], **changes: Any) -> 
     """The hidden effect is `eddies`, where nothing else is said."""
     return {
         "key": f"second/twin/{group}/0", "truth": "second", "case": "twin", "group": group, "number": 0,
-        "noise": "white", "imperfect": False, "signal": 6.0, "hidden": [listed()], "also_true": [],
+        "noise": "white", "imperfect": False, "signal": 6.0, "hidden": [listed()], "also_true": {},
         "verdict": verdict, "set": [name for one in steps for name in one["rivals"]], "not_excluded": [],
         "steps": list(steps), "places": [], "instruments": [], "flagged": 0, "amplitudes": [], "held_out": None,
         "seconds": 3.0,
     } | changes  # fmt: skip
 
 
-PIER = {"name": "unlisted:pier", "kind": "unlisted", "x": 10.0, "y": 0.5, "term": "friction", "stations": []}
+PIER = {"name": "unlisted:pier", "kind": "unlisted", "x": 10.0, "y": 0.5, "term": "drag", "stations": []}
 PROBE = {"name": "position", "kind": "instrument", "x": None, "y": None, "term": None, "stations": [4, 7]}
-HERE = {"x": 11.0, "y": 1.0, "term": "friction"}
-AWAY = {"x": 11.2, "y": 1.5, "term": "friction"}
+HERE = {"x": 11.0, "y": 1.0, "term": "drag"}
+AWAY = {"x": 11.2, "y": 1.5, "term": "drag"}
 READ, MISREAD = {"kind": "position", "stations": [7]}, {"kind": "gauge", "stations": [8]}
 
 NAMED = record("listed6", "identified", step("eddies"))
@@ -57,8 +57,10 @@ def off(*found: dict[str, Any], **changes: Any) -> dict[str, Any]:
 
 
 def test_imperfections_of_the_site_are_true() -> None:
-    found = nothing("identified", step("viscosity"), also_true=["viscosity"])
-    assert what.truths(NAMED | {"also_true": ["elder"]}) == {"eddies", "elder"}
+    found = nothing("identified", step("viscosity"), also_true={"viscosity": 0.8})
+    assert what.truths(NAMED | {"also_true": {"elder": 0.8}}) == {"eddies", "elder"}
+    assert what.false_named(found | {"sizes": {"viscosity": -0.003}}), "more of it was found, but there is less"
+    assert not what.false_named(found | {"sizes": {"viscosity": 0.003}})
     assert what.named(found)
     assert not what.false_named(found)
     assert what.false_named(nothing("identified", step("viscosity")))
@@ -86,7 +88,7 @@ def test_a_field_stands_for_all_that_was_found() -> None:
     """It is true of viscosity that is off, or near a hidden object; steps beside it were said to be something else."""
     mixed = {"field": {"term": "viscosity", "x": 3.0, "y": 0.0}}
     assert what.false_named(nothing("none-of-these", **mixed))
-    assert not what.false_named(nothing("none-of-these", step("wind"), also_true=["viscosity"], **mixed))
+    assert not what.false_named(nothing("none-of-these", step("wind"), also_true={"viscosity": 0.8}, **mixed))
     assert [what.false_named(pier("none-of-these", field=HERE | {"x": x})) for x in (10.5, 20.0)] == [False, True]
 
 
@@ -119,7 +121,7 @@ def test_false_names_beside_true_ones_and_alone() -> None:
         False, True, False,
     ]  # fmt: skip
     assert what.false_beside_true(off(READ, MISREAD))
-    elder = record("listed6", "identified", step("elder"), step("wind"), also_true=["elder"])
+    elder = record("listed6", "identified", step("elder"), step("wind"), also_true={"elder": 0.8})
     assert not what.false_beside_true(elder), "what was hidden was not found"
     assert not what.wrong_alone(elder)
     assert [what.wrong_alone(one) for one in (NAMED, WRONG, MANY, BESIDE)] == [False, True, False, False]
@@ -127,7 +129,7 @@ def test_false_names_beside_true_ones_and_alone() -> None:
 
 
 def test_an_object_in_no_list() -> None:
-    assert [what.none_of_these(one) for one in (pier("none-of-these"), pier("identified", AWAY))] == [True, True]
+    assert [what.none_of_these(one) for one in (pier("none-of-these"), pier("identified", AWAY))] == [True, False]
     assert not what.none_of_these(pier("nothing-missing"))
     assert [what.place_near(pier("none-of-these", place)) for place in (HERE, AWAY)] == [True, False]
     assert what.right_term(pier("none-of-these", HERE))
@@ -200,7 +202,7 @@ def test_chances_against_what_came_true() -> None:
 
 
 def test_what_is_named_instead_of_what() -> None:
-    also = record("listed6", "identified", step("elder"), also_true=["elder"])
+    also = record("listed6", "identified", step("elder"), also_true={"elder": 0.8})
     found = instead([NAMED, WRONG, WRONG, MANY, SILENT, also, SILENT | {"places": [HERE]}])
     assert found == [("eddies", "wind", 3, 1, 7), ("eddies", "(place)", 1, 0, 7)]
 

@@ -7,7 +7,11 @@ import pytest
 from blind import SIZES, planned_trials, records_in, study
 from blind_sets import Trial, hash_of, made, model_of, unseen_stations
 from blind_truth import PROBE, perfect_site, site_of_nature
-from site_reach import bed_level
+from second_channel import SHORT
+from second_solver import Flow
+from site_reach import Truth, bed_level, reach_of
+
+from vegglue.screening.candidates import candidates_of
 
 THETA = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7}
 
@@ -29,7 +33,7 @@ def test_a_perfect_site_is_as_configured_and_one_of_nature_is_not():
     perfect = perfect_site(case, "twin", THETA, 500)
     nature, again, other = (site_of_nature(perfect, case, seed) for seed in (3, 3, 4))
     assert repr(nature) == repr(again) != repr(other)
-    assert perfect.also_true == ()
+    assert not perfect.also_true
     assert not perfect.shifts.any()
     assert nature.shifts.std() == pytest.approx(PROBE, rel=0.1)
     assert 0.005 <= nature.truth.nu <= 0.025
@@ -44,10 +48,34 @@ def test_names_of_imperfections_are_those_that_are_there():
     case = model_of("twin").case
     for seed in range(20):
         site = site_of_nature(perfect_site(case, "twin", THETA, 10), case, seed)
-        assert {"viscosity", "elder"} <= set(site.also_true)
+        assert site.also_true["viscosity"] == site.also_true["elder"] == pytest.approx(site.truth.nu / 0.01 - 1.0)
         for name, factor in site.discharges.items():
             assert (f"discharge_error[{name}]" in site.also_true) == (abs(factor - 1.0) > 0.004)
         assert ("emergent_part" in site.also_true) == bool(site.truth.formulation.emergent)
+        own = site_of_nature(perfect_site(case, "twin", THETA, 10), case, seed, ("viscosity", "discharge_error[low]"))
+        assert own.truth.nu == 0.01, "what is hidden is no imperfection besides"
+        assert set(own.discharges.values()) == {1.0}
+        assert own.truth.stems == site.truth.stems
+
+
+@pytest.mark.parametrize("case", ["twin", "campaign"])
+def test_as_many_effects_are_hidden_as_there_are_sets_for(case):
+    model = model_of(case)
+    count = len(candidates_of(model.case, model.station))
+    hidden = {
+        one.hide for one in planned_trials() if one.case == case and one.truth == "second" and one.group == "listed6"
+    }
+    assert len(hidden) == min(count, SIZES["second", case]["listed6"])
+
+
+def test_a_wider_patch_resists_more():
+    """By a tenth of a cell on one side: the strip has its share of the plants."""
+    flow, drags = Flow(*(np.full((64, 40), value) for value in (0.9, 0.5, 0.0))), []
+    for side in (0.0, 0.02, 0.05):
+        edges = (((8.0, 12.0 + side), (-1.5, side)), SHORT.patches[1])
+        truth = Truth(0.03, 0.5, 2.0, 0.7, {}, stems=(1.0, 1.0), channel=SHORT, edges=edges)
+        drags.append(reach_of(truth, (0.5, 0.1875), 0.9).closure(flow).drag.sum())
+    assert drags[0] < drags[1] < drags[2]
 
 
 def test_unseen_stations_stand_elsewhere():

@@ -16,7 +16,7 @@ from vegglue.twins.twin import true_place
 
 # One of each kind: bed, inflow, plants, drag, mixing, momentum flux, force, instrument, and something in no list.
 SOME = (
-    "flank_scour", "inflow_skew", "canopy_deflection", "bank_vegetation", "edge_mixing", "secondary_current",
+    "flank_scour", "inflow_skew", "canopy_deflection", "bank_vegetation", "edge_mixing", "elder", "secondary_current",
     "panel_current", "partial_depth", "unlisted:fallen_tree",
 )  # fmt: skip
 

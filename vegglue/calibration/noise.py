@@ -1,12 +1,11 @@
 """The covariance of the errors: those of the measurements, correlated along a section, of the grid and of the model.
 
-    cov = s^2 D R D + E + m^2 M + O O',   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
+    cov = s^2 D R D + E + M + O O',   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
 
 D are the standard errors of the measurements and s their scale. rho is the correlation of neighbours in a section, d
 their usual spacing and d_ij the distance between stations i and j. R_ij is 0 between sections, experiments and kinds.
-g is the error of discretisation and c its correlation between two stations. M is the model's own error as it is
-allowed, see `model_error`, and m >= 1 its scale. A column of O is an instrument found to be off: what all its readings
-share counts for nothing.
+g is the error of discretisation and c its correlation between two stations. M is the model's own error, see
+`model_error`. A column of O is an instrument found to be off: what all its readings share counts for nothing.
 """
 
 import itertools
@@ -59,7 +58,6 @@ class Noise:
     correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
     model_error: Array  # M (n, n), zero when the model is taken to be right
     offsets: Array  # O (n, k), instruments that are off by an unknown amount
-    model_scale: float = 1.0  # m [-]
 
     def used(self, values: Array) -> Array:
         """The rows of the used stations (n, ...) of values of all stations (station, ...)."""
@@ -160,53 +158,43 @@ def with_offset(noise: Noise, readings: np.ndarray) -> Noise:
 
 
 def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
-    """rho, s and m of the errors by maximum likelihood of the residual r (n,), measured minus predicted.
+    """rho and s of the errors by maximum likelihood of the residual r (n,), measured minus predicted.
 
-        r ~ N(0, cov(rho, s, m) + t^2 F F')
+        r ~ N(0, cov(rho, s) + t^2 F F')
 
     systematic: F (n, k), changes of the predictions that calibration and missing effects could make, each of plausible
-    size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; one of s and m differs
-    from 1 only when the likelihood rejects the errors as stated and allowed at 1 %.
+    size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only when
+    the likelihood rejects the stated errors at 1 %.
     """
     deviance = _deviance_of(noise, residual, systematic)
     pairs = itertools.product(START_CORRELATIONS, START_SIZES)
-    _, *start = min((deviance(rho, 1.0, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho, t in pairs)
-    ways = ("", "s", "m") if noise.model_error.any() else ("", "s")
-    fixed, *free = (_likeliest(deviance, start, way) for way in ways)
-    larger = [one for one in free if fixed[0] - one[0] > SCALE_EVIDENCE and max(one[2], one[3]) > 1.0]
-    _, rho, scale, model_scale, log_t = min(larger, default=fixed)
-    found = replace(with_correlation(noise, rho if rho > 0.05 else 0.0, scale), model_scale=model_scale)
-    chances = _correlation_chances(lambda level: deviance(level, scale, model_scale, log_t))
-    return _with_cholesky(replace(found, correlation_chances=chances))
+    _, *start = min((deviance(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho, t in pairs)
+
+    def best(scale_free: bool) -> tuple[float, float, float, float]:
+        def unfold(x: Array) -> tuple[float, float, float]:
+            rho, scale = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[2], -3.0, 3.0)) if scale_free else 1.0
+            return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
+
+        end = scipy.optimize.minimize(
+            lambda x: deviance(*unfold(x)),
+            np.array([*start, 0.0][: 3 if scale_free else 2]),
+            method="Nelder-Mead",
+            options={"xatol": 0.02, "fatol": 0.02},
+        )
+        return float(end.fun), *unfold(end.x)
+
+    fixed, free = best(False), best(True)
+    _, rho, scale, log_t = free if fixed[0] - free[0] > SCALE_EVIDENCE and free[2] > 1.0 else fixed
+    found = with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
+    return replace(found, correlation_chances=_correlation_chances(lambda level: deviance(level, scale, log_t)))
 
 
-Deviance = Callable[[float, float, float, float], float]
-
-
-def _likeliest(deviance: Deviance, start: list[float], free: str) -> tuple[float, float, float, float, float]:
-    """The least deviance, with its rho, s, m and ln t; free: which scale is not 1."""
-
-    def unfold(x: Array) -> tuple[float, float, float, float]:
-        rho, size = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[-1], -3.0, 3.0)) if free else 1.0
-        scale, model_scale = (float(size) if free == name else 1.0 for name in "sm")
-        return float(rho), scale, model_scale, float(np.clip(x[1], -20.0, 10.0))
-
-    end = scipy.optimize.minimize(
-        lambda x: deviance(*unfold(x)),
-        np.array([*start, 0.0][: 3 if free else 2]),
-        method="Nelder-Mead",
-        options={"xatol": 0.02, "fatol": 0.02},
-    )
-    return float(end.fun), *unfold(end.x)
-
-
-def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Deviance:
-    """-2 ln likelihood (rho, s, m, ln t) up to a constant."""
+def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:
+    """-2 ln likelihood (rho, s, ln t) up to a constant."""
     gram = systematic @ systematic.T
 
-    def deviance(rho: float, scale: float, model_scale: float, log_t: float) -> float:
-        wrong = replace(noise, correlation=rho, scale=scale, model_scale=model_scale)
-        covariance = covariance_of(wrong) + np.exp(2.0 * log_t) * gram
+    def deviance(rho: float, scale: float, log_t: float) -> float:
+        covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
         factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
         return float(2.0 * np.log(np.diag(factor)).sum() + residual @ scipy.linalg.cho_solve((factor, lower), residual))
 
@@ -240,14 +228,13 @@ def _with_cholesky(noise: Noise) -> Noise:
 
 
 def covariance_of(noise: Noise) -> Array:
-    """s^2 D R D + E + m^2 M + O O' of the used stations (n, n)."""
+    """s^2 D R D + E + M + O O' of the used stations (n, n)."""
     rho, size = noise.correlation, noise.rows.size
     correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
     covariance = noise.scale**2 * correlations * np.outer(noise.error, noise.error)
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
     own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
-    wrong = noise.model_scale**2 * noise.model_error
-    return np.asarray(covariance + shared + own + wrong + noise.offsets @ noise.offsets.T)
+    return np.asarray(covariance + shared + own + noise.model_error + noise.offsets @ noise.offsets.T)
 
 
 def _separation(used: pd.DataFrame) -> Array:
