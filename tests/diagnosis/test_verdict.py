@@ -98,12 +98,15 @@ def test_silence_is_not_earned_where_errors_of_the_site_blur_the_flow() -> None:
 
 
 def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_blurred() -> None:
-    """0.1 m/s is clear with a standard error of 0.010 m/s; with 0.026 it is 2.6 standard errors of blurred data."""
+    """0.1 m/s is clear with a standard error of 0.010 m/s; with 0.026 it is 3.9 of them. It is told all the same."""
     clear, faint = an_instrument(), an_instrument(interval95=(0.05, 0.15))
     kind, sentence, _ = said(grounds(instruments=(clear,), blur=1.5))
     assert kind == "instrument"
     assert "it was set aside. Nothing else stands out, but errors of the model" in sentence
-    assert said(grounds(instruments=(faint,), blur=1.5))[0] == "cannot-tell"
+    kind, sentence, remarks = said(grounds(instruments=(faint,), blur=1.5))
+    assert kind == "cannot-tell"
+    assert "it was set aside" not in sentence
+    assert "is off by 0.1 m/s (0.05 to 0.15); it was set aside." in remarks
     assert said(grounds(instruments=(clear, faint), blur=1.5))[0] == "cannot-tell"
     assert said(grounds(instruments=(faint,), blur=1.2))[0] == "instrument"
 
@@ -289,7 +292,7 @@ def test_errors_that_are_not_as_stated_are_remarked() -> None:
 def test_the_model_error_that_is_allowed_is_remarked() -> None:
     used = ModelErrorUsed(0.05, 0.01, needed=0.5, log_ratio=1.0)
     assert (
-        "wrong by 5% of its friction and 1 cm of its bed everywhere; it needs 2.5% and 0.5 cm."
+        "by 5% of its friction and 1 cm of its bed everywhere, and its site as the config says; it needs 50% of what is"
         in said(grounds(model_error=used))[2]
     )
     assert "it needs none of it" in said(grounds(model_error=replace(used, needed=0.0)))[2]

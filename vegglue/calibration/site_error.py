@@ -10,6 +10,7 @@ Source: definition; which errors are meant, and of which size, is chosen (see DE
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses
@@ -17,6 +18,7 @@ from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.engine.interface import Cause, Model, Point, responses
 from vegglue.measurements.kinds import velocity_rows
+from vegglue.site.channel_geometry import patches_present
 
 # The name of an effect that is tried alone, and of its amplitude; no case has it.
 TRIED, AMOUNT = "error_of_the_site", "error_of_the_site_amount"
@@ -64,8 +66,7 @@ def _cause(case: Case, effect: str, *experiments: str) -> Cause:
 
 def _patches(model: Model, cells: CellResponses) -> Array:
     """Answers to the relative friction of each patch (station, patches)."""
-    patch = model.site.patch
-    return _summed(cells, [patch == index for index in np.unique(patch[patch >= 0])])
+    return _summed(model, cells, lambda inside: [inside.astype(float)])
 
 
 def _sides(model: Model, cells: CellResponses) -> Array:
@@ -74,17 +75,25 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     To first order the strip that is gained, d wide, is friction of the cells inside that side made larger by d over
     their width: what the bed among stems resists by itself is left out.
     """
-    grid, patch, sides = model.site.grid, model.site.patch, []
+    grid = model.site.grid
+
+    def sides(inside: NDArray[np.bool_]) -> list[Array]:
+        return [
+            (inside & ~np.roll(inside, step, axis)) / width
+            for axis, width in ((0, grid.dx), (1, grid.dy))
+            for step in (-1, 1)
+        ]
+
+    return _summed(model, cells, sides)
+
+
+def _summed(model: Model, cells: CellResponses, parts: Callable[[NDArray[np.bool_]], list[Array]]) -> Array:
+    """Answers to friction in each part of each patch (station, parts); none in experiments in which it is not there."""
+    patch, columns = model.site.patch, [np.zeros((len(model.station), 0))]
     for index in np.unique(patch[patch >= 0]):
-        inside = patch == index
-        for axis, width in ((0, grid.dx), (1, grid.dy)):
-            for step in (-1, 1):
-                outside = ~np.roll(inside, step, axis)
-                sides.append((inside & outside) / width)
-    return _summed(cells, sides)
-
-
-def _summed(cells: CellResponses, fields: list[Array]) -> Array:
-    if not fields:
-        return np.zeros((len(cells.of["friction"]), 0))
-    return np.einsum("nij,kij->nk", cells.of["friction"], np.array(fields, dtype=float), optimize=True)
+        fields = np.array(parts(patch == index), dtype=float)
+        answers = np.einsum("nij,kij->nk", cells.of["friction"], fields, optimize=True)
+        for experiment, rows in model.rows.items():
+            answers[rows] *= index in patches_present(model.case, experiment)
+        columns.append(answers)
+    return np.hstack(columns)

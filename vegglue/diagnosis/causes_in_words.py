@@ -108,11 +108,7 @@ def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
 
 
 def model_error_in_words(used: ModelErrorUsed) -> str:
-    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 3 %."""
+    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 60 % of what is allowed."""
     allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
-    needs = (
-        "none of it"
-        if used.needed == 0.0
-        else f"{used.needed * used.friction:.1%} and {100 * used.needed * used.bed:.2g} cm"
-    )
-    return f"The model is allowed to be wrong {allowed}; it needs {needs}."
+    needs = "none of it" if used.needed == 0.0 else f"{used.needed:.0%} of what is allowed"
+    return f"The model is allowed to be wrong {allowed}, and its site as the config says; it needs {needs}."

@@ -131,8 +131,7 @@ def _model_error(screening: Screening) -> tuple[ModelErrorUsed | None, float]:
     if not noise.model_error.any():
         return None, 0.0
     whole, residual = free_of_prior(search)
-    used = noise.model_scale**2
-    logs = [log_density_of_residual(whole + (share**2 - used) * noise.model_error, residual) for share in ERROR_SHARES]
+    logs = [log_density_of_residual(whole + (share**2 - 1.0) * noise.model_error, residual) for share in ERROR_SHARES]
     best = int(np.argmax(logs))
     gained = float(logs[best] - logs[ERROR_SHARES.index(1.0)])
     needed = ERROR_SHARES[best]

@@ -47,9 +47,9 @@ LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
 # ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
 # degree of freedom; and errors at what was not seen, over those expected, above which it disagrees.
 NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
-# Standard errors of blurred data that an instrument is to be off. Chosen after four false alarms of 3.1 to 3.4 standard
-# errors on sites with small imperfections.
-CLEARLY_OFF = 3.0
+# Standard errors that an instrument is to be off where the flow is blurred. Chosen after four false alarms of 3.1 to
+# 3.4 on sites with small imperfections.
+CLEARLY_OFF = 4.5
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 ABSURD, FAR_OFF = 4.0, 4.0
@@ -83,7 +83,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     found, misfit = grounds.findings, grounds.misfit
     open_still = _open(grounds.not_excluded) if misfit.p >= POOR else []
     kind, sentence = _sentence(grounds, suspects)
-    remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects)]
+    remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
     if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR:
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."
@@ -187,15 +187,15 @@ def _blurred(grounds: Grounds) -> tuple[VerdictKind, str]:
         "errors of the model and of what is told of its site, as they are allowed and not ruled out, blur its "
         f"velocities to {grounds.blur:.1f} times the errors of the data: a missing effect may hide in them"
     )
-    if instruments and all(_is_clear(one, grounds.blur) for one in instruments):
+    if instruments and all(_is_clear(one) for one in instruments):
         return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {blurred}."
     return "cannot-tell", f"Nothing stands out ({_told(grounds.misfit)}), but {blurred}."
 
 
-def _is_clear(instrument: FaultyInstrument, blur: float) -> bool:
-    """Whether an instrument is off by CLEARLY_OFF standard errors of blurred data."""
+def _is_clear(instrument: FaultyInstrument) -> bool:
+    """Whether an instrument is off by CLEARLY_OFF of its standard errors."""
     low, high = instrument.interval95
-    return abs(instrument.offset) > CLEARLY_OFF * blur * (high - low) / 3.92
+    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / 3.92
 
 
 def _unearned(grounds: Grounds) -> str:
@@ -220,7 +220,7 @@ def _unearned(grounds: Grounds) -> str:
     return ""
 
 
-def _remarks(grounds: Grounds, suspects: Sequence[Suspect]) -> list[str]:
+def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> list[str]:
     errors, remarks = grounds.errors, []
     if grounds.model_error is not None:
         remarks.append(model_error_in_words(grounds.model_error))
@@ -228,8 +228,9 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect]) -> list[str]:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
-    if grounds.findings.instruments and (grounds.findings.places or grounds.field is not None):
-        remarks.append(instruments_in_words(grounds.findings.instruments))
+    words = instruments_in_words(grounds.findings.instruments)
+    if grounds.findings.instruments and words not in sentence:
+        remarks.append(words)
     hidden = [suspect for suspect in suspects if not suspect.detectability.testable]
     if hidden:
         names = ", ".join(_untestable(suspect) for suspect in hidden)
