@@ -185,8 +185,9 @@ PAGE = """# How often the diagnosis is right
 
 Data were made in which something is hidden, and were diagnosed by a program that did not know it (`make blind`).
 There are two kinds of truth. **The stranger's truth** is nearer to what a user has: it does not obey the equations of
-the model to the letter. **Own equations** is the easier test: the equations of the model itself, on a finer grid. It
-stands beside, so that a reader sees what the step from twin to stranger costs.
+the model to the letter, and its site is not quite what is told of it. **Own equations** is the easier test: the
+equations of the model itself on a finer grid, in the small channel, on a perfect site. Its sets have errors and signs
+of their own.
 
 The stranger is an independent solver: explicit finite volumes (`tests/studies/second_solver.py`), its own grid, its
 own waterline, and its own closures, coded from the same formulas. On a perfect site its formulas are those of the
@@ -202,12 +203,18 @@ Another law of plants altogether would be a missing effect, and no imperfection.
 hidden on such a site; sets with nothing hidden are made on both. The errors that the model is allowed of its site
 (`model_error`) are those that `vegglue import` writes; some were chosen after sets of this kind, with other seeds.
 
-Where such an imperfection has a name in the list, a diagnosis may rightly say it: the name counts as true, though it
-is not what was hidden. Errors are new in each set. Calibration starts where a user's does. What is hidden is as large
-as makes it visible at the ratio stated, in standard errors of the data after calibration has done what it can.
+Where such an imperfection has a name in the list, a diagnosis may rightly say it, with its sign: the name counts as
+true, though it is not what was hidden. No site has an imperfection of the kind that is hidden in it. Errors are new in
+each set. Calibration starts where a user's does; true parameters lie 0.3 to 1 standard deviations off the middle of
+their priors, at one of eight places, which is why sets are not quite as independent as the intervals suppose.
+
+What is hidden is as large as makes it visible at the ratio stated: the length of its trace, after calibration has done
+what it can, in standard errors of the data, the grid, and the model with its site as `model_error` allows. These last
+are of about the size that the imperfections have.
 
 The small channel has 93 stations in 32 m, with two patches (`configs/twin.yaml`). The field campaign has 270 stations
-in 100 m, with seven patches (`configs/campaign.yaml`).
+in 100 m, with seven patches (`configs/campaign.yaml`). Cells of the stranger are 0.5 x 0.125 m in the small channel
+and 0.5 x 0.1875 m in the long one, those of the model 0.5 x 0.1875 m.
 
 {sizes}
 
@@ -223,7 +230,8 @@ sets are few this says little. Of {lines} lines with a figure, the share itself 
 
 {main}
 
-A name is false when it is among neither the hidden effects nor the imperfections of the site; a step is false when
+Names count where the verdict names: what it held when it ended with "cannot tell" is no name, but a set. A name is
+false when it is among neither the hidden effects nor the imperfections of the site; a step is false when
 all its rivals are. A place is false over 1.5 m away from every hidden object. An instrument is false when no hidden
 one shares a station with it. A hidden effect is in the set when a step has it among its rivals, or, where nothing
 stands out, when it is listed as not excluded. Groups are those that the data cannot tell apart, in the step that holds
