@@ -66,6 +66,13 @@ def test_imperfections_of_the_site_are_true() -> None:
     assert what.false_named(nothing("identified", step("viscosity")))
 
 
+def test_chances_of_stand_ins_do_not_come_true() -> None:
+    off = NAMED | {"also_true": {"viscosity": 0.8, "elder": 0.8, "patch_density[p1]": 0.1}}
+    assert [what.is_so(off, name) for name in ("eddies", "viscosity", "patch_density[p1]")] == [True, True, True]
+    assert [what.is_so(off, name) for name in ("elder", "wind")] == [False, False]
+    assert what.is_so(record("listed6", "identified", step("elder"), hidden=[listed("elder")]), "elder")
+
+
 def test_what_is_named() -> None:
     assert [what.named(one) for one in (NAMED, SILENT, MANY)] == [True, False, False]
     assert not what.named(nothing("cannot-tell", places=[HERE])), "what cannot be told is no name"
@@ -225,7 +232,7 @@ def test_the_page(tmp_path: Path) -> None:
     write_page(records, tmp_path)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     line = "| Listed effect in the set, ratio 6 | at least 90 % |"
-    assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | yes | 100.0 % (1) |" in page
+    assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | too few | 100.0 % (1) |" in page
     assert f"{line} 100.0 % (1) |" in page.partition("## The field campaign")[2]
     assert f"{line} 75.0 % (4) |" in page.partition("## The small channel")[2]
     assert "ratio 3" not in page.partition("## The field campaign")[2], "lines without data are left out"
