@@ -208,8 +208,10 @@ model. On a site with imperfections they are drawn anew in each set:
 - a bed surveyed with an error of 1 cm, probes 2 cm beside their places, and discharges 1 % off.
 
 Another law of plants altogether would be a missing effect, and no imperfection. Everything that the stranger hides is
-hidden on such a site; sets with nothing hidden are made on both. The errors that the model is allowed of its site
-(`model_error`) are those that `vegglue import` writes; some were chosen after sets of this kind, with other seeds.
+hidden on such a site; sets with nothing hidden are made on both. The model is allowed errors (`model_error`) as
+`vegglue import` writes them (friction 5 %, bed 1 cm), and of its site as whoever measured there may state them: edges
+of patches 5 cm, probes 2 cm, discharges 1 %. These were chosen after sets of this kind, with other seeds. Without them
+the diagnosis names more that is not there.
 
 Where such an imperfection has a name in the list, a diagnosis may rightly say it, with its sign: the name counts as
 true, though it is not what was hidden. No site has an imperfection of the kind that is hidden in it. Errors are new in

@@ -29,6 +29,8 @@ from vegglue.workflow.run_folder import model_in
 CONFIGS = Path(__file__).parents[2] / "configs"
 # True places of the prior, each seen by the model once.
 PLACES = 8
+# Errors of the site as whoever measured there would state them, see `blind_truth` for those that it has.
+SITE_ERROR = {"edges": 0.05, "probes": 0.02, "discharge": 0.01}
 # Every fifth set without a hidden effect has understated errors, two of five correlated ones.
 NULL_NOISE = ("white", "ar1:0.5", "white", "ar1:0.5", "understated:1.5")
 OBJECTS = {"pier": "drag", "fallen_tree": "drag", "sink": "drag", "jet": "drag", "scour_hole": "bed"}
@@ -76,9 +78,9 @@ class DataSet:
 
 @lru_cache
 def model_of(study: str) -> Model:
-    """The model with the error of its own that an imported case has."""
+    """The model with the error of its own that an imported case has, and errors of its site."""
     model = model_in(load_case(CONFIGS / f"{study}.yaml"))
-    case: Case = model.case.model_copy(update={"model_error": ModelError(**MODEL_ERROR["model_error"])})
+    case: Case = model.case.model_copy(update={"model_error": ModelError(**MODEL_ERROR["model_error"], **SITE_ERROR)})
     return replace(model, case=case)
 
 
