@@ -9,7 +9,6 @@ be stopped and go on, or grow by a larger --share. After a change of the diagnos
 """
 
 import argparse
-import gzip
 import json
 import time
 from collections.abc import Iterator
@@ -39,7 +38,7 @@ from vegglue.workflow.extend import found_additions
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"
 # Records of the study as far as it was made: data sets cost hours.
-KEPT = ROOT / "data" / "blind" / "records.jsonl.gz"
+KEPT = ROOT / "data" / "blind" / "records.jsonl"
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
@@ -222,8 +221,7 @@ def records_in(path: Path) -> Iterator[dict[str, Any]]:
     """All whole lines; the last one of a study that was stopped may not be whole."""
     if not path.exists():
         return
-    packed = path.read_bytes()
-    for line in (gzip.decompress(packed) if path.suffix == ".gz" else packed).splitlines():
+    for line in path.read_text(encoding="utf-8").splitlines():
         try:
             yield json.loads(line)
         except ValueError:
