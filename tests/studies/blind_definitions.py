@@ -116,21 +116,24 @@ def in_steps(record: Record) -> bool | None:
 
 
 def in_set(record: Record) -> bool | None:
-    """Every hidden listed effect is in a step, or, where nothing stands out, among what is not excluded."""
+    """Every hidden listed effect is in a step, or, where nothing that is named is false, among what is not excluded."""
     listed = hidden_of(record, "listed")
-    if record["steps"] or not listed or record["verdict"] not in ("nothing-missing", "cannot-tell"):
+    found = judged(record)
+    if not listed or (named(record) and not (found and all(found))):
         return in_steps(record)
+    rivals = {name for step in record["steps"] for name in step["rivals"]}
     left = {name for group in record["not_excluded"] for name in group}
-    return all(one["name"] in left for one in listed)
+    return all(one["name"] in rivals | left for one in listed)
 
 
 def few_groups(record: Record) -> bool:
-    """At most three groups: in the step with the hidden effect, else the first, else in what is not excluded."""
-    if record["steps"]:
-        listed = {one["name"] for one in hidden_of(record, "listed")}
-        holding = [step for step in record["steps"] if listed & set(step["rivals"])]
+    """At most three groups: in the step with the hidden effect, else in what is not excluded if that holds it, else in
+    the first step.
+    """
+    holding = [step for step in record["steps"] if hidden_names(record) & set(step["rivals"])]
+    if holding or (record["steps"] and not in_set(record)):
         return len((holding or record["steps"])[0]["groups"]) <= FEW
-    return not named(record) and 0 < len(record["not_excluded"]) <= FEW
+    return (in_set(record) or not named(record)) and 0 < len(record["not_excluded"]) <= FEW
 
 
 def few_and_true(record: Record) -> bool:

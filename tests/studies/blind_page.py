@@ -244,9 +244,10 @@ Names count where the verdict names: what it held when it ended with "cannot tel
 false when it is among neither the hidden effects nor the imperfections of the site; a step is false when
 all its rivals are. A place is false over 1.5 m away from every hidden object. An instrument is false when no hidden
 one shares a station with it. A hidden effect is in the set when a step has it among its rivals, or, where nothing
-stands out, when it is listed as not excluded. Groups are those that the data cannot tell apart, in the step that holds
-the hidden effect, else in the first. A wrong name alone is the verdict of one effect, where no step is true. Held-out
-errors are those at sections that were not measured, against the truth, with the error of a probe added.
+false is named, when it is listed as not excluded. Groups are those that the data cannot tell apart, in the step that
+holds the hidden effect, else in what is not excluded if it is there, else in the first step. A wrong name alone is the
+verdict of one effect, where no step is true. Held-out errors are those at sections that were not measured, against the
+truth, with the error of a probe added.
 
 ![Shares and their intervals, both truths](blind-shares.svg)
 

@@ -107,6 +107,10 @@ def test_a_hidden_effect_in_the_set() -> None:
     assert what.in_set(SILENT | {"verdict": "none-of-these"}) is False, "something else stands out"
     assert what.in_set(WRONG | {"not_excluded": [["eddies"]]}) is False, "what is named excludes it"
     assert what.in_set(nothing("nothing-missing")) is None
+    beside = record("listed3", "identified", step("viscosity"), not_excluded=[["eddies"]])
+    assert what.in_set(beside | {"also_true": {"viscosity": 0.8}}), "what is named is true, and does not exclude it"
+    assert what.few_groups(beside | {"also_true": {"viscosity": 0.8}})
+    assert not what.in_set(beside)
     two = {"hidden": [listed(), listed("wind")]}
     assert [what.in_set(one | two) for one in (NAMED, BESIDE)] == [False, True]
 

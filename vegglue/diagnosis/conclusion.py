@@ -59,7 +59,7 @@ def concluded(
         findings=found,
         field=field,
         model_error=model_error,
-        not_excluded=not_excluded(last) if silent and not found.instruments else (),
+        not_excluded=() if found.absurd else not_excluded(last),
         unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),

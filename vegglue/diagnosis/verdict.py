@@ -81,7 +81,7 @@ class Grounds:
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     """The verdict, its sentence, and what else should be known."""
     found, misfit = grounds.findings, grounds.misfit
-    open_still = _open(grounds.not_excluded) if misfit.p >= POOR else []
+    open_still = _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     kind, sentence = _sentence(grounds, suspects)
     remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
     if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR:
@@ -238,11 +238,12 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> li
     return remarks
 
 
-def _open(groups: Sequence[Sequence[str]]) -> list[str]:
+def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
     names = [name for group in groups for name in group]
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    one = "one more effect hide beside it" if something_named else "exactly one effect hide here"
     said = (
-        "Should exactly one effect hide here, of about three standard errors, nine times of ten it is one of these, "
+        f"Should {one}, of about three standard errors, nine times of ten it is one of these, "
         f"the likeliest first: {', '.join(names[:NAMES_SHOWN])}{more}; what is smaller may be any."
     )
     return [said] if names else []

@@ -106,8 +106,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was concluded. location: of drag that no listed effect explains, None without; not_excluded: where nothing
-    was detected, groups of effects among which one that is there undetected is, nine times of ten.
+    """What was concluded. location: of drag that no listed effect explains, None without; not_excluded: groups
+    of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
     """
 
     kind: VerdictKind
