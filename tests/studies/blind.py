@@ -109,8 +109,8 @@ def study(trial: Trial) -> dict[str, Any]:
         truth_seconds = time.process_time() - began
         try:
             found = diagnose_model(data.model)
-        except InputError as error:
-            return record | {"left_out": f"no diagnosis: {error}"}
+        except Exception as error:  # a crash is counted, and stops no study of hours
+            return record | {"left_out": f"no diagnosis: {type(error).__name__}: {error}"}
         seconds = time.process_time() - began - truth_seconds
         record |= _said(data, found) | {"seconds": seconds, "truth_seconds": truth_seconds}
         record["held_out"] = held_out(trial, data, found)

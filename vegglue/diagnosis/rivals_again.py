@@ -50,11 +50,16 @@ def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], say: Say
 
 
 def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[Refit]:
-    """The rivals, each from the size it had, in the model without the effect that was accepted."""
+    """The rivals, each from the size it had, in the model without the effect that was accepted.
+
+    A rival that a later step accepted acts already, and is none any more.
+    """
     case, z = less.model.case, less.fitted.point.z
     possible = {one.name: one for one in candidates_of(case, less.model.station)}
     trials = []
     for name in step.rivals:
+        if name not in possible:
+            continue
         one, suspect = possible[name], suspects[name]
         gain = one.amplitude.gain(suspect.amplitude.value)
         trials.append(RefitTrial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
