@@ -68,12 +68,15 @@ def report_command(config: Config, members: Members = None, runs: Runs = Path("r
     show(case, runs, report(case, runs=runs, members=members))
 
 
-def run_command(config: Config, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False) -> None:
+def run_command(
+    config: Config, members: Members = None, jobs: Jobs = -1, runs: Runs = Path("runs"), trust: Trust = False
+) -> None:
     """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report before and after."""
     with progress_bars() as watch:
         run(
             load_case(config, trust),
             runs=runs,
+            members=members,
             jobs=jobs,
             say=say_on(),
             watch=watch,

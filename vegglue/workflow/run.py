@@ -15,7 +15,7 @@ from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 from vegglue.workflow.infer import infer
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.report import report
-from vegglue.workflow.run_folder import folder_of
+from vegglue.workflow.run_folder import folder_of, of_size
 from vegglue.workflow.simulate import is_simulated, simulate
 
 Show = Callable[[Case, Any], None]
@@ -29,13 +29,15 @@ def run(
     case: Case,
     *,
     runs: Path | str = "runs",
+    members: int | None = None,
     jobs: int = -1,
     say: Say = silent,
     watch: Watch = silent,
     show: Show = _unseen,
 ) -> StepwiseExtension:
     """Diagnose, add what is missing, watch the error fall, say what to measure next; then ensemble, posterior and
-    report of the case and of its last child. What is up to date is not made again.
+    report of the case and of its last child. What is up to date is not made again. members: size of the ensembles
+    instead of the case's.
 
     show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
     Posterior, the Path of a page, or a sentence.
@@ -48,7 +50,7 @@ def run(
     picture = draw_ladder_of(extension.comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
     for each in {one.source: one for one in (case, last)}.values():
-        _ensemble_to_report(each, runs, jobs, say, watch, show)
+        _ensemble_to_report(of_size(each, members), runs, jobs, say, watch, show)
     return extension
 
 
@@ -65,4 +67,4 @@ def _ensemble_to_report(case: Case, runs: Path | str, jobs: int, say: Say, watch
         except InputError as error:
             show(case, f"{error} There is no report of {case.name} without a posterior.")
             return
-    show(case, report(case, runs=runs))
+    show(case, report(case, runs=runs, members=case.simulate.members))

@@ -1,5 +1,7 @@
 """case -> ensemble: every member solved and kept; what an earlier run has solved is not solved again."""
 
+import os
+import shutil
 from pathlib import Path
 
 from vegglue.case.resolved_config import simulation_hash
@@ -20,7 +22,8 @@ def simulate(
 ) -> Ensemble:
     """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields).
 
-    An ensemble of exactly this case is read instead; one that was stopped goes on where it was. members: size of the
+    An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
+    ensemble does not depend on; one that was stopped goes on where it was. members: size of the
     ensemble instead of the case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is
     told how far it is. Predictions are (member, station), in m/s for velocities and m for levels.
 
@@ -29,6 +32,8 @@ def simulate(
     """
     case = of_size(case, members)
     path = folder_of(runs, case) / "ensemble.h5"
+    if not is_simulated(case, runs):
+        _share_one_beside(case, path)
     if not is_simulated(case, runs):
         solve_ensemble(case, read_observations(case), path, jobs, watch)
     return read_ensemble(path)
@@ -42,3 +47,31 @@ def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
     except (InputError, StorageError):
         return False
     return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
+
+
+def _share_one_beside(case: Case, path: Path) -> None:
+    """Share the ensemble of a run in the same folder of runs that solved the very same members, if there is one."""
+    wanted = simulation_hash(case)
+    names = ("ensemble.h5",) if case.simulate.fields is None else ("fields.h5", "ensemble.h5")
+    for folder in sorted(path.parent.parent.iterdir()):
+        if folder != path.parent and all(stored_hash(folder / name) == wanted for name in names):
+            for name in names:
+                _share(folder / name, path.with_name(name))
+            return
+
+
+def _share(there: Path, here: Path) -> None:
+    """One file under two names, or a copy where the disk knows no links. Finished results are never changed in place.
+
+    Errors: StorageError when the disk is full.
+    """
+    new = here.with_name(f"{here.name}.new")
+    try:
+        new.unlink(missing_ok=True)
+        try:
+            os.link(there, new)
+        except OSError:
+            shutil.copyfile(there, new)
+        os.replace(new, here)
+    except OSError as error:
+        raise StorageError(f"{here}: cannot be shared with {there} ({error}); make room and run it again.") from error
