@@ -108,7 +108,19 @@ def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_blurred() -> None
     assert "it was set aside" not in sentence
     assert "is off by 0.1 m/s (0.05 to 0.15); it was set aside." in remarks
     assert said(grounds(instruments=(clear, faint), blur=1.5))[0] == "cannot-tell"
-    assert said(grounds(instruments=(faint,), blur=1.2))[0] == "instrument"
+
+
+def test_an_instrument_that_is_off_a_little_is_no_verdict() -> None:
+    clear, faint = an_instrument(x=3.0), an_instrument(interval95=(0.05, 0.15))
+    kind, sentence, remarks = said(grounds(instruments=(faint,)))
+    assert kind == "nothing-missing"
+    assert "set aside" not in sentence
+    assert "it was set aside. It is off by less than 4.5 standard errors" in remarks
+    kind, sentence, remarks = said(grounds(instruments=(clear, faint)))
+    assert kind == "instrument"
+    assert "x = 3" in sentence
+    assert "x = 36" not in sentence
+    assert "less than 4.5" in remarks
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ PAIRS = (
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
 # Sets of the parts before were seen when the errors of a site were chosen.
-EDITION = "second edition, part four: "
+EDITION = "second edition, part five: "
 # A bad reading beside an effect is off by so many standard errors.
 BAD = 10.0
 

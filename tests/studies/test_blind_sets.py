@@ -48,7 +48,9 @@ def test_names_of_imperfections_are_those_that_are_there():
     case = model_of("twin").case
     for seed in range(20):
         site = site_of_nature(perfect_site(case, "twin", THETA, 10), case, seed)
-        assert site.also_true["viscosity"] == site.also_true["elder"] == pytest.approx(site.truth.nu / 0.01 - 1.0)
+        off = site.truth.nu / 0.01 - 1.0
+        assert site.also_true.get("viscosity") == site.also_true.get("elder")
+        assert site.also_true.get("viscosity", 0.0) == (pytest.approx(off) if abs(off) > 0.2 else 0.0)
         for name, factor in site.discharges.items():
             assert (f"discharge_error[{name}]" in site.also_true) == (abs(factor - 1.0) > 0.004)
         assert ("emergent_part" in site.also_true) == bool(site.truth.formulation.emergent)
