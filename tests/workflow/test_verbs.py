@@ -14,6 +14,7 @@ import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import read_ensemble, stored_hash
 
 MEMBERS = 16
@@ -72,9 +73,17 @@ def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
     comparison = vegglue.compare([case, child], runs=runs)
     assert [rung.name for rung in comparison.rungs] == ["brook", "brook-streamlining"]
     assert (runs / "brook-streamlining" / "ladder.png").exists()
-    for question in vegglue.next_measurement(case, runs=runs, jobs=1):
+    kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, child)]
+    assert kept[0] == kept[1], "both pages show the same ladder"
+    assert kept[0] is not None
+    assert [step.added for step in kept[0].steps] == [(), ("streamlining",)]
+    questions = vegglue.next_measurement(case, runs=runs, jobs=1)
+    for question in questions:
         assert question.tells_apart
         assert question.measurements[0].per_hour >= question.measurements[-1].per_hour
+    asked = questions_that_fit(runs / "brook", case_hash(case))
+    assert asked is not None
+    assert [one.tells_apart for one in asked] == [one.tells_apart for one in questions]
 
     page = vegglue.report(case, runs=runs)
     assert diagnosis.verdict.sentence.split(" (")[0] in page.read_text(encoding="utf-8"), "the page tells the diagnosis"

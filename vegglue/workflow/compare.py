@@ -8,11 +8,14 @@ import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import Rung, rung
+from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.figures.error_ladder import save_ladder_figure
+from vegglue.measurements.kinds import STREAMWISE
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
+from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.storage.kept_words import write_ladder
 from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 
@@ -29,7 +32,8 @@ class Comparison:
 
 @one_thread()
 def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> Comparison:
-    """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one.
+    """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
+    comparison.json in the folder of each.
 
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when a model finds
     no flow, or a station has no standard error.
@@ -42,6 +46,7 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
             rungs.append(rung_of(case, runs, aside))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
+    keep_ladder(found, cases, runs)
     return found
 
 
@@ -61,3 +66,33 @@ def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
     picture = folder_of(runs, last) / "ladder.png"
     save_ladder_figure(found.rungs, picture)
     return picture
+
+
+def keep_ladder(found: Comparison, cases: Sequence[Case], runs: Path | str, reason: str = "") -> None:
+    """Keep the ladder in the folder of each of its cases, for their pages; reason: why it ends where it does.
+
+    Errors: StorageError.
+    """
+    hashes = [case_hash(case) for case in cases]
+    before: tuple[str, ...] = ()
+    steps = []
+    for case, config_hash, one in zip(cases, hashes, found.rungs, strict=True):
+        steps.append(_step_of(case, config_hash, one, tuple(name for name in one.effects if name not in before)))
+        before = one.effects
+    for case, config_hash in zip(cases, hashes, strict=True):
+        write_ladder(folder_of(runs, case), Ladder(tuple(steps), len(found.left_out), reason), config_hash)
+
+
+def _step_of(case: Case, config_hash: str, one: Rung, added: tuple[str, ...]) -> LadderStep:
+    return LadderStep(
+        name=case.name,
+        config=case.source.name,
+        config_hash=config_hash,
+        added=added,
+        parameters=len(one.values),
+        in_sample=one.in_sample.rmse[STREAMWISE],
+        held_out_sections=held_out_rmse(one),
+        held_out_experiments=held_out_rmse(one, "experiments"),
+        unseen=one.validation,
+        noise_floor=one.in_sample.noise_floor,
+    )

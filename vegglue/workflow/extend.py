@@ -23,7 +23,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
-from vegglue.workflow.compare import Comparison
+from vegglue.workflow.compare import Comparison, keep_ladder
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
     MAKE_ROOM,
@@ -73,11 +73,13 @@ def extend(
 @one_thread()
 def extend_stepwise(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
-    and the misfit with all others fall; see `stepwise_choice`.
+    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case.
     """
     found = diagnose(case, runs=runs, jobs=jobs, say=say)
     with at_most(jobs):
-        return _extended(case, found, runs, say)
+        extension = _extended(case, found, runs, say)
+    keep_ladder(extension.comparison, extension.cases, runs, extension.reason)
+    return extension
 
 
 def _extended(case: Case, found: Diagnosis, runs: Path | str, say: Say) -> StepwiseExtension:

@@ -4,20 +4,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
+from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Say, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.storage.kept_words import write_questions
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import calibrated, folder_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
+# Measurements kept of each question for the page: more than these nobody plans in one season.
+KEPT = 4
+# A measurement that raises D^2 by less than a tenth is said to add nothing.
+ADDS = 1.1
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,8 @@ def next_measurement(
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
     between: names of effects, else those that the diagnosis could not tell apart, else the strongest of those it could
-    not test, each by itself at a plausible size. Errors: InputError for a name that is not in the diagnosis.
+    not test, each by itself at a plausible size; only questions nobody chose are kept, in questions.json. Errors:
+    InputError for a name that is not in the diagnosis.
     """
     found = diagnose(case, runs=runs, jobs=jobs, say=say)
     by_name = {one.name: one for one in found.suspects}
@@ -43,12 +51,28 @@ def next_measurement(
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
     asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
-    if not asked:
-        return []
-    with at_most(jobs):
-        base = calibrated(case, folder_of(runs, case), excluded_by(found))
-        worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [rivals for _, rivals in asked])
-    return [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
+    questions: list[Question] = []
+    if asked:
+        with at_most(jobs):
+            base = calibrated(case, folder_of(runs, case), excluded_by(found))
+            worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [one for _, one in asked])
+        questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
+    if not between:
+        write_questions(folder_of(runs, case), [open_question(one) for one in questions], case_hash(case))
+    return questions
+
+
+def open_question(question: Question) -> OpenQuestion:
+    """A question with the few measurements that would answer it, or the one that comes nearest."""
+    useful = [one for one in question.measurements if one.then >= SEPARATES and one.then > ADDS * one.now]
+    nearest = sorted(question.measurements, key=lambda one: -one.then)[:1]
+    return OpenQuestion(
+        question.tells_apart,
+        tuple(
+            ProposedMeasurement(one.plan.name, one.plan.rows.size, one.plan.hours, one.now, one.then, bool(useful))
+            for one in (useful[:KEPT] or nearest)
+        ),
+    )
 
 
 def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:

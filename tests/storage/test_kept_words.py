@@ -1,0 +1,59 @@
+"""comparison.json and questions.json: read back as they were, and not shown where they belong to another state."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.storage.kept_words import (
+    COMPARISON_FILE,
+    QUESTIONS_FILE,
+    ladder_that_fits,
+    questions_that_fit,
+    write_ladder,
+    write_questions,
+)
+
+HASH, OTHER = "a" * 64, "b" * 64
+STEP = LadderStep("brook", "brook.yaml", HASH, ("Größe",), 4, 0.011, 0.02, 0.03, 0.04, 0.012)
+LADDER = Ladder((STEP,), 2, "Added: eddies.")
+QUESTIONS = (OpenQuestion("eddies from wind", (ProposedMeasurement("a gauge", 1, 0.5, 0.2, 9.0, True),)),)
+
+
+def test_what_is_kept_is_read_back(tmp_path: Path) -> None:
+    write_ladder(tmp_path, LADDER, HASH)
+    write_questions(tmp_path, QUESTIONS, HASH)
+    assert ladder_that_fits(tmp_path, HASH) == LADDER
+    assert questions_that_fit(tmp_path, HASH) == QUESTIONS
+
+
+def test_what_is_no_number_is_null_in_the_file(tmp_path: Path) -> None:
+    unknown = LadderStep("brook", "brook.yaml", HASH, (), 4, 0.011, math.nan, 0.03, math.nan, 0.012)
+    write_ladder(tmp_path, Ladder((unknown,), 0, ""), HASH)
+    told = json.loads((tmp_path / COMPARISON_FILE).read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert told["told"]["steps"][0]["unseen"] is None
+    found = ladder_that_fits(tmp_path, HASH)
+    assert found is not None
+    assert math.isnan(found.steps[0].unseen)
+    assert math.isnan(found.steps[0].held_out_sections)
+
+
+def test_nothing_left_to_ask_is_not_the_same_as_nobody_asked(tmp_path: Path) -> None:
+    assert questions_that_fit(tmp_path, HASH) is None
+    write_questions(tmp_path, (), HASH)
+    assert questions_that_fit(tmp_path, HASH) == ()
+
+
+@pytest.mark.parametrize("broken", ["", "{", "[]", '{"format": "vegglue comparison 0", "config_hash": "a"}', "null"])
+def test_what_does_not_fit_counts_as_not_there(tmp_path: Path, broken: str) -> None:
+    write_ladder(tmp_path, LADDER, HASH)
+    write_questions(tmp_path, QUESTIONS, HASH)
+    assert ladder_that_fits(tmp_path, OTHER) is None
+    assert questions_that_fit(tmp_path, OTHER) is None
+    for name in (COMPARISON_FILE, QUESTIONS_FILE):
+        (tmp_path / name).write_text(broken, encoding="utf-8")
+    assert ladder_that_fits(tmp_path, HASH) is None
+    assert questions_that_fit(tmp_path, HASH) is None

@@ -1,0 +1,58 @@
+"""The error ladder as it is kept for the page: what each model of a comparison misses, the baseline first."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+# Errors of a step, which may be unknown.
+ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "noise_floor")
+
+
+@dataclass(frozen=True)
+class LadderStep:
+    """One model: its case and config hash, the effects it has and the model before has not, how many parameters.
+
+    Root mean square errors of velocities along x [m/s], NaN where there are none: of what the model was calibrated to,
+    of sections and of experiments left out in turn, of what no calibration has seen; and the error of measuring.
+    """
+
+    name: str
+    config: str
+    config_hash: str
+    added: tuple[str, ...]
+    parameters: int
+    in_sample: float
+    held_out_sections: float
+    held_out_experiments: float
+    unseen: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words,
+    '' where nobody searched.
+    """
+
+    steps: tuple[LadderStep, ...]
+    left_out: int
+    reason: str
+
+
+def ladder_json(ladder: Ladder) -> dict[str, Any]:
+    """The ladder as one object; what is not a number is null."""
+    tree = asdict(ladder)
+    for step in tree["steps"]:
+        step.update({name: None if math.isnan(step[name]) else step[name] for name in ERRORS})
+    return tree
+
+
+def ladder_from(tree: Mapping[str, Any]) -> Ladder:
+    """The ladder of such an object. Errors: KeyError, TypeError or ValueError where it is none."""
+    return Ladder(tuple(_step_from(step) for step in tree["steps"]), int(tree["left_out"]), str(tree["reason"]))
+
+
+def _step_from(step: Mapping[str, Any]) -> LadderStep:
+    errors = {name: math.nan if step[name] is None else float(step[name]) for name in ERRORS}
+    return LadderStep(**{**step, **errors, "added": tuple(step["added"])})

@@ -1,0 +1,52 @@
+"""Small results as JSON in the folder of a run: comparison.json and questions.json, each with the config hash.
+
+What belongs to another state of the case, or cannot be read, counts as not there.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from vegglue.case.text_files import write_text
+from vegglue.results.ladder import Ladder, ladder_from, ladder_json
+from vegglue.results.open_questions import OpenQuestion, questions_from, questions_json
+
+LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue comparison 1", "vegglue questions 1"
+COMPARISON_FILE, QUESTIONS_FILE = "comparison.json", "questions.json"
+Kept = TypeVar("Kept")
+
+
+def write_ladder(folder: Path, ladder: Ladder, config_hash: str) -> None:
+    """Keep a comparison in the folder of one of its models, whose config hash is given. Errors: StorageError."""
+    _write(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, ladder_json(ladder))
+
+
+def ladder_that_fits(folder: Path, config_hash: str) -> Ladder | None:
+    """The comparison kept there for exactly this config, None without."""
+    return _read_if_it_fits(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, ladder_from)
+
+
+def write_questions(folder: Path, questions: Sequence[OpenQuestion], config_hash: str) -> None:
+    """Keep what to measure next, which may be nothing. Errors: StorageError."""
+    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_json(questions))
+
+
+def questions_that_fit(folder: Path, config_hash: str) -> tuple[OpenQuestion, ...] | None:
+    """The questions kept there for exactly this config; None where nobody asked, empty where nothing is left to ask."""
+    return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_from)
+
+
+def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
+    tree = {"format": file_format, "config_hash": config_hash, "told": told}
+    write_text(path, json.dumps(tree, ensure_ascii=False, indent=1) + "\n", "make room and run it again")
+
+
+def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+        if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
+            return None
+        return understand(tree["told"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
