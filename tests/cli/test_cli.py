@@ -41,10 +41,12 @@ def test_every_step_says_what_it_made(finished: Finished) -> None:
     assert "n_b: median 0.05" in said["infer"]
     assert str(run / "report.html") in said["report"]
     assert {file.name for file in run.iterdir()} == {
-        ".lock", "channel.png", "ensemble.h5", "posterior.h5", "report.html", "figures",
+        ".lock", "channel.png", "ensemble.h5", "posterior.h5", "flow.h5", "report.html", "figures",
     }  # fmt: skip
-    for picture in (run / "channel.png", *run.glob("figures/*.png")):
-        assert picture.read_bytes().startswith(b"\x89PNG"), picture
+    assert (run / "channel.png").read_bytes().startswith(b"\x89PNG")
+    drawn = list((run / "figures").iterdir())
+    assert drawn
+    assert all(picture.suffix == ".svg" and "<svg" in picture.read_text(encoding="utf-8") for picture in drawn)
 
 
 def test_the_line_finds_what_the_measurements_were_made_with(finished: Finished) -> None:

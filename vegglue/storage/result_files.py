@@ -1,24 +1,26 @@
-"""Results as files: ensemble.h5, fields.h5, posterior.h5 and diagnosis.h5, each with the config it was made from.
+"""Results as files: ensemble.h5, fields.h5, posterior.h5, flow.h5 and diagnosis.h5, each with its config.
 
 A file whose config hash is not the wanted one is refused with the command that makes it again. Ensembles are written by
 `resume`, member by member.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from vegglue.errors import InputError, StorageError
+from vegglue.flow.sensor import FlowFields
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from, diagnosis_groups
 from vegglue.results.ensemble import Ensemble, ensemble_from
 from vegglue.results.fields import Fields, fields_from
+from vegglue.results.median_flow import flow_attributes, flow_from, flow_groups
 from vegglue.results.posterior import Posterior
 from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
 from vegglue.storage.hdf5 import open_hdf5, read_groups, stored_attribute, write_whole
 from vegglue.storage.resume import part_file
 
-POSTERIOR_FORMAT, DIAGNOSIS_FORMAT = "vegglue posterior 1", "vegglue diagnosis 3"
+POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 3", "vegglue flow 1"
 Result = TypeVar("Result")
 
 
@@ -70,6 +72,23 @@ def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
     """The diagnosis of exactly this config, None when there is none or only one of another state or another format."""
     fits = stored_hash(path) == config_hash and stored_attribute(path, "format") == DIAGNOSIS_FORMAT
     return read_diagnosis(path) if fits else None
+
+
+def write_flow(
+    path: Path, flow: Mapping[str, FlowFields], theta: Mapping[str, float], config: str, config_hash: str
+) -> None:
+    """Write the flow by experiment that was solved with the parameters theta; errors as those of write_posterior."""
+    own = {"config": config, "config_hash": config_hash, "format": FLOW_FORMAT}
+    write_whole(path, flow_groups(flow), flow_attributes(theta) | own)
+
+
+def flow_that_fits(path: Path, config_hash: str, theta: Mapping[str, float]) -> dict[str, FlowFields] | None:
+    """The flow of exactly this config and these parameters, None when there is none or only another one."""
+    wanted = flow_attributes(theta) | {"config_hash": config_hash, "format": FLOW_FORMAT}
+    if any(stored_attribute(path, name) != value for name, value in wanted.items()):
+        return None
+    with open_hdf5(path, "r") as file:
+        return flow_from(read_groups(file))
 
 
 def stored_hash(path: Path) -> str | None:

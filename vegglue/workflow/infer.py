@@ -14,6 +14,7 @@ from vegglue.progress import Say, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.storage.result_files import read_ensemble, write_posterior
+from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size
 
 Method = Literal["refine", "glue"]
@@ -31,7 +32,7 @@ def infer(
     say: Say = silent,
 ) -> Posterior:
     """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
-    runs/<name>/posterior.h5.
+    runs/<name>/posterior.h5, and the flow of their medians in flow.h5.
 
     ensemble: the one of this case, whose size counts then; read from the folder if not given. method: `refine` or
     `glue` instead of the case's. members: size of the ensemble instead of the case's.
@@ -51,6 +52,7 @@ def infer(
         with at_most(jobs):
             posterior = refine(ensemble, case, observations, say)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
+    median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior
 
 

@@ -4,19 +4,21 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import solve_flow
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
 from vegglue.report_page.page import write_report
-from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
+from vegglue.report_page.run import LoopResults
+from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
+from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior, stored_hash
+from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size
 
 
 @one_thread()
 def report(case: Case, *, runs: Path | str = "runs", members: int | None = None) -> Path:
-    """Write runs/<name>/report.html and figures/ from the ensemble, the posterior and, if it fits, the diagnosis kept
-    there; returns the page. members: size of the ensemble instead of the case's.
+    """Write runs/<name>/report.html and figures/ from the ensemble, the posterior and, where they fit, the diagnosis,
+    the comparison and the questions kept there; returns the page. members: size of the ensemble instead of the case's.
 
     Errors: InputError when there is no ensemble or posterior of this case; StorageError when a file cannot be written.
     """
@@ -25,8 +27,23 @@ def report(case: Case, *, runs: Path | str = "runs", members: int | None = None)
     folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(sized))
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
-    flow = solve_flow(sized, posterior.marginals.median)
+    flow = median_flow(sized, posterior, folder)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     # A diagnosis needs no ensemble: it is that of the case, whatever the size of this one.
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
-    return write_report(folder, sized, observations, ensemble, posterior, flow, survey, diagnosis)
+    loop = loop_results_of(case, runs)
+    return write_report(folder, sized, observations, ensemble, posterior, flow, survey, diagnosis, loop)
+
+
+def loop_results_of(case: Case, runs: Path | str = "runs") -> LoopResults:
+    """What diagnose, extend, compare and next left of exactly this case, and of the model its ladder begins with."""
+    runs, wanted = Path(runs), case_hash(case)
+    ladder = ladder_that_fits(runs / case.name, wanted)
+    first, first_hash = (case.name, wanted) if ladder is None else (ladder.steps[0].name, ladder.steps[0].config_hash)
+    steps = () if ladder is None else ladder.steps
+    return LoopResults(
+        behind=diagnosis_that_fits(runs / first / "diagnosis.h5", first_hash),
+        ladder=ladder,
+        questions=questions_that_fit(runs / first, first_hash),
+        pages=tuple(one.name for one in steps if stored_hash(runs / one.name / "posterior.h5") == one.config_hash),
+    )

@@ -49,12 +49,15 @@ def run(
     last = extension.cases[-1]
     picture = draw_ladder_of(extension.comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
-    for each in {one.source: one for one in (case, last)}.values():
-        _ensemble_to_report(of_size(each, members), runs, jobs, say, watch, show)
+    both = {one.source: one for one in (case, last)}.values()
+    # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
+    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, say, watch, show)]:
+        show(each, report(each, runs=runs, members=members))
     return extension
 
 
-def _ensemble_to_report(case: Case, runs: Path | str, jobs: int, say: Say, watch: Watch, show: Show) -> None:
+def _has_posterior(case: Case, runs: Path | str, jobs: int, say: Say, watch: Watch, show: Show) -> bool:
+    """Makes the ensemble and the posterior of a case where they are not up to date; False where it has none."""
     folder = folder_of(runs, case)
     current = is_simulated(case, runs)
     ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch)
@@ -66,5 +69,5 @@ def _ensemble_to_report(case: Case, runs: Path | str, jobs: int, say: Say, watch
             show(case, infer(case, ensemble, runs=runs, jobs=jobs, say=say))
         except InputError as error:
             show(case, f"{error} There is no report of {case.name} without a posterior.")
-            return
-    show(case, report(case, runs=runs, members=case.simulate.members))
+            return False
+    return True
