@@ -1,5 +1,6 @@
 """Runs of a report, with posteriors made by hand on the synthetic record and on a toy case."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.report_page.page import write_report
 from vegglue.report_page.run import Run
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
@@ -63,8 +65,9 @@ def a_run(folder: Path, case: Case, observations: Observations, truth: dict[str,
 
 def written(run: Run) -> str:
     path = write_report(
-        run.folder, run.case, run.observations, run.ensemble, run.posterior, run.flow, run.cylinder, run.diagnosis
-    )
+        run.folder, run.case, run.observations, run.ensemble, run.posterior, run.flow, run.cylinder, run.diagnosis,
+        run.loop,
+    )  # fmt: skip
     assert path == run.folder / "report.html"
     return path.read_text(encoding="utf-8")
 
@@ -73,6 +76,15 @@ def kict(folder: Path, name: str) -> Run:
     case = load_case(CONFIGS / f"{name}.yaml")
     assert case.reference is not None
     return a_run(folder, case, read_observations(case), dict(case.reference.made_with))
+
+
+def told_of(run: Run, found: Diagnosis) -> Diagnosis:
+    """A diagnosis made by hand as one of this run: its stations stand in the channel, in experiments there are."""
+    station = found.predictions.station
+    names = dict(zip(dict.fromkeys(station["experiment"]), run.case.experiments, strict=True))
+    middle = sum(run.case.grid.y) / 2
+    moved = station.assign(experiment=station["experiment"].map(names), y=station["y"] + middle)
+    return replace(found, predictions=replace(found.predictions, station=moved))
 
 
 def a_toy(folder: Path, **keys: object) -> Run:

@@ -18,7 +18,7 @@ from matplotlib.transforms import Bbox
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung, held_out_rmse, improvement
 from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
-from vegglue.figures.misfit import draw_gauges, draw_profiles, draw_zones
+from vegglue.figures.misfit import draw_gauges, draw_zones
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import COLOUR
 from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
@@ -72,25 +72,6 @@ def test_what_a_later_step_accepts_has_its_chance() -> None:
     found = replace(a_diagnosis(), steps=(*a_diagnosis().steps, second))
     assert found.chances == {"eddies": 0.7, "mixing[D3]": 1.0}
     assert found.set == ["eddies", "mixing[D3]"]
-
-
-def test_profiles_show_both_predictions_and_what_they_leave() -> None:
-    table = stations()
-    figure = draw_profiles(table, "eddies", [1])
-    upper, lower = figure.axes[:2]
-    row = table[(table["experiment"] == "low") & (table["section"] == "D3")]
-    drawn = {tuple(line.get_ydata()): line for line in upper.lines}
-    assert tuple(row["prediction"]) in drawn
-    assert drawn[tuple(row["prediction_first"])].is_dashed()
-    assert any(line.get_marker() == "x" and list(line.get_ydata()) == [0.5] for line in upper.lines)
-    after = (row["value"] - row["prediction"]) / row["error"]
-    assert any(np.allclose(line.get_ydata(), after) for line in lower.lines if len(line.get_ydata()) == len(after))
-
-
-def test_profiles_of_an_unchanged_model_show_it_once() -> None:
-    figure = draw_profiles(stations(), "")
-    assert not any(line.is_dashed() for line in figure.axes[0].lines)
-    assert "model" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_gauges_show_millimetres() -> None:

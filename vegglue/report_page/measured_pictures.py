@@ -6,79 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from vegglue.figures.measured import (
-    Bands,
-    SectionDrawing,
     Vertical,
     draw_canopy_profiles,
     draw_discharge,
     draw_quantiles,
     draw_residuals,
-    draw_section,
     draw_verticals,
 )
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import NARROW, count, fixed, plus_minus, short, unit_html, unit_math
+from vegglue.figures.typography import count, fixed, plus_minus, short, unit_html, unit_math
 from vegglue.inference.glue import member_weights
 from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
-from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
+from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import fitted_curve
 from vegglue.report_page.key_numbers import measurement_error
-from vegglue.report_page.run import Run, median_plants, published_picture, station_zones
-from vegglue.results.posterior import Posterior
-
-
-def sections(run: Run) -> Iterator[Picture]:
-    """Measured against modelled across each section of each experiment."""
-    table = run.observations.table
-    velocity = table[velocity_rows(table)]
-    for (kind, experiment, section), rows in velocity.groupby(["kind", "experiment", "section"], sort=False):
-        yield _section(run, kind_of(str(kind)), str(experiment), str(section), rows)
-
-
-def _bands(posterior: Posterior, rows: NDArray[np.intp]) -> Bands:
-    model, total = posterior.predicted.model_band[:, rows], posterior.predicted.total_band[:, rows]
-    return Bands(model[2], (model[1], model[3]), (model[0], model[4]), (total[0], total[4]))
-
-
-def _section(run: Run, kind: Kind, experiment: str, section: str, rows: pd.DataFrame) -> Picture:
-    index = rows.index.to_numpy()
-    bands = _bands(run.posterior, index)
-    below = _below(run, experiment, float(rows["x"].mean()))
-    figure = draw_section(rows.reset_index(drop=True), bands, below)
-    used = rows["used"].to_numpy(bool)
-    value = rows["value"].to_numpy()
-    inside = [
-        int(np.sum(used & (value >= low) & (value <= high)))
-        for low, high in (bands.model_50, bands.model_95, bands.total_95)
-    ]
-    worst = int(np.argmax(np.where(used, np.abs(run.posterior.fit.residual[index]), -1)))
-    what, name = ("", "section") if kind.name == STREAMWISE else (f"{kind.words}, ", kind.name)
-    caption = (
-        f"<b>{html.escape(section)}, experiment {html.escape(experiment)}</b>, {what}x = {rows['x'].mean():g} m. "
-        f"Of {count(int(used.sum()), 'station')} used, {inside[0]} lie in the 50{NARROW}% and {inside[1]} in the "
-        f"95{NARROW}% range of the model, {inside[2]} in that with residual error (dashed). Largest departure "
-        f"{fixed(run.posterior.fit.residual[index][worst], 3)} m/s at y = {rows['y'].iloc[worst]:g} m."
-    )
-    alt = (
-        f"{kind.words.capitalize()} across section {section} of {experiment}: measured points over the modelled 50 and "
-        "95 % bands."
-    )
-    return published_picture(run, figure, f"{name}-{experiment}-{section}", caption, alt)
-
-
-def _below(run: Run, experiment: str, x: float) -> SectionDrawing | None:
-    if experiment not in run.flow:
-        return None
-    flow = run.flow[experiment]
-    column = int(np.argmin(np.abs(flow.x - x)))
-    plants, canopy = median_plants(run, experiment), np.full(len(flow.y), np.nan)
-    here = plants.column == column
-    canopy[plants.row[here]] = flow.bed[column, plants.row[here]] + plants.canopy_height[here, 0]
-    return SectionDrawing(flow.y, flow.bed[column], canopy, flow.level[column])
+from vegglue.report_page.run import Run, published_picture, station_zones
 
 
 def residuals(run: Run) -> Iterator[Picture]:

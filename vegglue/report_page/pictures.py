@@ -30,12 +30,12 @@ from vegglue.report_page.key_numbers import (
     plant_parameter,
     symbol,
 )
-from vegglue.report_page.measured_pictures import canopy_profiles, discharges, residuals, sections, verticals
+from vegglue.report_page.measured_pictures import canopy_profiles, discharges, residuals, verticals
 from vegglue.report_page.posterior_words import weights_in_words
 from vegglue.report_page.run import Run, published_picture
 
-# Pairs of parameters drawn together, the most correlated first: two rows of three, all pairs of four parameters.
-PAIRS_DRAWN = 6
+# Pairs of parameters drawn together, the most correlated first: one row; strong correlations are told in words.
+PAIRS_DRAWN = 3
 # |r| [-] below which two parameters are said hardly to constrain each other: they share less than a tenth of variance.
 HARDLY_CORRELATED = 0.3
 # Letters beside a mark, with which the axes of a marginal keep nine tenths of their width.
@@ -51,7 +51,6 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
         "marginals": [*(_marginal(run, name) for name in run.posterior.parameters), *_canopy_corrected(run)],
         "joints": list(_joint_posteriors(run)),
         "plants": list(_plant_drag(run)),
-        "sections": list(sections(run)),
         "residuals": list(residuals(run)),
         "verticals": list(verticals(run)),
         "canopy_and_discharge": [*canopy_profiles(run), *discharges(run)],

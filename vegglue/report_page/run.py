@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vegglue.case.schema import Case
-from vegglue.figures.style import Picture, publish
+from vegglue.figures.style import Picture, publish, publish_text
 from vegglue.flow.problem import VegetatedCells
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields
@@ -17,6 +17,8 @@ from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
+from vegglue.results.ladder import Ladder
+from vegglue.results.open_questions import OpenQuestion
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
@@ -25,9 +27,25 @@ SYNTHETIC = "synthetic record"  # stamped on every figure of one
 
 
 @dataclass(frozen=True)
+class LoopResults:
+    """What the loop from misfit to missing effect left beside a case; None for what was not made.
+
+    behind: the diagnosis that names what is missing, of the case itself or of the model it extends; ladder: the error
+    ladder with the case in it; questions: what that diagnosis leaves open; pages: other models of the ladder that have
+    a page.
+    """
+
+    behind: Diagnosis | None = None
+    ladder: Ladder | None = None
+    questions: tuple[OpenQuestion, ...] | None = None
+    pages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Run:
     """Everything a report may show. flow: the flow of the median parameters, by experiment; cylinder: if surveyed;
-    diagnosis: if there is one of this case."""
+    diagnosis: if there is one of this case; loop: what else is known of what it lacks.
+    """
 
     folder: Path
     case: Case
@@ -38,6 +56,12 @@ class Run:
     flow: dict[str, FlowFields]
     cylinder: RigidCylinder | None
     diagnosis: Diagnosis | None
+    loop: LoopResults = LoopResults()
+
+    @property
+    def behind(self) -> Diagnosis | None:
+        """The diagnosis that says what is missing: of the case, else of the model it extends."""
+        return self.diagnosis or self.loop.behind
 
 
 def is_synthetic(case: Case) -> bool:
@@ -48,8 +72,22 @@ def is_synthetic(case: Case) -> bool:
 
 def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
     """The figure as a file of the run and as a part of its page."""
-    file = re.sub(r"[^A-Za-z0-9_.-]+", "-", name)  # experiments and sections are named by their user
-    return publish(figure, run.folder / "figures", file, caption, alt, SYNTHETIC if is_synthetic(run.case) else "")
+    return publish(figure, run.folder / "figures", file_name(name), caption, alt, stamp(run.case))
+
+
+def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Picture:
+    """A picture that is SVG text already, as a file of the run and as a part of its page."""
+    return publish_text(svg, run.folder / "figures", file_name(name), caption, alt)
+
+
+def file_name(words: str) -> str:
+    """Words as the name of a file: experiments and sections are named by their user."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", words)
+
+
+def stamp(case: Case) -> str:
+    """What stands on every figure of a synthetic record, '' on others."""
+    return SYNTHETIC if is_synthetic(case) else ""
 
 
 def median_plants(run: Run, experiment: str) -> VegetatedCells:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
+from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, plus_minus, short
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
@@ -200,6 +200,12 @@ def member_counts(ensemble: Ensemble) -> list[tuple[str, int, str]]:
     """For each status of a member: its words, how many members have it, and their share as text."""
     counts = [(word, members_with(ensemble.status, number)) for number, word in STATUS_WORDS.items()]
     return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
+
+
+def health_in_words(ensemble: Ensemble) -> str:
+    """How many members there are and how many failed (text)."""
+    failed = members_with(ensemble.status, FAILED)
+    return f"{count(len(ensemble.status), 'member')}, {failed or 'none'} of them failed"
 
 
 def failure_reasons(ensemble: Ensemble) -> list[tuple[str, int]]:

@@ -1,0 +1,126 @@
+"""The top of the page: verdict, ladder, what to do next, and what forbids using it, before anything else."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_instrument
+from posteriors import changed
+from report_runs import a_toy, told_of, written
+
+from vegglue.report_page.answer import answer_of
+from vegglue.report_page.answer_words import headline, ladder_in_words, next_steps, why_not_to_rely
+from vegglue.report_page.run import LoopResults, Run
+from vegglue.report_page.section_pictures import safe_json
+from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+
+FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
+LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
+LADDER = Ladder((FIRST, LAST), 0, "Added: eddies.")
+GAUGE = ProposedMeasurement("a gauge at x = 5 m", 1, 0.5, 0.2, 9.0, True)
+
+
+@pytest.fixture(scope="module")
+def toy(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return a_toy(tmp_path_factory.mktemp("toy"))
+
+
+def plain(words: str) -> str:
+    return re.sub("<[^>]*>", "", words).replace("\u202f", " ")
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (NOTHING, "Nothing is missing from this model that these data could show."),
+        (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies)"),
+        (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
+         "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
+        (replace(EVERY_KIND, field=None), "something is missing that is in no list: water that enters"),
+        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m"),
+        (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "I cannot tell <it>."}), "cannot tell &lt;it&gt;."),
+        (replace(EVERY_KIND, field=a_field()), "over some 15 m along"),
+    ],
+)  # fmt: skip
+def test_every_verdict_is_one_plain_sentence(toy: Run, found, said: str) -> None:
+    words = plain(headline(replace(toy, diagnosis=found)))
+    assert said in words
+    assert words.endswith(".")
+
+
+def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy: Run) -> None:
+    assert "identified" in headline(toy) or "first look" in headline(toy)
+    assert "vegglue diagnose toy.yaml" in next_steps(toy)[0]
+    assert "vegglue run toy.yaml" in answer_of(toy).ladder_words
+
+
+def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
+    said = plain(ladder_in_words(LADDER))
+    assert said.startswith("With eddies, the error at measurements no calibration has seen falls from 0.039 to 0.0033")
+    assert "errors of measuring alone are 0.012 m/s" in said
+    unseen = replace(LADDER, steps=tuple(replace(step, unseen=float("nan")) for step in LADDER.steps))
+    assert "at sections left out in turn falls from 0.041 to 0.013" in plain(ladder_in_words(unseen))
+    assert "rises from 0.0033 to 0.039" in plain(ladder_in_words(replace(LADDER, steps=(LAST, FIRST))))
+    assert plain(ladder_in_words(replace(LADDER, steps=(FIRST,)))).startswith("The model misses measurements no")
+
+
+def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:
+    loop = LoopResults(ladder=LADDER, questions=(OpenQuestion("eddies from <wind>", (GAUGE,)),), pages=("toy-eddies",))
+    better, measure, *_ = next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))
+    assert '<a href="../toy-eddies/report.html">' in better
+    assert "eddies from &lt;wind&gt;, measure <b>a gauge at x = 5 m</b>" in measure
+    nothing = next_steps(replace(toy, diagnosis=NOTHING, loop=replace(loop, questions=())))
+    assert any("nothing is left to be told apart" in step for step in nothing)
+    asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
+    assert any("vegglue extend toy.yaml --auto" in step for step in asked)
+    assert any("vegglue next toy.yaml" in step for step in asked)
+
+
+def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
+    question = OpenQuestion("eddies from wind", (replace(GAUGE, enough=False),))
+    steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(question,))))
+    assert "no single measurement would do. The nearest to it: a gauge at x = 5 m." in steps[0]
+
+
+def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:
+    found = told_of(toy, a_diagnosis())
+    loop = LoopResults(behind=found, ladder=replace(LADDER, steps=(replace(FIRST, name="brook"), LAST)))
+    top = answer_of(replace(toy, loop=loop))
+    assert "found in brook" in top.subject
+    assert top.in_full == found.verdict.sentence
+    assert top.sections.added
+    assert answer_of(replace(toy, diagnosis=found, loop=loop)).subject == ""
+
+
+def test_what_forbids_using_the_answer_is_one_sentence(toy: Run) -> None:
+    few = replace(toy, posterior=changed(toy.posterior, effective_size=7.0))
+    assert "the weights are worth 7 of" in why_not_to_rely(few)
+    enough = replace(toy, posterior=changed(toy.posterior, effective_size=900.0, pareto_k=0.1))
+    assert why_not_to_rely(enough) == ""
+    badly = a_diagnosis(misfit={"p": 1e-9})
+    said = why_not_to_rely(replace(few, diagnosis=badly))
+    assert "larger than the errors allow; the weights" in said
+    assert said.count(".") == 1
+
+
+@pytest.mark.slow
+def test_the_answer_stands_before_all_else(toy: Run, tmp_path: Path) -> None:
+    run = replace(toy, folder=tmp_path, diagnosis=told_of(toy, a_diagnosis()), loop=LoopResults(ladder=LADDER))
+    text = written(run)
+    parts = ['class="verdict"', 'id="ladder"', "What to do next", 'class="sections"', 'id="parameters"', 'id="missing"']
+    places = [text.index(part) for part in [*parts, 'id="found"', 'id="health"']]
+    assert places == sorted(places)
+    caveats = text[text.index('id="found"') : text.index('id="health"')]
+    number = re.search(r"<summary>(\d+) caveats?,", caveats)
+    assert number is not None
+    assert int(number[1]) == caveats.count('class="doubt"')
+    assert a_diagnosis().verdict.remarks[0] in caveats
+
+
+def test_words_of_users_close_no_script() -> None:
+    text = safe_json([{"section": "</script><script>alert('weeds')</script> & \u2028"}])
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text)[0]["section"].startswith("</script><script>")

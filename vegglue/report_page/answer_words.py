@@ -1,0 +1,205 @@
+"""The answer in words (HTML), for a reader with ten seconds: what is missing, how far the error falls, what to do."""
+
+import html
+import math
+from collections.abc import Iterator
+
+from vegglue.figures.typography import NARROW, count, percent, short, unit_html
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.report_page.cause_words import OF_KIND, field_in_words, size_of, what_at, where
+from vegglue.report_page.findings import FAILED_TOLERATED
+from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
+from vegglue.report_page.posterior_words import UNBELIEVED
+from vegglue.report_page.run import Run
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.open_questions import OpenQuestion
+from vegglue.results.posterior import Posterior
+from vegglue.solver.status import FAILED, members_with
+
+# Ways of judging a model, the most telling first: field of a step, and the measurements it is about.
+JUDGED_ON = {
+    "unseen": "measurements no calibration has seen",
+    "held_out_sections": "sections left out in turn",
+    "held_out_experiments": "experiments left out in turn",
+    "in_sample": "measurements it was calibrated to",
+}
+NUMBERS = ("", "One", "Two", "Three", "Four", "Five", "Six")
+# Questions shown beside the answer: more are a list that nobody acts on.
+QUESTIONS_SHOWN = 3
+
+
+def headline(run: Run) -> str:
+    """The verdict in one sentence."""
+    found = run.behind
+    if found is None:
+        return verdict_of(run.case, run.posterior)
+    kind = found.verdict.kind
+    if kind == "nothing-missing":
+        return "Nothing is missing from this model that these data could show."
+    if kind == "instrument":
+        which = " and ".join(f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}" for one in found.instruments)
+        return f"The model is sound, but an instrument is off: {which}."
+    if kind == "none-of-these" and found.field is not None:
+        return f"Something is missing that is in no list: {field_in_words(found)}."
+    if kind in ("identified", "one-of", "none-of-these"):
+        return _what_is_missing(found)
+    return html.escape(found.verdict.sentence)
+
+
+def _what_is_missing(found: Diagnosis) -> str:
+    """Effects by their titles, places by what they do."""
+    effects = [_effect_in_words(found, step.accepted, len(step.rivals) > 1) for step in found.steps]
+    places = [f"{what_at(one)} of {size_of(one)} at {where(one.x, one.y)}" for one in found.places]
+    parts = []
+    if effects:
+        subject = "physical effect is" if len(effects) == 1 else "physical effects are"
+        parts.append(f"{NUMBERS[min(len(effects), 6)]} {subject} missing from this model: {', and '.join(effects)}")
+    if places:
+        parts.append(f"{'something' if parts else 'Something'} is missing that is in no list: {' and '.join(places)}")
+    return f"{'; and '.join(parts)}."
+
+
+def _effect_in_words(found: Diagnosis, name: str, rivals: bool) -> str:
+    suspect = found.suspect(name)
+    short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
+    doubt = f"most likely ({percent(found.chances[name])}) " if rivals else ""
+    explained = f", {more}" if more else ""
+    return f"{doubt}<b>{short_title[:1].lower()}{short_title[1:]}</b> (<code>{html.escape(name)}</code>{explained})"
+
+
+def of_which_model(run: Run) -> str:
+    """Which model the verdict is about, where it is not that of the page; '' else."""
+    ladder = run.loop.ladder
+    if run.diagnosis is not None or run.loop.behind is None or ladder is None:
+        return ""
+    added = [name for step in ladder.steps for name in step.added if name in run.case.effects]
+    return (
+        f"That was found in {html.escape(ladder.steps[0].name)}. This page is about the model with "
+        f"{_listed([f'<code>{html.escape(name)}</code>' for name in added]) or 'what was added'} in it."
+    )
+
+
+def _listed(words: list[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def why_not_to_rely(run: Run) -> str:
+    """What forbids using the answer, in one sentence; '' where nothing does."""
+    reasons = [*_of_verdict(run.behind), *_of_posterior(run.posterior), *_of_ensemble(run.ensemble)]
+    return f"Not to be relied on yet: {'; '.join(reasons)}." if reasons else ""
+
+
+def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
+    if found is not None and found.misfit.p < UNBELIEVED and found.verdict.kind != "cannot-tell":
+        yield "what is left of the misfit is still larger than the errors allow"
+
+
+def _of_posterior(posterior: Posterior) -> Iterator[str]:
+    size = posterior.weighting.effective_size
+    if not posterior.claimed:
+        members = f"the weights are worth {max(size, 1.0):.0f} of {count(posterior.sample.members, 'member')}"
+        yield f"{members}, too few to say how sure the parameters are"
+    elif posterior.weighting.pareto_k > TRUSTED_K_HAT:
+        yield "a few members carry most of the weight, so that the parameters are less sure than they look"
+
+
+def _of_ensemble(ensemble: Ensemble) -> Iterator[str]:
+    failed = members_with(ensemble.status, FAILED)
+    if failed > FAILED_TOLERATED * len(ensemble.status):
+        yield f"{failed:,} of {count(len(ensemble.status), 'member')} failed"
+    if largest_mass_error(ensemble) >= MASS_LIMIT:
+        yield f"a member loses or gains {percent(largest_mass_error(ensemble))} of its discharge"
+
+
+def ladder_in_words(ladder: Ladder) -> str:
+    """How far the error falls from the first model to the last, by the most telling way of judging."""
+    first, last = ladder.steps[0], ladder.steps[-1]
+    judged = next((name for name in JUDGED_ON if math.isfinite(getattr(last, name))), None)
+    if judged is None:
+        return "No velocities along x were measured, by which models are set side by side."
+    before, after = getattr(first, judged), getattr(last, judged)
+    floor = f"; errors of measuring alone are {_speed(last.noise_floor)}" if math.isfinite(last.noise_floor) else ""
+    if len(ladder.steps) == 1:
+        return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}."
+    falls = "falls" if after < before else "rises"
+    with_it = _listed([f"<code>{html.escape(name)}</code>" for name in _all_added(ladder)])
+    return (
+        f"With {with_it or html.escape(last.name)}, the error at {JUDGED_ON[judged]} {falls} from "
+        f"{short(before, 2)} to {_speed(after)}{floor}."
+    )
+
+
+def _all_added(ladder: Ladder) -> list[str]:
+    last = [name for step in ladder.steps[1:] for name in step.added]
+    return list(dict.fromkeys(last))
+
+
+def _speed(value: float) -> str:
+    return f"{short(value, 2)}{NARROW}{unit_html('m/s')}"
+
+
+def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
+    """Errors of each model in turn [m/s], by what they are judged on, without what nothing is known of."""
+    rows = {words: [float(getattr(step, name)) for step in ladder.steps] for name, words in JUDGED_ON.items()}
+    return {words: values for words, values in rows.items() if any(map(math.isfinite, values))}
+
+
+def next_steps(run: Run) -> list[str]:
+    """What to do next, the first thing first."""
+    command = html.escape(run.case.source.name)
+    if run.behind is None:
+        return [f"<code>vegglue diagnose {command}</code> tells which physical effect this model lacks, if any."]
+    return [*_better_model(run), *_measurements(run, command), *_of_instruments(run.behind)]
+
+
+def _of_instruments(found: Diagnosis) -> Iterator[str]:
+    for one in found.instruments:
+        yield f"Look at the instrument again: {OF_KIND[one.kind]}, at {where(one.x, one.y)}. Its readings are left out."
+
+
+def _better_model(run: Run) -> Iterator[str]:
+    ladder, found = run.loop.ladder, run.behind
+    assert found is not None
+    if ladder is None:
+        if found.steps or found.places:
+            command = html.escape(run.case.source.name)
+            yield f"<code>vegglue extend {command} --auto</code> adds what is missing, and shows the error fall."
+        return
+    if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:
+        yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
+    elif len(ladder.steps) > 1:
+        yield f"Compare with the model without it: {_page_of(run, ladder.steps[0])}."
+    if ladder.reason and len(ladder.steps) == 1:
+        yield html.escape(ladder.reason)
+
+
+def _page_of(run: Run, step: LadderStep) -> str:
+    config = f"<code>{html.escape(step.config)}</code>"
+    if step.name not in run.loop.pages:
+        return config
+    return f'{config} (<a href="../{html.escape(step.name)}/report.html">its report</a>)'
+
+
+def _measurements(run: Run, command: str) -> Iterator[str]:
+    questions = run.loop.questions
+    if questions is None:
+        yield f"<code>vegglue next {command}</code> says what to measure next."
+    elif not questions:
+        yield "No further measurement is needed: nothing is left to be told apart."
+    else:
+        for question in questions[:QUESTIONS_SHOWN]:
+            yield _question_in_words(question)
+
+
+def _question_in_words(question: OpenQuestion) -> str:
+    apart = html.escape(question.tells_apart)
+    best = next(iter(question.measurements), None)
+    if best is None or not best.enough:
+        near = f" The nearest to it: {html.escape(best.name)}." if best else ""
+        return f"To tell {apart}, no single measurement would do.{near}"
+    return (
+        f"To tell {apart}, measure <b>{html.escape(best.name)}</b>: {count(best.stations, 'station')}, some "
+        f"{short(best.hours, 2)}{NARROW}hours of field work."
+    )
