@@ -39,7 +39,7 @@ def plain(words: str) -> str:
         (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies)"),
         (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
          "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
-        (replace(EVERY_KIND, field=None), "something is missing that is in no list: water that enters"),
+        (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m"),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "I cannot tell <it>."}), "cannot tell &lt;it&gt;."),
         (replace(EVERY_KIND, field=a_field()), "over some 15 m along"),
@@ -89,7 +89,8 @@ def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:
     found = told_of(toy, a_diagnosis())
     loop = LoopResults(behind=found, ladder=replace(LADDER, steps=(replace(FIRST, name="brook"), LAST)))
     top = answer_of(replace(toy, loop=loop))
-    assert "found in brook" in top.subject
+    assert "missing from open-x" in top.headline
+    assert "made of brook" in top.subject
     assert top.in_full == found.verdict.sentence
     assert top.sections.added
     assert answer_of(replace(toy, diagnosis=found, loop=loop)).subject == ""
@@ -102,6 +103,7 @@ def test_what_forbids_using_the_answer_is_one_sentence(toy: Run) -> None:
     assert why_not_to_rely(enough) == ""
     badly = a_diagnosis(misfit={"p": 1e-9})
     said = why_not_to_rely(replace(few, diagnosis=badly))
+    assert said.startswith("Neither the verdict nor the parameters below are")
     assert "larger than the errors allow; the weights" in said
     assert said.count(".") == 1
 

@@ -62,14 +62,14 @@ def _floor(scale: Scale, floor: float, foot: float) -> list[str]:
     at = float(scale(floor))
     line = svg_element("path", d=f"M{at:.1f},22V{foot + 26:g}", stroke=COLOUR["ink"], stroke_dasharray="3 3")
     words = f"errors of measuring alone: {short(floor, 2)}"
-    left = min(at + 5, ROWS_WIDTH - 200)
-    return [line, svg_words(left, foot + 38, words)]
+    right = at > 0.5 * ROWS_WIDTH
+    return [line, svg_words(at - 5 if right else at + 5, foot + 40, words, text_anchor="end" if right else "start")]
 
 
 def _row(scale: Scale, words: str, values: Sequence[float], height: float) -> list[str]:
     """From the first model, hollow, to the last, full; those between as strokes."""
     parts = [
-        svg_words(0.0, height - 20, words),
+        svg_words(0.0, height - 20, words, **NUMBER_HALO),
         svg_element("path", d=f"M{ROWS_START:g},{height:g}H{ROWS_END:g}", stroke=COLOUR["rule"]),
     ]
     known = [float(value) for value in values if np.isfinite(value)]

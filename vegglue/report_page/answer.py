@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from vegglue.figures.error_rows import draw_error_rows
 from vegglue.figures.style import Picture
 from vegglue.report_page.answer_words import (
+    causes_of,
     headline,
     ladder_in_words,
     ladder_rows,
@@ -57,7 +58,7 @@ def answer_of(run: Run) -> CaseAnswer:
         in_full=run.behind.verdict.sentence if run.behind else "",
         falls=ladder is not None and len(ladder.steps) > 1,
         ladder=_ladder_picture(run),
-        ladder_words=missing if ladder is None else ladder_in_words(ladder),
+        ladder_words=missing if ladder is None else ladder_in_words(ladder, causes_of(run)),
         next_steps=next_steps(run),
         sections=section_panels(run),
         stand_in=STAND_IN if run.diagnosis and accepted_causes(run.diagnosis) else "",

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from vegglue.figures.typography import NARROW, count, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.report_page.cause_words import OF_KIND, field_in_words, size_of, what_at, where
+from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.posterior_words import UNBELIEVED
@@ -36,28 +36,32 @@ def headline(run: Run) -> str:
     if found is None:
         return verdict_of(run.case, run.posterior)
     kind = found.verdict.kind
+    model, tense = ("this model", "is") if run.diagnosis else (html.escape(found.name), "was")
     if kind == "nothing-missing":
-        return "Nothing is missing from this model that these data could show."
+        return f"Nothing {tense} missing from {model} that these data could show."
     if kind == "instrument":
         which = " and ".join(f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}" for one in found.instruments)
         return f"The model is sound, but an instrument is off: {which}."
     if kind == "none-of-these" and found.field is not None:
         return f"Something is missing that is in no list: {field_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
-        return _what_is_missing(found)
+        return _what_is_missing(found, model, tense)
     return html.escape(found.verdict.sentence)
 
 
-def _what_is_missing(found: Diagnosis) -> str:
-    """Effects by their titles, places by what they do."""
+def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
+    """Effects by their titles, places by what they do; tense: is or was."""
     effects = [_effect_in_words(found, step.accepted, len(step.rivals) > 1) for step in found.steps]
     places = [f"{what_at(one)} of {size_of(one)} at {where(one.x, one.y)}" for one in found.places]
     parts = []
     if effects:
-        subject = "physical effect is" if len(effects) == 1 else "physical effects are"
-        parts.append(f"{NUMBERS[min(len(effects), 6)]} {subject} missing from this model: {', and '.join(effects)}")
+        subject = f"physical effect {tense}"
+        if len(effects) > 1:
+            subject = f"physical effects {'are' if tense == 'is' else 'were'}"
+        parts.append(f"{NUMBERS[min(len(effects), 6)]} {subject} missing from {model}: {', and '.join(effects)}")
     if places:
-        parts.append(f"{'something' if parts else 'Something'} is missing that is in no list: {' and '.join(places)}")
+        what = "something else" if parts else "Something"
+        parts.append(f"{what} {tense} missing from {model} that is in no list: {' and '.join(places)}")
     return f"{'; and '.join(parts)}."
 
 
@@ -70,14 +74,14 @@ def _effect_in_words(found: Diagnosis, name: str, rivals: bool) -> str:
 
 
 def of_which_model(run: Run) -> str:
-    """Which model the verdict is about, where it is not that of the page; '' else."""
+    """Which model the page is about, where it is not the one that was diagnosed; '' else."""
     ladder = run.loop.ladder
     if run.diagnosis is not None or run.loop.behind is None or ladder is None:
         return ""
     added = [name for step in ladder.steps for name in step.added if name in run.case.effects]
     return (
-        f"That was found in {html.escape(ladder.steps[0].name)}. This page is about the model with "
-        f"{_listed([f'<code>{html.escape(name)}</code>' for name in added]) or 'what was added'} in it."
+        f"This page is about the model made of {html.escape(ladder.steps[0].name)} by adding "
+        f"{_listed([f'<code>{html.escape(name)}</code>' for name in added]) or 'what was missing'}."
     )
 
 
@@ -87,8 +91,13 @@ def _listed(words: list[str]) -> str:
 
 def why_not_to_rely(run: Run) -> str:
     """What forbids using the answer, in one sentence; '' where nothing does."""
-    reasons = [*_of_verdict(run.behind), *_of_posterior(run.posterior), *_of_ensemble(run.ensemble)]
-    return f"Not to be relied on yet: {'; '.join(reasons)}." if reasons else ""
+    verdict, parameters = [*_of_verdict(run.behind)], [*_of_posterior(run.posterior), *_of_ensemble(run.ensemble)]
+    if verdict and parameters:
+        subject = "Neither the verdict nor the parameters below are"
+    else:
+        subject = "The verdict is not" if verdict else "The parameters below are not"
+    reasons = [*verdict, *parameters]
+    return f"{subject} to be relied on yet: {'; '.join(reasons)}." if reasons else ""
 
 
 def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
@@ -113,8 +122,11 @@ def _of_ensemble(ensemble: Ensemble) -> Iterator[str]:
         yield f"a member loses or gains {percent(largest_mass_error(ensemble))} of its discharge"
 
 
-def ladder_in_words(ladder: Ladder) -> str:
-    """How far the error falls from the first model to the last, by the most telling way of judging."""
+def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
+    """How far the error falls from the first model to the last, by the most telling way of judging.
+
+    causes: what was added, in words (text), where that is known.
+    """
     first, last = ladder.steps[0], ladder.steps[-1]
     judged = next((name for name in JUDGED_ON if math.isfinite(getattr(last, name))), None)
     if judged is None:
@@ -125,10 +137,9 @@ def ladder_in_words(ladder: Ladder) -> str:
         return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}."
     falls = "falls" if after < before else "rises"
     with_it = _listed([f"<code>{html.escape(name)}</code>" for name in _all_added(ladder)])
-    return (
-        f"With {with_it or html.escape(last.name)}, the error at {JUDGED_ON[judged]} {falls} from "
-        f"{short(before, 2)} to {_speed(after)}{floor}."
-    )
+    model = html.escape(causes) or with_it or html.escape(last.name)
+    from_to = f"{falls} from {short(before, 2)} to {_speed(after)}"
+    return f"With {model}, the error at {JUDGED_ON[judged]} {from_to}{floor}."
 
 
 def _all_added(ladder: Ladder) -> list[str]:
@@ -138,6 +149,14 @@ def _all_added(ladder: Ladder) -> list[str]:
 
 def _speed(value: float) -> str:
     return f"{short(value, 2)}{NARROW}{unit_html('m/s')}"
+
+
+def causes_of(run: Run) -> str:
+    """What the diagnosis accepted, in words (text), where the ladder adds all of it and nothing else; '' else."""
+    ladder, found = run.loop.ladder, run.behind
+    if ladder is None or found is None or len(_all_added(ladder)) != len(found.steps) + len(found.places):
+        return ""
+    return accepted_causes(found)
 
 
 def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
