@@ -64,14 +64,16 @@ def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
     unseen = replace(LADDER, steps=tuple(replace(step, unseen=float("nan")) for step in LADDER.steps))
     assert "at sections left out in turn falls from 0.041 to 0.013" in plain(ladder_in_words(unseen))
     assert "rises from 0.0033 to 0.039" in plain(ladder_in_words(replace(LADDER, steps=(LAST, FIRST))))
-    assert plain(ladder_in_words(replace(LADDER, steps=(FIRST,)))).startswith("The model misses measurements no")
+    alone = plain(ladder_in_words(Ladder((FIRST,), 0, "Nothing is added: nothing is missing.")))
+    assert alone.startswith("The model misses measurements no")
+    assert alone.endswith(" Nothing is added: nothing is missing.")
 
 
 def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:
     loop = LoopResults(ladder=LADDER, questions=(OpenQuestion("eddies from <wind>", (GAUGE,)),), pages=("toy-eddies",))
     better, measure, *_ = next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))
     assert '<a href="../toy-eddies/report.html">' in better
-    assert "eddies from &lt;wind&gt;, measure <b>a gauge at x = 5 m</b>" in measure
+    assert "Measure <b>a gauge at x = 5 m</b>, to tell eddies from &lt;wind&gt;: 1 station" in measure
     nothing = next_steps(replace(toy, diagnosis=NOTHING, loop=replace(loop, questions=())))
     assert any("nothing is left to be told apart" in step for step in nothing)
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
@@ -80,9 +82,11 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
 
 
 def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
-    question = OpenQuestion("eddies from wind", (replace(GAUGE, enough=False),))
-    steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(question,))))
-    assert "no single measurement would do. The nearest to it: a gauge at x = 5 m." in steps[0]
+    hidden = OpenQuestion("eddies from a change of k_s", (replace(GAUGE, enough=False),))
+    unknown = OpenQuestion("eddies from wind", ())
+    steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden, unknown))))
+    said = "to see whether eddies hides behind a change of k_s; nor to tell eddies from wind."
+    assert steps == [f"No single measurement would do {said}"]
 
 
 def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:

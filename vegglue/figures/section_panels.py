@@ -29,7 +29,7 @@ PANEL_WIDTH, PANEL_HEIGHT, PANEL_LETTERS, NOTE_LETTERS = 240.0, 222.0, 11.5, 9.0
 PANEL_LEFT, PANEL_RIGHT, PANEL_TOP, PANEL_LOWEST, PANEL_BED_TOP, PANEL_BED_FOOT = 28.0, 236.0, 24.0, 154.0, 160.0, 190.0
 PANEL_TICKS = 5
 FAINT_LINE: dict[str, Any] = {"stroke_width": 0.9, "stroke_dasharray": "2 2.5"}
-AXIS_CLEAR = 12.0  # of the name of the axis [px]
+AXIS_CLEAR = 18.0  # of the name of the axis [px]
 LARGE_DOT, SMALL_DOT = 3.6, 2.6
 Edges = tuple[Array, Array]  # lower and upper
 

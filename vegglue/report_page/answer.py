@@ -14,6 +14,7 @@ from vegglue.report_page.answer_words import (
     ladder_rows,
     next_steps,
     of_which_model,
+    where_it_fails,
     why_not_to_rely,
 )
 from vegglue.report_page.cause_words import accepted_causes
@@ -27,9 +28,10 @@ STAND_IN = "They are those of the model as it is, and may stand in for what is m
 class CaseAnswer:
     """What the top of a page says of one case (HTML).
 
-    headline: the verdict; subject: which model it is about, '' for that of the page; warning: what forbids using it;
-    in_full: the whole verdict (text), '' without a diagnosis; falls: whether models are compared; ladder: None where
-    nobody did, and ladder_words then name the command; stand_in: what to think of the parameters of this model (text).
+    headline: the verdict; subject: which model the page is about, '' where it is the one diagnosed; warning: what
+    forbids using it; in_full: the whole verdict (text), '' without a diagnosis; falls: whether models are compared;
+    ladder: None where nobody did, and ladder_words then name the command; where: it fails most (text); stand_in: what to
+    think of the parameters of this model (text).
     """
 
     name: str
@@ -41,6 +43,7 @@ class CaseAnswer:
     ladder: Picture | None
     ladder_words: str
     next_steps: list[str]
+    where: str
     sections: SectionPanels
     stand_in: str
 
@@ -60,6 +63,7 @@ def answer_of(run: Run) -> CaseAnswer:
         ladder=_ladder_picture(run),
         ladder_words=missing if ladder is None else ladder_in_words(ladder, causes_of(run)),
         next_steps=next_steps(run),
+        where=where_it_fails(run.behind),
         sections=section_panels(run),
         stand_in=STAND_IN if run.diagnosis and accepted_causes(run.diagnosis) else "",
     )

@@ -4,7 +4,10 @@ import html
 import math
 from collections.abc import Iterator
 
-from vegglue.figures.typography import NARROW, count, percent, short, unit_html
+import numpy as np
+import pandas as pd
+
+from vegglue.figures.typography import NARROW, count, fixed, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
 from vegglue.report_page.findings import FAILED_TOLERATED
@@ -26,7 +29,9 @@ JUDGED_ON = {
     "in_sample": "measurements it was calibrated to",
 }
 NUMBERS = ("", "One", "Two", "Three", "Four", "Five", "Six")
-# Questions shown beside the answer: more are a list that nobody acts on.
+# How a question names an effect that calibration hides.
+HIDDEN_BEHIND = " from a change of "
+# Measurements named beside the answer: more are a list that nobody acts on.
 QUESTIONS_SHOWN = 3
 
 
@@ -134,7 +139,8 @@ def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
     before, after = getattr(first, judged), getattr(last, judged)
     floor = f"; errors of measuring alone are {_speed(last.noise_floor)}" if math.isfinite(last.noise_floor) else ""
     if len(ladder.steps) == 1:
-        return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}."
+        why = f" {html.escape(ladder.reason)}" if ladder.reason else ""
+        return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}.{why}"
     falls = "falls" if after < before else "rises"
     with_it = _listed([f"<code>{html.escape(name)}</code>" for name in _all_added(ladder)])
     model = html.escape(causes) or with_it or html.escape(last.name)
@@ -165,6 +171,20 @@ def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
     return {words: values for words, values in rows.items() if any(map(math.isfinite, values))}
 
 
+def where_it_fails(found: Diagnosis | None) -> str:
+    """The zone that the first model misses most (text); '' where none is known."""
+    zones = found.misfit.zones if found else pd.DataFrame()
+    if found is None or zones.empty:
+        return ""
+    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
+    worst = zones.iloc[int(np.argmax(size))]
+    place = " ".join(part for part in (str(worst["experiment"]), str(worst["section"])) if part)
+    return (
+        f"The model {'as it was ' if accepted_causes(found) else ''}misses most in {place}, {worst['zone']}: by "
+        f"{fixed(float(size.max()), 1)} standard errors, where errors alone make 1."
+    )
+
+
 def next_steps(run: Run) -> list[str]:
     """What to do next, the first thing first."""
     command = html.escape(run.case.source.name)
@@ -190,8 +210,6 @@ def _better_model(run: Run) -> Iterator[str]:
         yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
     elif len(ladder.steps) > 1:
         yield f"Compare with the model without it: {_page_of(run, ladder.steps[0])}."
-    if ladder.reason and len(ladder.steps) == 1:
-        yield html.escape(ladder.reason)
 
 
 def _page_of(run: Run, step: LadderStep) -> str:
@@ -202,23 +220,29 @@ def _page_of(run: Run, step: LadderStep) -> str:
 
 
 def _measurements(run: Run, command: str) -> Iterator[str]:
+    """What to measure, and what no single measurement would settle."""
     questions = run.loop.questions
     if questions is None:
         yield f"<code>vegglue next {command}</code> says what to measure next."
-    elif not questions:
+        return
+    if not questions:
         yield "No further measurement is needed: nothing is left to be told apart."
-    else:
-        for question in questions[:QUESTIONS_SHOWN]:
-            yield _question_in_words(question)
+    settled = [one for one in questions if one.measurements and one.measurements[0].enough]
+    measurements = {one.measurements[0].name: one.measurements[0] for one in reversed(settled)}
+    for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
+        purposes = [_to_see(one) for one in settled if one.measurements[0].name == best.name]
+        yield (
+            f"Measure <b>{html.escape(best.name)}</b>, {' and '.join(purposes)}: {count(best.stations, 'station')}, "
+            f"some {short(best.hours, 2)}{NARROW}hours of field work."
+        )
+    left = [_to_see(one) for one in questions if one not in settled]
+    if left:
+        yield f"No single measurement would do {'; nor '.join(left)}."
 
 
-def _question_in_words(question: OpenQuestion) -> str:
-    apart = html.escape(question.tells_apart)
-    best = next(iter(question.measurements), None)
-    if best is None or not best.enough:
-        near = f" The nearest to it: {html.escape(best.name)}." if best else ""
-        return f"To tell {apart}, no single measurement would do.{near}"
-    return (
-        f"To tell {apart}, measure <b>{html.escape(best.name)}</b>: {count(best.stations, 'station')}, some "
-        f"{short(best.hours, 2)}{NARROW}hours of field work."
-    )
+def _to_see(question: OpenQuestion) -> str:
+    """What a question asks, as a purpose."""
+    one, hidden, other = question.tells_apart.partition(HIDDEN_BEHIND)
+    if hidden:
+        return f"to see whether {html.escape(one)} hides behind a change of {html.escape(other)}"
+    return f"to tell {html.escape(question.tells_apart)}"

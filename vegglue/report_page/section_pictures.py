@@ -150,7 +150,7 @@ def _ground_at(run: Run, experiment: str, x: float) -> PanelGround:
 
 
 def panel_words(panel: SectionPanel) -> str:
-    """Where a section was missed most, by how much before and after, and how many stations bands hold (text)."""
+    """Where a section was missed most, by how much before and after, and how many stations errors explain (text)."""
     counted = ~panel.aside
     if not counted.any():
         return "no measurement counts here"
@@ -159,15 +159,13 @@ def panel_words(panel: SectionPanel) -> str:
     worst = int(np.argmax(first))
     after = "" if panel.before is None else f", with it by {short(float(left[worst]), 2)}"
     missed = "misses most" if panel.before is None else "missed most"
-    held = "" if panel.core is None or panel.band is None else f"; {_held(panel, panel.core, panel.band)}"
+    held = "" if panel.total is None else f"; {_held(panel, panel.total)}"
     return f"{missed} at y = {as_given(float(panel.y[worst]))} m: by {short(float(first[worst]), 2)}{after} m/s{held}"
 
 
-def _held(panel: SectionPanel, core: Edges, band: Edges) -> str:
-    inside = [
-        int(np.sum(~panel.aside & (panel.measured >= low) & (panel.measured <= high))) for low, high in (core, band)
-    ]
-    return f"of {count(int(np.sum(~panel.aside)), 'station')}, {inside[0]} in the 50 % and {inside[1]} in the 95 % band"
+def _held(panel: SectionPanel, total: Edges) -> str:
+    inside = int(np.sum(~panel.aside & (panel.measured >= total[0]) & (panel.measured <= total[1])))
+    return f"{inside} of {count(int(np.sum(~panel.aside)), 'station')} lie within the dotted lines"
 
 
 def _numbers(name: str, kind: Kind, panel: SectionPanel, drawn: DrawnPanel) -> dict[str, Any]:
