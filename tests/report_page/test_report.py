@@ -76,7 +76,6 @@ def test_every_figure_is_labelled_captioned_and_on_file(d3a: tuple[Run, str]) ->
         "residuals-velocity",
         "quantiles-velocity",
         "weights",
-        "mass-error",
     }
     assert expected <= set(page.ids)
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
+from vegglue.figures.style import COLOUR, HEIGHT, WIDTH, canvas, label, styled
 from vegglue.figures.typography import short, symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
@@ -227,22 +227,4 @@ def draw_weights(weights: Array) -> Figure:
         ylabel="share of the weight [–]",
     )
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    return figure
-
-
-@styled
-def draw_mass_error(mass_error: Array, limit: float) -> Figure:
-    """Members by their largest discharge error |Q/Q_in − 1|, logarithmic, with the limit they are held to."""
-    figure, axes = canvas()
-    exponent = np.log10(np.maximum(mass_error[np.isfinite(mass_error)], 1e-16))
-    axes.hist(exponent, bins=40, color=COLOUR["model"], linewidth=0)
-    axes.axvline(np.log10(limit), color=COLOUR["measured"], linewidth=1.2)
-    top = axes.get_ylim()[1]
-    label(axes, float(np.log10(limit)), top, "limit", "measured", ha="right", va="top", xytext=(-4, 0))
-    axes.set(xlabel="largest |Q / Q of the inflow − 1| [–]", ylabel="members")
-    low, high = axes.get_xlim()
-    step = max(1, round((high - low) / 6))
-    ticks = np.arange(np.ceil(low), high + 1e-9, step)
-    axes.set_xticks(ticks, [rf"$10^{{{tick:.0f}}}$" for tick in ticks])
-    axes.tick_params(labelsize=SMALL + 1)
     return figure

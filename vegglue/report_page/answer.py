@@ -30,8 +30,8 @@ class CaseAnswer:
 
     headline: the verdict; subject: which model the page is about, '' where it is the one diagnosed; warning: what
     forbids using it; in_full: the whole verdict (text), '' without a diagnosis; falls: whether models are compared;
-    ladder: None where nobody did, and ladder_words then name the command; where: it fails most (text); stand_in: what to
-    think of the parameters of this model (text).
+    ladder: None where nobody did, and ladder_words then name the command; where: it fails most (text); stand_in: what
+    to think of the parameters of this model (text).
     """
 
     name: str

@@ -14,7 +14,6 @@ from vegglue.figures.posterior import (
     draw_cylinder,
     draw_joint,
     draw_marginal,
-    draw_mass_error,
     draw_weights,
 )
 from vegglue.figures.style import Picture
@@ -22,11 +21,9 @@ from vegglue.figures.typography import fixed, html_notation, plus_minus, short
 from vegglue.inference.weighted_statistics import weighted_quantile
 from vegglue.report_page.flow_pictures import plans
 from vegglue.report_page.key_numbers import (
-    MASS_LIMIT,
     as_power,
     estimate,
     identified_width,
-    mass_in_words,
     plant_parameter,
     symbol,
 )
@@ -55,7 +52,7 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
         "verticals": list(verticals(run)),
         "canopy_and_discharge": [*canopy_profiles(run), *discharges(run)],
         "flow": [drawn for experiment in run.flow for drawn in plans(run, experiment)],
-        "health": [_weights(run), _mass_error(run)],
+        "health": [_weights(run)],
     }
 
 
@@ -182,8 +179,3 @@ def _weights(run: Run) -> Picture:
     caption = weights_in_words(run.posterior, html_notation({}))[0]
     figure = draw_weights(run.posterior.sample.weights)
     return published_picture(run, figure, "weights", caption, "Cumulated weight of the members.")
-
-
-def _mass_error(run: Run) -> Picture:
-    figure = draw_mass_error(run.ensemble.mass_error, MASS_LIMIT)
-    return published_picture(run, figure, "mass-error", mass_in_words(run.ensemble), "Histogram of mass errors.")
