@@ -101,8 +101,9 @@ def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:
 
 
 def test_what_forbids_using_the_answer_is_one_sentence(toy: Run) -> None:
-    few = replace(toy, posterior=changed(toy.posterior, effective_size=7.0))
+    few = replace(toy, diagnosis=a_diagnosis(), posterior=changed(toy.posterior, effective_size=7.0))
     assert "the weights are worth 7 of" in why_not_to_rely(few)
+    assert why_not_to_rely(replace(few, diagnosis=None)) == "", "the headline says it"
     enough = replace(toy, posterior=changed(toy.posterior, effective_size=900.0, pareto_k=0.1))
     assert why_not_to_rely(enough) == ""
     badly = a_diagnosis(misfit={"p": 1e-9})

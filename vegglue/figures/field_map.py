@@ -135,7 +135,7 @@ def streamlines(frame: MapFrame, x: Array, y: Array, psi: Array, levels: Array) 
     for level in levels:
         place = first_crossing(y, psi[columns], float(level))
         path = line_through(frame.across(x[columns]), frame.down(place))
-        for colour, width, opacity in (("white", 2.0, 0.45), (EDGE_COLOUR, 0.8, 1.0)):
+        for colour, width, opacity in (("white", 1.4, 0.4), (EDGE_COLOUR, 0.6, 1.0)):
             parts.append(
                 svg_element("path", d=path, fill="none", stroke=colour, stroke_width=width, stroke_opacity=opacity)
             )

@@ -77,7 +77,10 @@ def draw_reach(
     upper, lower = MapFrame(window, HEAD, HEAD + tall), MapFrame(window, HEAD + tall + GAP, HEAD + 2 * tall + GAP)
     parts = [*_depth(upper, flow), *_velocity(lower, flow)]
     for frame in (upper, lower):
-        parts += [*outlined(frame, [one.corners for one in patches]), *station_dots(frame, stations, 3.2)]
+        parts += [
+            *outlined(frame, [one.corners for one in patches]),
+            *station_dots(frame, stations, float(np.clip(0.03 * tall, 1.3, 3.2))),
+        ]
     for one in patches:
         place = float(upper.across(one.corners[:, 0].max())) + 5, float(upper.down(one.corners[:, 1].mean())) + 4
         halo: dict[str, Any] = {"stroke": COLOUR["paper"], "stroke_width": 3.0, "paint_order": "stroke"}

@@ -96,7 +96,9 @@ def _listed(words: list[str]) -> str:
 
 def why_not_to_rely(run: Run) -> str:
     """What forbids using the answer, in one sentence; '' where nothing does."""
-    verdict, parameters = [*_of_verdict(run.behind)], [*_of_posterior(run.posterior), *_of_ensemble(run.ensemble)]
+    told = run.behind is None and not run.posterior.claimed  # by the headline
+    verdict = [*_of_verdict(run.behind)]
+    parameters = [*([] if told else _of_posterior(run.posterior)), *_of_ensemble(run.ensemble)]
     if verdict and parameters:
         subject = "Neither the verdict nor the parameters below are"
     else:
