@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy.stats
 from scipy.integrate import quad
 
-from vegglue.case.prior import log_prior, quantile, sample_prior
+from vegglue.case.prior import log_prior, probability, quantile, sample_prior
+from vegglue.case.prior_tails import share_below
 from vegglue.case.schema import Parameter
 
 PRIORS = {
@@ -30,6 +32,30 @@ EXACT = [
 @pytest.mark.parametrize(("name", "probability", "expected"), EXACT)
 def test_quantiles_are_the_closed_form(name, probability, expected):
     assert quantile(PRIORS[name], probability) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+TAILS = PRIORS | {
+    "above": Parameter(distribution="normal", mean=0.5, sd=1.0, low=6.0, unit="-"),
+    "below": Parameter(distribution="normal", mean=0.5, sd=1.0, high=-5.0, unit="-"),
+}
+BY_SCIPY = {
+    "uniform": scipy.stats.uniform(0.01, 0.15 - 0.01),
+    "loguniform": scipy.stats.loguniform(0.01, 100),
+    "normal": scipy.stats.norm(2.66, 0.1),
+    "bounded": scipy.stats.truncnorm(-0.5, 1.5, loc=0.5, scale=1.0),
+    "lognormal": scipy.stats.lognorm(0.3, scale=0.8),
+    "above": scipy.stats.truncnorm(5.5, np.inf, loc=0.5, scale=1.0),
+    "below": scipy.stats.truncnorm(-np.inf, -5.5, loc=0.5, scale=1.0),
+}
+
+
+@pytest.mark.parametrize("name", TAILS)
+def test_what_lies_below_a_value_is_what_scipy_says(name):
+    prior = TAILS[name]
+    values = np.concatenate([quantile(prior, np.linspace(1e-6, 1 - 1e-6, 401)), [-1e3, -1.0, 0.0, 1.0, 1e3]])
+    expected = BY_SCIPY[name].cdf(values)
+    np.testing.assert_allclose(probability(prior, values), expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose([share_below(prior, float(x)) for x in values], expected, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", PRIORS)

@@ -2,15 +2,17 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
 from vegglue.case.parts import Interval, Value
-from vegglue.case.prior import quantile
+from vegglue.case.prior_tails import share_below
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Inflow, Stand, StandOverride
-from vegglue.effects.definition import Amplitude, Shape
-from vegglue.effects.library import library
 from vegglue.errors import shown_path
+
+if TYPE_CHECKING:
+    from vegglue.effects.definition import Amplitude, Shape
 
 # Names that dimensions of the result files have, and a variable in them must not.
 DIMENSIONS = ("chain", "draw", "member", "station", "experiment", "section")
@@ -92,7 +94,7 @@ def _values(case: Case) -> Iterator[Refusal]:
     for place, value, positive in values(case):
         if isinstance(value, str):
             yield from _unknown(place, value, case.parameters, "parameter")
-            if positive and quantile(case.parameters[value], LEAST_PROBABILITY) <= 0:
+            if positive and share_below(case.parameters[value], 0.0) >= LEAST_PROBABILITY:
                 complaint = f"may fall to 0 or below, but `{dotted(place)}` must be above 0: raise its lower bound"
                 yield Refusal(("parameters", value), complaint)
         elif value is not None and positive and value <= 0:
@@ -101,6 +103,10 @@ def _values(case: Case) -> Iterator[Refusal]:
 
 def _effects(case: Case) -> Iterator[Refusal]:
     """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
+    if not case.effects and case.effect_file is None:
+        return
+    from vegglue.effects.library import library  # which needs numpy
+
     known = library(case.effect_file)
     for key, entry in case.effects.items():
         place: KeyPath = ("effects", key)
@@ -124,12 +130,12 @@ def _unknown_word(place: KeyPath, word: str, known: Iterable[str]) -> Iterator[R
         yield Refusal(place, f"is no parameter of this effect: {nearest(word, names)}")
 
 
-def _in_support(case: Case, place: KeyPath, value: Value, parameter: Amplitude | Shape) -> Iterator[Refusal]:
+def _in_support(case: Case, place: KeyPath, value: Value, parameter: "Amplitude | Shape") -> Iterator[Refusal]:
     low, high = parameter.low, parameter.high
     if isinstance(value, str):
         if value in case.parameters:
-            ends = [quantile(case.parameters[value], p) for p in (LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)]
-            if not low <= min(ends) <= max(ends) <= high:
+            prior = case.parameters[value]
+            if share_below(prior, low) > LEAST_PROBABILITY or share_below(prior, high) < 1.0 - LEAST_PROBABILITY:
                 complaint = (
                     f"may leave {low:g} to {high:g} {parameter.unit}, where `{dotted(place)}` must lie: bound it"
                 )

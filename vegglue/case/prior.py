@@ -1,4 +1,7 @@
-"""Prior distributions: Sobol' points through their inverse distribution functions, and their density."""
+"""Prior distributions: Sobol' points through their inverse distribution functions, and their density.
+
+scipy.stats is imported where it is needed: it takes longer than all else that reads a case.
+"""
 
 import math
 from collections.abc import Mapping
@@ -6,7 +9,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.stats
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr, ndtri
 
@@ -35,7 +37,7 @@ def _truncated_normal(
 
     Where both bounds lie above the mean, the distribution is mirrored: A and B close to 1 would lose their digits.
     """
-    a, b = -math.inf if low is None else (low - mean) / sd, math.inf if high is None else (high - mean) / sd
+    a, b = _standard_bounds(mean, sd, low, high)
     if a > 0.0:
         mirrored = _truncated_normal(-mean, sd, None if high is None else -high, -low, 1.0 - share)  # type: ignore[operator]
         return np.asarray(-mirrored)
@@ -45,7 +47,28 @@ def _truncated_normal(
 
 def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
     """F(x) = P(X <= x) [-], the inverse of `quantile`; x in the unit of the prior."""
-    return np.asarray(_distribution(prior).cdf(value), dtype=np.float64)
+    number, x = _numbers(prior), np.asarray(value, dtype=np.float64)
+    if prior.distribution == "uniform":
+        return np.clip((x - number["low"]) / (number["high"] - number["low"]), 0.0, 1.0)
+    if prior.distribution == "loguniform":
+        low, high = np.log(number["low"]), np.log(number["high"])
+        return (np.log(np.clip(x, number["low"], number["high"])) - low) / (high - low)
+    if prior.distribution == "lognormal":
+        with np.errstate(divide="ignore"):  # Phi(-inf) = 0 is what lies below 0
+            return np.asarray(ndtr(np.log(np.maximum(x / number["median"], 0.0)) / number["log_sd"]))
+    a, b = _standard_bounds(number["mean"], number["sd"], prior.low, prior.high)
+    place = np.clip((x - number["mean"]) / number["sd"], a, b)
+    return np.asarray(_normal_mass(a, place) / _normal_mass(a, b))
+
+
+def _normal_mass(low: float, high: ArrayLike) -> NDArray[np.float64]:
+    """Phi(high) - Phi(low), from the tail in which both keep their digits; low <= high."""
+    return np.asarray(ndtr(-low) - ndtr(np.negative(high)) if low > 0.0 else ndtr(high) - ndtr(low))
+
+
+def _standard_bounds(mean: float, sd: float, low: float | None, high: float | None) -> tuple[float, float]:
+    """The bounds of a normal prior in standard deviations from its mean; infinite where there is none."""
+    return -math.inf if low is None else (low - mean) / sd, math.inf if high is None else (high - mean) / sd
 
 
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
@@ -62,7 +85,9 @@ def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64
     The first points of a longer sequence are the same, because it is drawn up to the next power of two.
     Source: Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
     """
-    sequence = scipy.stats.qmc.Sobol(parameters, scramble=True, seed=seed)
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(parameters, scramble=True, seed=seed)
     points = sequence.random_base2(math.ceil(math.log2(members)))[:members]
     return np.clip(points, SMALLEST_PROBABILITY, 1.0 - SMALLEST_PROBABILITY)
 
@@ -78,6 +103,8 @@ def log_prior(parameters: Mapping[str, Parameter], theta: Mapping[str, ArrayLike
 
 @lru_cache(maxsize=256)  # scipy takes a millisecond to make one
 def _distribution(prior: Parameter) -> Any:
+    import scipy.stats
+
     number = _numbers(prior)
     if prior.distribution == "uniform":
         return scipy.stats.uniform(number["low"], number["high"] - number["low"])
@@ -86,9 +113,7 @@ def _distribution(prior: Parameter) -> Any:
     if prior.distribution == "lognormal":
         return scipy.stats.lognorm(number["log_sd"], scale=number["median"])
     mean, sd = number["mean"], number["sd"]
-    low = -math.inf if prior.low is None else (prior.low - mean) / sd
-    high = math.inf if prior.high is None else (prior.high - mean) / sd
-    return scipy.stats.truncnorm(low, high, loc=mean, scale=sd)
+    return scipy.stats.truncnorm(*_standard_bounds(mean, sd, prior.low, prior.high), loc=mean, scale=sd)
 
 
 def _numbers(prior: Parameter) -> dict[str, float]:
