@@ -31,12 +31,12 @@ def imported(name: str, folder: Path) -> Case:
 
 def looked_into(name: str, folder: Path) -> Diagnosis:
     """What is said of an open case; read where it has been said in this folder before."""
-    return diagnose(imported(name, folder), runs=folder / "runs", say=print)
+    return diagnose(imported(name, folder), runs=folder / "runs", watch=print)
 
 
 def extended(name: str, folder: Path) -> StepwiseExtension:
     """An open case with what its diagnosis names, which is read where there is one in this folder."""
-    return extend_stepwise(imported(name, folder), runs=folder / "runs", say=print)
+    return extend_stepwise(imported(name, folder), runs=folder / "runs", watch=print)
 
 
 def assert_better(grown: StepwiseExtension, added: int) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
+from itertools import count
 from threading import Semaphore
 from typing import Any
 
@@ -19,6 +20,7 @@ from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import threadpool_limits
 
 from vegglue.errors import InputError
+from vegglue.progress import silent
 
 # Threads that may be begun beside those at work, in what is done within `at_most`.
 _SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
@@ -41,22 +43,27 @@ def at_most(jobs: int) -> Iterator[None]:
         _SPARE.reset(token)
 
 
-def in_threads(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]) -> list[Any]:
+def in_threads(
+    work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
+) -> list[Any]:
     """work(*task) for every task, in their order, by threads: for compiled work on large values that all share.
 
     Tasks that are split into tasks of their own share the threads that `at_most` allows, all cores without it.
+    finished: is told how many are done, each time another one is.
     """
     spare = _SPARE.get()
     if spare is None:
         with at_most(-1):
-            return in_threads(work, tasks)
+            return in_threads(work, tasks, finished)
     with threadpool_limits(1):
-        return _shared_out(work, list(tasks), spare)
+        return _shared_out(work, list(tasks), spare, finished)
 
 
-def _shared_out(work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: Semaphore) -> list[Any]:
+def _shared_out(
+    work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: Semaphore, finished: Callable[[int], None]
+) -> list[Any]:
     """Tasks taken one by one, by this thread and by as many others as are spare while some wait."""
-    waiting, found = deque(enumerate(tasks)), [None] * len(tasks)
+    waiting, found, ends = deque(enumerate(tasks)), [None] * len(tasks), count(1)
 
     def take_next() -> bool:
         try:
@@ -64,6 +71,7 @@ def _shared_out(work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: S
         except IndexError:
             return False
         found[position] = work(*task)
+        finished(next(ends))
         return True
 
     def by_another() -> None:

@@ -1,4 +1,4 @@
-"""How a long command tells how far it is."""
+"""How a long command tells how far it is: what it does, and how much of that is done where it is counted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,18 +6,35 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the ensemble of a case is: members solved of all, failed among them, there from an earlier run."""
+    """What a long command does now. total: how many there are to do, None where nothing is counted.
 
-    name: str
-    solved: int
-    members: int
-    failed: int
-    resumed: int
+    unit: what is counted; failed: those of the done that failed; resumed: those that an earlier run had done.
+    """
+
+    phase: str
+    done: int = 0
+    total: int | None = None
+    unit: str = ""
+    failed: int = 0
+    resumed: int = 0
+
+    def __str__(self) -> str:
+        """As one line: 'solving brook: 128 of 256 members (64 from before), 1 failed'."""
+        if self.total is None:
+            return self.phase
+        resumed = f" ({self.resumed:,} from before)" if self.resumed else ""
+        failed = f", {self.failed:,} failed" if self.failed else ""
+        return f"{self.phase}: {self.done:,} of {self.total:,} {self.unit}".rstrip() + resumed + failed
 
 
-Say = Callable[[str], None]
 Watch = Callable[[Progress], None]
 
 
 def silent(_: object) -> None:
-    """Says nothing: what is heard of a long command unless it is given something to say it to."""
+    """Says nothing: what is heard of a long command unless it is given someone who watches."""
+
+
+def counted(watch: Watch, phase: str, total: int, unit: str = "") -> Callable[[int], None]:
+    """What tells of a phase each time one more of `total` is done; none is at first, which is told at once."""
+    watch(Progress(phase, 0, total, unit))
+    return lambda done: watch(Progress(phase, done, total, unit))

@@ -236,17 +236,17 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
     chunks = []
 
     def fill_up(handle: int) -> None:
-        if chunks[-1].solved >= CHUNK:
+        if chunks[-1].done >= CHUNK:
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
         patch.setattr("vegglue.storage.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
         with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* run the same command again"):
             solve_ensemble(case, observations, path, 1, chunks.append)
-    assert [progress.solved for progress in chunks] == [0, CHUNK]
+    assert [progress.done for progress in chunks] == [0, CHUNK]
     again = []
     solve_ensemble(case, observations, path, 1, again.append)
-    assert (again[0].resumed, again[-1].solved) == (CHUNK, CHUNKS * CHUNK)
+    assert (again[0].resumed, again[-1].done) == (CHUNK, CHUNKS * CHUNK)
     assert (read_ensemble(path).status == SOLVED_BY_NEWTON).all()
 
 

@@ -84,8 +84,8 @@ def climb(path: Path, title: str, runs: Path, jobs: int, again: int = 1) -> tupl
     model is diagnosed in its turn.
     """
     case = load_case(path)
-    found = diagnose(case, runs=runs, jobs=jobs, say=print)
-    grown = extend_stepwise(case, runs=runs, jobs=jobs, say=print)
+    found = diagnose(case, runs=runs, jobs=jobs, watch=print)
+    grown = extend_stepwise(case, runs=runs, jobs=jobs, watch=print)
     titles = [", ".join([title, *_added(case, one)]) for one in grown.cases]
     rows = [row_of(name, one, runs) for name, one in zip(titles, grown.cases, strict=True)]
     said = [f"**{title}** ({found.verdict.kind}): {grown.sentence}", grown.reason]

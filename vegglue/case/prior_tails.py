@@ -1,4 +1,4 @@
-"""How much of a prior lies below a value: one number by the standard library alone, so that a case is refused at once."""
+"""How much of a prior lies below a value, by the standard library alone: a case is refused without waiting for more."""
 
 import math
 

@@ -2,8 +2,13 @@
 
 To add a command, write a function `NAME_command` in the file of its group (`ensemble_commands`, `loop_commands`,
 `effect_commands`, `twin_commands`), with options from `options.py` where they mean the same, and list it in COMMANDS of
-`main.py`. What it does belongs into `workflow`, what it prints as a table into `tables.py`; README lists it.
+`main.py`. What it does belongs into `workflow`; what it prints into `words.py` and, for `--json`, `objects.py`; README
+lists it.
 
-May import: case, effects, measurements, solver, results, diagnosis, report_page, workflow.
+Help and a refused config come at once, since files of commands import nothing heavy at their top: verbs are called as
+`vegglue.NAME`, which imports them then, and all else that needs numpy is imported in the function that needs it.
+`tests/cli/test_startup.py` holds that.
+
+May import: case, effects, measurements, solver, inference, results, diagnosis, figures, report_page, workflow.
 Open first: main.py, ensemble_commands.py.
 """

@@ -1,21 +1,19 @@
 """The shell of the library of effects: list it, show one, check a file of one's own."""
 
-import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vegglue.case.config import load_case
-from vegglue.case.messages import nearest
-from vegglue.case.schema import Case
-from vegglue.cli.options import Json, Runs, console
-from vegglue.effects.definition import Effect
-from vegglue.effects.library import library
+import vegglue
+from vegglue.cli.hearing import heard
+from vegglue.cli.options import Json, Quiet, Runs
+from vegglue.cli.output import print_object
 from vegglue.errors import InputError
-from vegglue.report_page.effect_page import by_stage, effect_in_words, effect_json, work_in_case
-from vegglue.workflow.check import check_effects
-from vegglue.workflow.diagnose import draw_fingerprint_of
+
+if TYPE_CHECKING:
+    from vegglue.case.schema import Case
+    from vegglue.effects.definition import Effect
 
 
 def effects_command(
@@ -25,6 +23,7 @@ def effects_command(
     config: Annotated[Path | None, typer.Option(help="Say also what this case does with it.")] = None,
     check: Annotated[Path | None, typer.Option(help="Check the effects of a Python file of your own.")] = None,
     as_object: Json = False,
+    quiet: Quiet = False,
     trust: Annotated[bool, typer.Option("--trust", help="Run the Python file of effects that is named.")] = False,
     runs: Runs = Path("runs"),
 ) -> None:
@@ -32,46 +31,63 @@ def effects_command(
     if check is not None:
         _check(check, as_object, trust)
         return
-    case = load_case(config, trust) if config is not None else None
+    case = vegglue.load_case(config, trust) if config is not None else None
+    from vegglue.case.messages import nearest
+    from vegglue.effects.library import library
+
     known = library(case.effect_file if case is not None else None)
     if name is None:
         _list(tuple(known.values()), as_object)
-    elif name in known:
+    elif name not in known:
+        raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
+    else:
         _show(known[name], case, as_object)
         if case is not None and case.observations and not as_object:
-            console.print(f"Fingerprint drawn in {draw_fingerprint_of(case, known[name], runs=runs)}")
-    else:
-        raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
+            _draw(case, known[name], runs, quiet)
 
 
-def _list(known: tuple[Effect, ...], as_object: bool) -> None:
+def _list(known: "tuple[Effect, ...]", as_object: bool) -> None:
+    from vegglue.report_page.effect_page import by_stage, effect_json
+
     if as_object:
-        print(json.dumps([effect_json(effect) for effect in known], ensure_ascii=False))
+        print_object([effect_json(effect) for effect in known])
         return
     for heading, effects in by_stage(known):
-        console.print(heading)
+        print(heading)
         for effect in effects:
-            console.print(f"  {effect.name:<22}{effect.title}")
+            print(f"  {effect.name:<22}{effect.title}")
 
 
-def _show(effect: Effect, case: Case | None, as_object: bool) -> None:
+def _show(effect: "Effect", case: "Case | None", as_object: bool) -> None:
+    from vegglue.report_page.effect_page import effect_in_words, effect_json, work_in_case
+
     doing = list(work_in_case(case, effect)) if case is not None else []
     if as_object:
-        print(json.dumps(effect_json(effect) | ({"case": doing} if case is not None else {}), ensure_ascii=False))
+        print_object(effect_json(effect) | ({"case": doing} if case is not None else {}))
         return
     for line in (*effect_in_words(effect), *doing):
-        console.print(line)
+        print(line)
+
+
+def _draw(case: "Case", effect: "Effect", runs: Path, quiet: bool) -> None:
+    from vegglue.workflow.diagnose import draw_fingerprint_of
+
+    with heard(quiet, as_object=False) as watch:
+        picture = draw_fingerprint_of(case, effect, runs=runs, watch=watch)
+    print(f"Fingerprint drawn in {picture}")
 
 
 def _check(file: Path, as_object: bool, trust: bool) -> None:
+    from vegglue.workflow.check import check_effects
+
     found = check_effects(file, trust=trust)
     if as_object:
-        print(json.dumps(found, ensure_ascii=False))
+        print_object(found)
     else:
         for name, sentences in found.items():
-            console.print(f"{name}: {'keeps the contract' if not sentences else 'breaks it'}")
+            print(f"{name}: {'keeps the contract' if not sentences else 'breaks it'}")
             for sentence in sentences:
-                console.print(f"  - {sentence}")
+                print(f"  - {sentence}")
     broken = [name for name, sentences in found.items() if sentences]
     if broken:
         raise InputError(f"{file}: {len(broken)} of {len(found)} effects break the contract: {', '.join(broken)}.")

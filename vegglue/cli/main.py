@@ -14,54 +14,52 @@ from vegglue.cli.loop_commands import (
     import_command,
     next_command,
 )
-from vegglue.cli.options import console
 from vegglue.cli.twin_commands import reveal_command, twin_command
 from vegglue.errors import InputError, StorageError
-from vegglue.parallel import one_thread
 from vegglue.version import VERSION
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
 
 @app.callback()
 def about() -> None:
     """Calibrate a model of flow through plants against measured velocities, and see where it fails.
 
-    check, then run, or its steps: simulate, infer, diagnose, extend, compare, next, report. Every command takes the
-    same CONFIG and works in runs/<name>.
+    Begin with check, then run, or take its steps one by one; all work in runs/<name>.
     """
 
 
 def version_command() -> None:
     """Print the version."""
-    console.print(VERSION)
+    print(VERSION)
 
 
-COMMANDS: dict[str, Callable[..., None]] = {
-    "version": version_command,
-    "check": check_command,
-    "simulate": simulate_command,
-    "infer": infer_command,
-    "report": report_command,
-    "run": run_command,
-    "import": import_command,
-    "diagnose": diagnose_command,
-    "extend": extend_command,
-    "compare": compare_command,
-    "next": next_command,
-    "twin": twin_command,
-    "reveal": reveal_command,
-    "effects": effects_command,
+# By group, in the order in which they are used.
+COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
+    "Begin": {"import": import_command, "check": check_command, "run": run_command},
+    "The loop": {
+        "diagnose": diagnose_command,
+        "extend": extend_command,
+        "compare": compare_command,
+        "next": next_command,
+    },
+    "Ensemble": {"simulate": simulate_command, "infer": infer_command, "report": report_command},
+    "More": {
+        "effects": effects_command,
+        "twin": twin_command,
+        "reveal": reveal_command,
+        "version": version_command,
+    },
 }
-for _name, _command in COMMANDS.items():
-    app.command(name=_name)(_command)
+for _group, _commands in COMMANDS.items():
+    for _name, _command in _commands.items():
+        app.command(name=_name, rich_help_panel=_group)(_command)
 
 
 def main() -> None:
     """Entry point: errors a user can mend are one sentence and exit code 2, a full disk or a lock 3, Ctrl-C 130."""
     try:
-        with one_thread():
-            app()
+        app()
     except InputError as error:
         print(error, file=sys.stderr)
         sys.exit(2)

@@ -1,15 +1,14 @@
-"""Results as they are printed: tables and sentences for a reader, objects for `--json`."""
+"""The tables of a diagnosis, of the error ladder, and of measurements to be made, as they are printed."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from vegglue.cli.options import console
+from vegglue.cli.output import console
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
-from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth
+from vegglue.diagnosis.next_measurement import SEPARATES
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.compare import Comparison
@@ -18,10 +17,10 @@ from vegglue.workflow.next_measurement import Question
 
 def show_diagnosis(found: Diagnosis) -> None:
     """The verdict and its sentence, remarks, the ten strongest suspects as a table, stations set aside."""
-    console.print(found.verdict.kind, style="bold", end=": ")
-    console.print(found.verdict.sentence)
+    console().print(found.verdict.kind, style="bold", end=": ")
+    console().print(found.verdict.sentence)
     for remark in found.verdict.remarks:
-        console.print(f"- {remark}")
+        console().print(f"- {remark}")
     table = Table(box=None, pad_edge=False, header_style="bold")
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
     for heading in headings:
@@ -36,15 +35,15 @@ def show_diagnosis(found: Diagnosis) -> None:
             one.name, share, f"{amplitude.value:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{test.score:+.1f}",
             p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
         )  # fmt: skip
-    console.print(table)
+    console().print(table)
     for off in found.instruments:
         at = ", ".join(f"{name} = {value:g}" for name, value in (("x", off.x), ("y", off.y)) if np.isfinite(value))
-        console.print(f"- set aside: the {off.kind} at {at} m, {len(off.stations)} reading(s)")
+        console().print(f"- set aside: the {off.kind} at {at} m, {len(off.stations)} reading(s)")
     of_instruments = {row for off in found.instruments for row in off.stations}
     for row in [row for row in found.errors.flagged if row not in of_instruments]:
         station = found.predictions.station.iloc[row]
         place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
-        console.print(f"- set aside: {place}, measured {station['value']:g}")
+        console().print(f"- set aside: {place}, measured {station['value']:g}")
 
 
 def show_ladder(found: Comparison) -> None:
@@ -66,18 +65,18 @@ def show_ladder(found: Comparison) -> None:
             f"{held_out_rmse(one):.4f}", gain, f"{held_out_rmse(one, 'experiments'):.4f}",
             f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}", f"{one.validation:.4f}",
         )  # fmt: skip
-    console.print(table)
+    console().print(table)
     if rungs:
-        console.print(
+        console().print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
             f"{rungs[-1].in_sample.noise_floor:.4f} m/s."
         )
     if note:
-        console.print(note)
+        console().print(note)
     for one in rungs:
         moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < 0.01]
         if moving:
-            console.print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
+            console().print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
 
 
 def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
@@ -89,32 +88,16 @@ def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
 def show_questions(found: Sequence[Question]) -> None:
     """For each question the four best measurements, or why none would do."""
     if not found:
-        console.print("Nothing is left to be told apart; no further measurement is proposed.")
+        console().print("Nothing is left to be told apart; no further measurement is proposed.")
     for question in found:
         what, worths = question.tells_apart, question.measurements
         useful = [one for one in worths if one.then >= SEPARATES and one.then > 1.1 * one.now]
         if not useful:
             best = max(worths, key=lambda one: one.then, default=None)
             most = f" (D2 at most {best.then:.2g}: {best.plan.name})" if best else ""
-            console.print(f"To tell {what}: none of {len(worths)} measurements would by itself{most}.")
+            console().print(f"To tell {what}: none of {len(worths)} measurements would by itself{most}.")
             continue
-        console.print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
+        console().print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
         for one in useful[:4]:
             plan = one.plan
-            console.print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
-
-
-def question_json(question: Question) -> dict[str, Any]:
-    """What is to be told apart, and the measurements that could."""
-    return {
-        "tells_apart": question.tells_apart,
-        "measurements": [_worth_json(one) for one in question.measurements],
-    }
-
-
-def _worth_json(one: MeasurementWorth) -> dict[str, Any]:
-    plan = one.plan
-    return {
-        "name": plan.name, "experiment": plan.experiment, "x": plan.x, "stations": int(plan.rows.size),
-        "hours": plan.hours, "now": one.now, "then": one.then, "gain_per_hour": one.per_hour,
-    }  # fmt: skip
+            console().print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")

@@ -5,11 +5,10 @@ from typing import Annotated
 
 import typer
 
-from vegglue.case.config import load_case
-from vegglue.cli.options import Runs, console
+import vegglue
+from vegglue.cli.options import Json, Quiet, Runs
+from vegglue.cli.output import print_object
 from vegglue.errors import shown_path
-from vegglue.measurements.observations import read_observations
-from vegglue.workflow.twin import make_twin, reveal
 
 
 def twin_command(
@@ -22,19 +21,33 @@ def twin_command(
     snr: Annotated[float, typer.Option(min=0.1, help="How visible an effect without a size is made.")] = 6.0,
     noise: Annotated[str, typer.Option(help="white, ar1:0.5 or understated:1.5.")] = "white",
     seed: Annotated[int, typer.Option(min=0, help="Decides parameters, errors and what `?` is.")] = 1,
+    as_object: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Make measurements with a hidden effect, to play blind against `diagnose`; the answer is sealed."""
-    case = make_twin(load_case(config), to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed)
+    parent = vegglue.load_case(config)
+    case = vegglue.make_twin(parent, to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed)
+    from vegglue.measurements.observations import read_observations
+
     target = shown_path(case.source)
     measurements = int(read_observations(case).table["used"].sum())
-    console.print(f"{target}: {measurements} measurements. Next: vegglue diagnose {target}, then")
-    console.print(f"vegglue reveal {to}")
+    if as_object:
+        print_object({"config": target, "folder": to, "measurements": measurements})
+        return
+    print(f"{target}: {measurements} measurements.")
+    if not quiet:
+        print(f"Next: vegglue diagnose {target}, then vegglue reveal {to}")
 
 
 def reveal_command(
     folder: Annotated[Path, typer.Argument(help="Folder that `vegglue twin` made.", show_default=False)],
     runs: Runs = Path("runs"),
+    as_object: Json = False,
 ) -> None:
     """Open the seal of a twin, and say how well its diagnosis guessed."""
-    for line in reveal(folder, runs=runs):
-        console.print(f"- {line}")
+    lines = vegglue.reveal(folder, runs=runs)
+    if as_object:
+        print_object({"folder": folder, "sentences": lines})
+        return
+    for line in lines:
+        print(f"- {line}")

@@ -20,7 +20,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
-from vegglue.progress import Say
+from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import place_candidate
 from vegglue.screening.evidence import HypothesisKind, log_factors, prior_shrinkage
 from vegglue.screening.instruments import Instrument
@@ -54,7 +54,7 @@ class Contender:
     what: Refit | Instrument
 
 
-def contenders_of(screening: Screening, say: Say) -> list[Contender]:
+def contenders_of(screening: Screening, watch: Watch) -> list[Contender]:
     """Everything that was tried, most evidence first."""
     by_name, second = {kind.name: kind for kind in screening.kinds}, second_look(screening)
     linear = _linear_evidence(by_name["effect"], second)
@@ -64,10 +64,10 @@ def contenders_of(screening: Screening, say: Say) -> list[Contender]:
     spots = [(one, spot) for one in places for spot in _promising_spots(one, by_name[one.term], best)]
     candidates = screening.fingerprints.candidates
     names = [candidates[j].name for j in effects] + [f"{one.term} at a place" for one in places]
-    say(f"refitting with {', '.join(names)}")
+    watch(Progress(f"comparing {', '.join(names)}"))
     trials = [_effect_trial(screening, j, linear, second) for j in effects]
     trials += [_place_trial(screening, one, spot) for one, spot in spots]
-    refits = refits_of(screening.search, trials)
+    refits = refits_of(screening.search, trials, watch)
     found = _instrument_contenders(screening)
     for j, refit in zip(effects, refits, strict=False):
         if refit is not None:

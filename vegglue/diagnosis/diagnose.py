@@ -33,7 +33,7 @@ from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.interface import Model
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import in_threads
-from vegglue.progress import Say, silent
+from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.screening.candidates import candidate_in_case
 from vegglue.screening.evidence import alarm_p
@@ -62,15 +62,15 @@ class Following:
     screening: Screening | None = None
 
 
-def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None) -> Diagnosis:
+def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = None) -> Diagnosis:
     """Find out what a calibrated model lacks, from a start that hangs on nothing but the case and its data.
 
     unseen: the model at measurements that no calibration sees, which silence has to agree with.
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    say("calibrating the model as it is")
+    watch(Progress("calibrating the model as it is"))
     base = baseline(model)
-    say("looking for what is missing")
+    watch(Progress("looking for what is missing"))
     first = screening = screen(base)
     found, suspects = Findings(absurd=tuple(absurd_values(model.case, model.site, model.station))), dict[str, Suspect]()
     while True:
@@ -79,20 +79,20 @@ def diagnose_model(model: Model, say: Say = silent, unseen: Model | None = None)
         found = _with_alarm(screening, found)
         if found.absurd or not found.alarmed:
             break
-        contenders = contenders_of(screening, say)
+        contenders = contenders_of(screening, watch)
         suspects |= _calibrated(contenders, tested)
-        following = _following(screening, contenders, found, say)
+        following = _following(screening, contenders, found, watch)
         if following is None:
             found = replace(found, undecided=tuple(contenders))
             break
         more, base = following.found.accepted > found.accepted, following.base
         found = following.found
         if more:
-            base, steps = with_rivals_again(base, found.steps, suspects, say)
+            base, steps = with_rivals_again(base, found.steps, suspects, watch)
             found = replace(found, steps=steps)
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
-        say("looking for what is missing with it")
+        watch(Progress("looking for what is missing with it"))
         at_hand = following.screening if base is following.base else None
         screening = at_hand or screen(base, found.flagged)
     return concluded(first, screening, found, suspects, unseen)
@@ -104,7 +104,9 @@ def _with_alarm(screening: Screening, found: Findings) -> Findings:
     return replace(found, p=alarm_p(screening.kinds, screening.errors, 1, slack), rate=rate)
 
 
-def _following(screening: Screening, contenders: Sequence[Contender], found: Findings, say: Say) -> Following | None:
+def _following(
+    screening: Screening, contenders: Sequence[Contender], found: Findings, watch: Watch
+) -> Following | None:
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
@@ -113,7 +115,7 @@ def _following(screening: Screening, contenders: Sequence[Contender], found: Fin
     chance = chances_of(contenders)
     odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
     rivals = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
-    branches = in_threads(_branch, [(screening, contenders, j, found, say) for j in rivals])
+    branches = in_threads(_branch, [(screening, contenders, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
         return possible[0][1] if possible else None
@@ -146,21 +148,21 @@ def _prospect(one: Following, found: Findings) -> float:
 
 
 def _branch(
-    screening: Screening, contenders: Sequence[Contender], j: int, found: Findings, say: Say
+    screening: Screening, contenders: Sequence[Contender], j: int, found: Findings, watch: Watch
 ) -> Following | None:
     """What is found with one contender, and the model that follows; None when there are enough, or no flow with it."""
     one = contenders[j]
     if isinstance(one.what, Instrument):
         enough = len(found.instruments) == MOST_INSTRUMENTS
-        return None if enough else _without_instrument(screening, one, one.what, found, say)
-    return None if found.accepted == MOST_ACCEPTED else _with_accepted(screening, contenders, j, one.what, found, say)
+        return None if enough else _without_instrument(screening, one, one.what, found, watch)
+    return None if found.accepted == MOST_ACCEPTED else _with_accepted(screening, contenders, j, one.what, found, watch)
 
 
 def _without_instrument(
-    screening: Screening, best: Contender, instrument: Instrument, found: Findings, say: Say
+    screening: Screening, best: Contender, instrument: Instrument, found: Findings, watch: Watch
 ) -> Following:
     """One instrument set aside, and the model calibrated without what its readings share."""
-    say(f"setting aside a {best.kind} that is off")
+    watch(Progress(f"setting aside a {best.kind} that is off"))
     base, readings = screening.base, instrument.readings
     noise = with_offset(base.noise, np.array(readings))
     flagged = (*found.flagged, *(row for row in readings if row not in found.flagged))
@@ -172,7 +174,7 @@ def _without_instrument(
 
 
 def _with_accepted(
-    screening: Screening, contenders: Sequence[Contender], j: int, refit: Refit, found: Findings, say: Say
+    screening: Screening, contenders: Sequence[Contender], j: int, refit: Refit, found: Findings, watch: Watch
 ) -> Following | None:
     """An effect or place accepted, and the model with it; None when it explains less than nothing does, has so many
     rivals that they say nothing, or no flow is found with it.
@@ -180,7 +182,7 @@ def _with_accepted(
     one = contenders[j]
     if one.log_evidence < 0.0:
         return None
-    say(f"calibrating with {one.name}")
+    watch(Progress(f"calibrating with {one.name}"))
     further = calibrated_with(screening.base, refit)
     if further is None:
         return None
@@ -197,7 +199,7 @@ def _with_accepted(
     step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None
-    further, unneeded = pruned(further, [one.accepted for one in found.steps], say)
+    further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
     return Following(replace(found, steps=(*kept, step)), further)
 

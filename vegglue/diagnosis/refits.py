@@ -25,7 +25,7 @@ from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise
 from vegglue.parallel import in_threads
-from vegglue.progress import Say
+from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import Suspect
 from vegglue.screening.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 
@@ -62,11 +62,11 @@ class Refit:
         return replace(suspect, shapes=dict(self.shapes), amplitude=amplitude)
 
 
-def refits_of(search: SearchModel, trials: Sequence[RefitTrial]) -> list[Refit | None]:
+def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:
     """Each trial refitted, side by side; None where no flow is found."""
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
     tasks = [(search, trial, start) for trial in trials for start in trial.starts]
-    ends = iter(in_threads(_refitted, tasks))
+    ends = iter(in_threads(_refitted, tasks, counted(watch, "refitting with each", len(tasks), "refits")))
     found: list[Refit | None] = []
     for trial in trials:
         fits = [end for end in [next(ends) for _ in trial.starts] if end is not None]
@@ -118,7 +118,7 @@ def _with(model: Model, tried: RefitTrial | Refit) -> Model:
 NEEDED = 2.0
 
 
-def pruned(base: Baseline, earlier: list[str], say: Say) -> tuple[Baseline, list[str]]:
+def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, list[str]]:
     """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
     unneeded: list[str] = []
     for name in earlier:
@@ -128,7 +128,7 @@ def pruned(base: Baseline, earlier: list[str], say: Say) -> tuple[Baseline, list
         off = z_of(base.model.case.parameters[one.parameter], one.effect.amplitude.off)
         if abs(base.fitted.point.z[j] - off) > NEEDED * spread:
             continue
-        say(f"{name} is no longer needed")
+        watch(Progress(f"{name} is no longer needed"))
         fewer = without_effect(base, one)
         if fewer is not None:
             base, unneeded = fewer, [*unneeded, name]

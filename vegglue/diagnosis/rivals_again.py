@@ -12,26 +12,26 @@ from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.diagnosis.competition import tempered_chances
 from vegglue.diagnosis.refits import Refit, RefitTrial, calibrated_with, refits_of, start_with, without_effect
 from vegglue.diagnosis.rivals import with_chances
-from vegglue.progress import Say
+from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening.candidates import candidate_in_case, candidates_of
 
 
 def with_rivals_again(
-    base: Baseline, steps: Sequence[Step], suspects: Mapping[str, Suspect], say: Say
+    base: Baseline, steps: Sequence[Step], suspects: Mapping[str, Suspect], watch: Watch
 ) -> tuple[Baseline, tuple[Step, ...]]:
     """The model with the best rival of every step but the last, and the steps with the chances as they are now."""
     kept: list[Step] = []
     for step in steps[:-1]:
-        found = _again(base, step, suspects, say) if len(step.rivals) > 1 else None
+        found = _again(base, step, suspects, watch) if len(step.rivals) > 1 else None
         base, step = found or (base, step)
         kept.append(step)
     return base, (*kept, *steps[-1:])
 
 
-def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], say: Say) -> tuple[Baseline, Step] | None:
+def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], watch: Watch) -> tuple[Baseline, Step] | None:
     """One step; None when no flow is found without its effect, or with any of its rivals."""
-    say(f"comparing {', '.join(step.rivals)} again")
+    watch(Progress(f"comparing {', '.join(step.rivals)} again"))
     own = candidate_in_case(base.model.case, step.accepted)
     less = without_effect(base, own)
     if less is None:

@@ -63,13 +63,13 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     with ensemble_writer(path, header) as writer:
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
-        solved, failed = resumed, 0
-        watch(Progress(case.name, solved, header.members, failed, resumed))
+        solved, failed, phase = resumed, 0, f"solving {case.name}"
+        watch(Progress(phase, solved, header.members, "members", failed, resumed))
         for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + members_with(rows["status"], FAILED)
-            watch(Progress(case.name, solved, header.members, failed, resumed))
+            watch(Progress(phase, solved, header.members, "members", failed, resumed))
 
 
 def chunk_size(members: int) -> int:

@@ -17,6 +17,7 @@ from vegglue.arrays import Array
 from vegglue.inference.emulator import Emulator, fit_emulator
 from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weights
 from vegglue.inference.weighted_statistics import effective_size
+from vegglue.progress import silent
 
 # Rounds at most, draws of the first, and of any other at most. Chosen, not measured: they bound the runs of the model
 # (6,336 at most), and a larger first round makes a better emulator of a proposal that may be poor.
@@ -42,10 +43,18 @@ class Sample:
     effective: tuple[float, ...]
 
 
-def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float, seed: int) -> Sample:
+def sample(
+    predict: Predict,
+    density: LogDensity,
+    start: Mixture,
+    wanted: int,
+    seed: int,
+    finished: Callable[[int], None] = silent,
+) -> Sample:
     """Draws until `wanted` of them are effective, or SAMPLING_ROUNDS are over.
 
-    predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,).
+    predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,); finished: is told how many
+    of those wanted are effective after each round.
     """
     points = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
     mixture, size = start, FIRST_DRAWS
@@ -62,6 +71,7 @@ def sample(predict: Predict, density: LogDensity, start: Mixture, wanted: float,
         weights = pooled_weights(logs, z, rounds)
         drawn.append(len(z))
         effective.append(effective_size(weights))
+        finished(min(int(effective[-1]), wanted))
         if effective[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
             return Sample(z, values, logs, weights, tuple(drawn), tuple(effective))
         last = effective_size(pooled_weights(parts[-1][2], new, rounds[-1:])) / size

@@ -19,6 +19,7 @@ from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
 from vegglue.parallel import in_threads
+from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.screening.residual_screening import screen
 
@@ -37,16 +38,16 @@ class FoundModes:
     starts: int
 
 
-def find_modes(model: Model, noise: Noise, ensemble: Ensemble) -> FoundModes:
+def find_modes(model: Model, noise: Noise, ensemble: Ensemble, watch: Watch = silent) -> FoundModes:
     """The modes of the posterior under given errors.
 
     Errors: InputError when no steady flow is found from any of the members.
     """
     starts = starting_points(noise, z_at(model.case, ensemble.parameters), ensemble.prediction)
     coarse = coarser(model)
-    ends = _fit_all(coarse or model, noise, starts)
+    ends = _fit_all(coarse or model, noise, starts, watch)
     if coarse is not None:
-        ends = _refine_all(model, coarse, noise, ends)
+        ends = _refine_all(model, coarse, noise, ends, watch)
     if not ends:
         raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
     return FoundModes(tuple(ends), len(starts))
@@ -70,10 +71,10 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
     return np.asarray(z[chosen])
 
 
-def _fit_all(model: Model, noise: Noise, starts: Array) -> list[MapEstimate]:
-    return distinct_modes(
-        [end for end in in_threads(_fit_from, [(model, noise, z) for z in starts]) if end is not None]
-    )
+def _fit_all(model: Model, noise: Noise, starts: Array, watch: Watch) -> list[MapEstimate]:
+    finished = counted(watch, "following the best members downhill", len(starts), "members")
+    ends = in_threads(_fit_from, [(model, noise, z) for z in starts], finished)
+    return distinct_modes([end for end in ends if end is not None])
 
 
 def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
@@ -81,8 +82,9 @@ def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
     return None if start is None else fit(model, noise, start)
 
 
-def _refine_all(model: Model, coarse: Model, noise: Noise, ends: list[MapEstimate]) -> list[MapEstimate]:
-    finer = in_threads(_refine, [(model, coarse, noise, end) for end in ends])
+def _refine_all(model: Model, coarse: Model, noise: Noise, ends: list[MapEstimate], watch: Watch) -> list[MapEstimate]:
+    finished = counted(watch, "refining modes on the cells of the case", len(ends), "modes")
+    finer = in_threads(_refine, [(model, coarse, noise, end) for end in ends], finished)
     return distinct_modes([end for end in finer if end is not None])
 
 
@@ -135,7 +137,7 @@ class ModesAndErrors:
     grid_error_known: bool
 
 
-def modes_and_errors(model: Model, ensemble: Ensemble, rule: str) -> ModesAndErrors:
+def modes_and_errors(model: Model, ensemble: Ensemble, rule: str, watch: Watch = silent) -> ModesAndErrors:
     """The modes from the best members of an ensemble; then the errors, and the modes under these.
 
     rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
@@ -144,7 +146,8 @@ def modes_and_errors(model: Model, ensemble: Ensemble, rule: str) -> ModesAndErr
     Errors: InputError when a standard error is missing (known) or no flow is found.
     """
     noise = _initial_noise(model, ensemble, rule)
-    modes = find_modes(model, noise, ensemble)
+    modes = find_modes(model, noise, ensemble, watch)
+    watch(Progress("estimating the errors"))
     fits, coarse = list(modes.fits), coarser(model)
     on_coarse = None if coarse is None else linearise(coarse, fits[0].point.z)
     if rule == "known":

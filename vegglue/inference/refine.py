@@ -27,7 +27,7 @@ from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.refinement_summary import precision_of, refinement_of
 from vegglue.inference.student_mixture import Mixture, mixture_at_modes
 from vegglue.measurements.observations import Observations
-from vegglue.progress import Say
+from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
 from vegglue.version import VERSION
@@ -36,19 +36,19 @@ from vegglue.version import VERSION
 EFFECTIVE_DRAWS = 1000
 
 
-def refine(ensemble: Ensemble, case: Case, observations: Observations, say: Say = lambda text: None) -> Posterior:
+def refine(ensemble: Ensemble, case: Case, observations: Observations, watch: Watch = silent) -> Posterior:
     """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict unseen data.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
     or no flow is found from the best members.
     """
     check_stations(ensemble, observations.table)
-    say("following the best members downhill")
-    base = modes_and_errors(model_of(case, observations), ensemble, case.infer.sigma)
-    say(f"{len(base.fits)} mode(s), chi2 {base.fits[0].chi2:.4g} over {base.noise.rows.size} stations; drawing")
+    base = modes_and_errors(model_of(case, observations), ensemble, case.infer.sigma, watch)
     run = partial(predict, base.model, [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
-    drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed)
+    finished = counted(watch, f"drawing around {len(base.fits)} mode(s)", EFFECTIVE_DRAWS, "effective draws")
+    drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
+    watch(Progress("summing up"))
     posterior = _posterior(base, drawn, ensemble)
     return replace(
         posterior,

@@ -10,6 +10,7 @@ from vegglue.effects.library import effects_of
 from vegglue.errors import InputError
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
+from vegglue.parallel import one_thread
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow.run_folder import folder_of
 
@@ -25,6 +26,7 @@ class CheckedCase:
     picture: Path
 
 
+@one_thread()
 def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
     """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png.
 
@@ -38,6 +40,7 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
     return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
 
 
+@one_thread()
 def check_effects(file: Path, *, trust: bool = False) -> dict[str, list[str]]:
     """What each effect of a Python file breaks of the contract, in sentences, by its name; none for a good one.
 

@@ -13,7 +13,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.parallel import at_most, one_thread
-from vegglue.progress import Say, silent
+from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.storage.kept_words import write_ladder
 from vegglue.storage.result_files import diagnosis_that_fits
@@ -31,7 +31,7 @@ class Comparison:
 
 
 @one_thread()
-def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> Comparison:
+def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
     comparison.json in the folder of each.
 
@@ -41,8 +41,8 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     aside = left_out(cases, runs)
     rungs = []
     with at_most(jobs):
-        for case in cases:
-            say(f"calibrating {case.name}")
+        for number, case in enumerate(cases):
+            watch(Progress(f"calibrating {case.name}", number, len(cases), "models"))
             rungs.append(rung_of(case, runs, aside))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)

@@ -12,7 +12,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most, one_thread
-from vegglue.progress import Say, silent
+from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
@@ -21,7 +21,7 @@ from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remembe
 
 
 @one_thread()
-def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> Diagnosis:
+def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Diagnosis:
     """Say where the model fails, which effect is missing, and how sure that is; kept in runs/<name>/diagnosis.h5 and
     drawn in diagnosis.png.
 
@@ -34,7 +34,7 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say 
     if kept is not None:
         return kept
     with at_most(jobs):
-        found = diagnose_model(model_in(case), say, validation_of(case))
+        found = diagnose_model(model_in(case), watch, validation_of(case))
     write_diagnosis(path, found, resolved_yaml(case), wanted)
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.parameters.first)
@@ -42,12 +42,13 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say 
 
 
 @one_thread()
-def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs") -> Path:
+def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
     """Draw what an effect would change at the stations of the calibrated case, before calibration takes its part; in
     runs/<name>/fingerprint_<effect>.png, which is returned.
     """
     folder = folder_of(runs, case)
     path = folder / f"fingerprint_{effect.name}.png"
+    watch(Progress(f"calibrating {case.name}"))
     trace, station = fingerprint_of(case, folder, effect)
     amplitude = effect.amplitude
     unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"

@@ -20,7 +20,7 @@ from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
-from vegglue.progress import Say, silent
+from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
 from vegglue.workflow.compare import Comparison, keep_ladder
@@ -71,21 +71,23 @@ def extend(
 
 
 @one_thread()
-def extend_stepwise(case: Case, *, runs: Path | str = "runs", jobs: int = -1, say: Say = silent) -> StepwiseExtension:
+def extend_stepwise(
+    case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
+) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
     and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case.
     """
-    found = diagnose(case, runs=runs, jobs=jobs, say=say)
+    found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     with at_most(jobs):
-        extension = _extended(case, found, runs, say)
+        extension = _extended(case, found, runs, watch)
     keep_ladder(extension.comparison, extension.cases, runs, extension.reason)
     return extension
 
 
-def _extended(case: Case, found: Diagnosis, runs: Path | str, say: Say) -> StepwiseExtension:
+def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch) -> StepwiseExtension:
     """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
-    say(f"calibrating {case.name}")
+    watch(Progress(f"calibrating {case.name}"))
     parent = calibrated(case, folder_of(runs, case), aside)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
@@ -93,7 +95,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, say: Say) -> Stepw
 
     def rung_with(names: Names) -> Rung | None:
         if names not in tried:
-            say(f"trying {' and '.join(names)}")
+            watch(Progress(f"trying {' and '.join(names)}"))
             base = tried[names] = _calibrated_with(case, [named[name] for name in names], found, aside)
             if base is not None:
                 rungs[names] = rung(base)

@@ -10,7 +10,7 @@ from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
-from vegglue.progress import Say, silent
+from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.storage.result_files import read_ensemble, write_posterior
@@ -29,7 +29,7 @@ def infer(
     method: Method | None = None,
     members: int | None = None,
     jobs: int = -1,
-    say: Say = silent,
+    watch: Watch = silent,
 ) -> Posterior:
     """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
     runs/<name>/posterior.h5, and the flow of their medians in flow.h5.
@@ -50,7 +50,7 @@ def infer(
         posterior = glue(ensemble, case, observations)
     else:
         with at_most(jobs):
-            posterior = refine(ensemble, case, observations, say)
+            posterior = refine(ensemble, case, observations, watch)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
     median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior

@@ -12,7 +12,7 @@ from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Riva
 from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
-from vegglue.progress import Say, silent
+from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
 from vegglue.storage.kept_words import write_questions
@@ -37,7 +37,7 @@ class Question:
 
 @one_thread()
 def next_measurement(
-    case: Case, *, between: Sequence[str] = (), runs: Path | str = "runs", jobs: int = -1, say: Say = silent
+    case: Case, *, between: Sequence[str] = (), runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
 ) -> list[Question]:
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
@@ -45,7 +45,7 @@ def next_measurement(
     not test, each by itself at a plausible size; only questions nobody chose are kept, in questions.json. Errors:
     InputError for a name that is not in the diagnosis.
     """
-    found = diagnose(case, runs=runs, jobs=jobs, say=say)
+    found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     by_name = {one.name: one for one in found.suspects}
     unknown = [name for name in between if name not in by_name]
     if unknown:
@@ -54,7 +54,9 @@ def next_measurement(
     questions: list[Question] = []
     if asked:
         with at_most(jobs):
+            watch(Progress(f"calibrating {case.name}"))
             base = calibrated(case, folder_of(runs, case), excluded_by(found))
+            watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [one for _, one in asked])
         questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
     if not between:

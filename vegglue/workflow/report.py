@@ -7,6 +7,7 @@ from vegglue.case.schema import Case
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
+from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.page import write_report
 from vegglue.report_page.run import LoopResults
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
@@ -16,7 +17,7 @@ from vegglue.workflow.run_folder import folder_of, of_size
 
 
 @one_thread()
-def report(case: Case, *, runs: Path | str = "runs", members: int | None = None) -> Path:
+def report(case: Case, *, runs: Path | str = "runs", members: int | None = None, watch: Watch = silent) -> Path:
     """Write runs/<name>/report.html and figures/ from the ensemble, the posterior and, where they fit, the diagnosis,
     the comparison and the questions kept there; returns the page. members: size of the ensemble instead of the case's.
 
@@ -27,11 +28,13 @@ def report(case: Case, *, runs: Path | str = "runs", members: int | None = None)
     folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(sized))
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
+    watch(Progress(f"solving the flow of {case.name} at its medians"))
     flow = median_flow(sized, posterior, folder)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     # A diagnosis needs no ensemble: it is that of the case, whatever the size of this one.
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
     loop = loop_results_of(case, runs)
+    watch(Progress(f"drawing the figures of {case.name}"))
     return write_report(folder, sized, observations, ensemble, posterior, flow, survey, diagnosis, loop)
 
 

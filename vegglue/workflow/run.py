@@ -7,7 +7,7 @@ from typing import Any
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.progress import Say, Watch, silent
+from vegglue.progress import Watch, silent
 from vegglue.storage.result_files import stored_hash
 from vegglue.workflow.compare import draw_ladder_of
 from vegglue.workflow.diagnose import diagnose
@@ -31,7 +31,6 @@ def run(
     runs: Path | str = "runs",
     members: int | None = None,
     jobs: int = -1,
-    say: Say = silent,
     watch: Watch = silent,
     show: Show = _unseen,
 ) -> StepwiseExtension:
@@ -42,21 +41,21 @@ def run(
     show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
     Posterior, the Path of a page, or a sentence.
     """
-    show(case, diagnose(case, runs=runs, jobs=jobs, say=say))
-    extension = extend_stepwise(case, runs=runs, jobs=jobs, say=say)
+    show(case, diagnose(case, runs=runs, jobs=jobs, watch=watch))
+    extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch)
     show(case, extension)
-    show(case, next_measurement(case, runs=runs, jobs=jobs, say=say))
+    show(case, next_measurement(case, runs=runs, jobs=jobs, watch=watch))
     last = extension.cases[-1]
     picture = draw_ladder_of(extension.comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
     both = {one.source: one for one in (case, last)}.values()
     # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
-    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, say, watch, show)]:
-        show(each, report(each, runs=runs, members=members))
+    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show)]:
+        show(each, report(each, runs=runs, members=members, watch=watch))
     return extension
 
 
-def _has_posterior(case: Case, runs: Path | str, jobs: int, say: Say, watch: Watch, show: Show) -> bool:
+def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show) -> bool:
     """Makes the ensemble and the posterior of a case where they are not up to date; False where it has none."""
     folder = folder_of(runs, case)
     current = is_simulated(case, runs)
@@ -66,7 +65,7 @@ def _has_posterior(case: Case, runs: Path | str, jobs: int, say: Say, watch: Wat
         show(case, f"{folder / 'posterior.h5'} is up to date.")
     else:
         try:
-            show(case, infer(case, ensemble, runs=runs, jobs=jobs, say=say))
+            show(case, infer(case, ensemble, runs=runs, jobs=jobs, watch=watch))
         except InputError as error:
             show(case, f"{error} There is no report of {case.name} without a posterior.")
             return False

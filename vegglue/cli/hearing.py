@@ -1,0 +1,108 @@
+"""How a long command is heard: one line that moves on a terminal, a line now and then in a file or a pipe."""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from vegglue.cli.output import console
+from vegglue.progress import Progress, Watch, silent
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+# Seconds between two lines about one phase in a file or a pipe, at least: a log of an hour stays readable.
+BETWEEN_LINES = 10.0
+# Terminals that cannot take a line back.
+PLAIN_TERMINALS = ("dumb", "unknown")
+
+
+@contextmanager
+def heard(quiet: bool, as_object: bool) -> Iterator[Watch]:
+    """Whoever watches a verb and tells the user. Nothing is told if quiet.
+
+    Where standard output is kept for an object, a terminal is told on standard error, and nobody else.
+    """
+    screen = sys.stderr if as_object else sys.stdout
+    moving = screen.isatty() and os.environ.get("TERM") not in PLAIN_TERMINALS
+    if quiet or (as_object and not moving):
+        yield silent
+    elif moving:
+        with moving_line(console(errors=as_object)) as watch:
+            yield watch
+    else:
+        yield now_and_then(lambda line: print(line, flush=True))
+
+
+@contextmanager
+def moving_line(screen: "Console") -> Iterator[Watch]:
+    """One line at the foot of a terminal, gone in the end: phase, bar, done of all, rate, time left, failures."""
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    words = (TextColumn(f"{{task.{part}}}", markup=False) for part in ("description", "fields[count]"))
+    columns = (SpinnerColumn(), next(words), BarColumn(bar_width=16), next(words), TimeElapsedColumn())
+    with Bar(*columns, console=screen, transient=True) as bar:
+        task, timed = bar.add_task("", total=None, count=""), with_pace()
+
+        def watch(progress: Progress) -> None:
+            new, pace = timed(progress)
+            if new:
+                bar.reset(task, total=progress.total)
+            bar.update(
+                task,
+                description=progress.phase,
+                completed=progress.done,
+                total=progress.total,
+                count=str(progress).removeprefix(progress.phase).removeprefix(": ") + pace,
+            )
+
+        yield watch
+
+
+def now_and_then(say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> Watch:
+    """Says a line for each phase, at most one in BETWEEN_LINES seconds within it, and one when all of it is done."""
+    timed, said_at, lock = with_pace(clock), -BETWEEN_LINES, Lock()
+
+    def watch(progress: Progress) -> None:
+        nonlocal said_at
+        with lock:  # phases of one command may run side by side
+            new, pace = timed(progress)
+            finished = progress.total is not None and progress.done >= progress.total
+            if new or finished or clock() - said_at >= BETWEEN_LINES:
+                say(f"... {progress}{pace}")
+                said_at = clock()
+
+    return watch
+
+
+def with_pace(clock: Callable[[], float] = time.monotonic) -> Callable[[Progress], tuple[bool, str]]:
+    """Tells of each progress whether its phase is new, and its rate and the time left in words."""
+    phase, began, first = "", 0.0, 0
+
+    def timed(progress: Progress) -> tuple[bool, str]:
+        nonlocal phase, began, first
+        if new := progress.phase != phase:
+            phase, began, first = progress.phase, clock(), progress.done
+        return new, pace_in_words(progress, progress.done - first, clock() - began)
+
+    return timed
+
+
+def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
+    """', 53 a second, 12 s left' after so many were done in so many seconds; nothing where that tells nothing."""
+    if progress.total is None or done <= 0 or seconds <= 0.0:
+        return ""
+    rate = done / seconds
+    each = f"{rate:.2g} a second" if rate >= 1.0 else f"{60.0 * rate:.2g} a minute"
+    left = (progress.total - progress.done) / rate
+    return f", {each}, {_duration(left)} left" if left > 0.0 else f", {each}"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

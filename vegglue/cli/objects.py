@@ -1,0 +1,134 @@
+"""Results as objects, as `--json` prints them: names of files and every number that is told in words."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vegglue.case.schema import Case
+from vegglue.diagnosis.comparison import rung_json
+from vegglue.diagnosis.next_measurement import MeasurementWorth
+from vegglue.report_page.posterior_words import describe, pressed_bounds
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis_json import diagnosis_json
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.workflow.check import CheckedCase
+from vegglue.workflow.compare import Comparison
+from vegglue.workflow.extend import StepwiseExtension
+from vegglue.workflow.next_measurement import Question
+
+Told = dict[str, Any]
+
+
+def object_of(case: Case, runs: Path, result: Any) -> Told:
+    """What a verb returns of a case, by name."""
+    folder = runs / case.name
+    match result:
+        case CheckedCase():
+            return _checked(case, result)
+        case Ensemble():
+            return _ensemble(result) | {"file": folder / "ensemble.h5"}
+        case Posterior():
+            return _posterior(case, result) | {"file": folder / "posterior.h5"}
+        case Diagnosis():
+            return diagnosis_json(result)
+        case StepwiseExtension():
+            told = {"configs": [one.source for one in result.cases], "cases": [one.name for one in result.cases]}
+            words = {"sentence": result.sentence, "reason": result.reason}
+            return told | words | _comparison(result.comparison)
+        case Comparison():
+            return _comparison(result)
+        case list():
+            return {"questions": [_question(one) for one in result]}
+        case Path():
+            return {"report": result.resolve()}
+    return {"note": str(result)}
+
+
+def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
+    """What `run` found, in the order it came: diagnosis, extension and questions; then, of each case by name, its
+    ensemble, posterior and report, and what was up to date in `notes`.
+    """
+    told: Told = {"cases": {}}
+    for case, result in results:
+        of_case = told["cases"].setdefault(case.name, {"config": case.source, "notes": []})
+        match result:
+            case Diagnosis():
+                told["diagnosis"] = object_of(case, runs, result)
+            case StepwiseExtension():
+                told["extension"] = object_of(case, runs, result)
+            case list():
+                told |= object_of(case, runs, result)
+            case Ensemble():
+                of_case["ensemble"] = object_of(case, runs, result)
+            case Posterior():
+                of_case["posterior"] = object_of(case, runs, result)
+            case Path():
+                of_case |= object_of(case, runs, result)
+            case _:
+                of_case["notes"].append(str(result))
+    return told
+
+
+def _checked(case: Case, found: CheckedCase) -> Told:
+    return {
+        "case": case.name, "experiments": list(case.experiments), "cells": found.cells, "stations": found.stations,
+        "used_stations": found.used_stations, "remarks": found.remarks, "picture": found.picture,
+    }  # fmt: skip
+
+
+def _ensemble(found: Ensemble) -> Told:
+    marched, failed = (members_with(found.status, number) for number in (SOLVED_BY_MARCHING, FAILED))
+    mass_error = found.mass_error[found.status != FAILED].max(initial=0.0)
+    return {"members": len(found.status), "marched": marched, "failed": failed, "largest_mass_error": mass_error}
+
+
+def _posterior(case: Case, found: Posterior) -> Told:
+    refined = found.refinement
+    misfit = None if refined is None or refined.error_model.errors == "estimated" else refined.misfit
+    return {
+        "method": found.settings.method,
+        "members": found.sample.members,
+        "failed": found.sample.failed,
+        "effective_size": found.weighting.effective_size,
+        "k_hat": found.weighting.pareto_k,
+        "claimed": found.claimed,
+        "parameters": {name: _parameter(found, name) for name in found.parameters},
+        "correlation": found.marginals.correlation,
+        "used_stations": found.fit.used,
+        "rmse": found.fit.rmse,
+        "sigma": found.fit.sigma,
+        "chi2": None if misfit is None else {"chi2": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p_misfit},
+        "sentences": describe(found, case.reference.table if case.reference else None),
+    }
+
+
+def _parameter(found: Posterior, name: str) -> Told:
+    marginals = found.marginals
+    return {
+        "unit": found.sample.unit[name],
+        "median": marginals.median[name],
+        "sd": marginals.sd[name],
+        "range95": marginals.quantiles[name][[0, -1]],
+        "share_of_prior": marginals.width_ratio[name],
+        "identified": bool(marginals.identified[name]),
+        "at_bounds": pressed_bounds(found, name),
+    }
+
+
+def _comparison(found: Comparison) -> Told:
+    return {"rungs": [rung_json(one) for one in found.rungs], "left_out": found.left_out.to_dict("records")}
+
+
+def _question(question: Question) -> Told:
+    """What is to be told apart, and the measurements that could."""
+    return {"tells_apart": question.tells_apart, "measurements": [_worth(one) for one in question.measurements]}
+
+
+def _worth(one: MeasurementWorth) -> Told:
+    plan = one.plan
+    return {
+        "name": plan.name, "experiment": plan.experiment, "x": plan.x, "stations": int(plan.rows.size),
+        "hours": plan.hours, "now": one.now, "then": one.then, "gain_per_hour": one.per_hour,
+    }  # fmt: skip

@@ -1,0 +1,62 @@
+"""Results in words, as they are printed for a reader."""
+
+from pathlib import Path
+from typing import Any
+
+from vegglue.case.schema import Case
+from vegglue.cli.brief_posterior import show_posterior
+from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
+from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.workflow.check import CheckedCase
+from vegglue.workflow.compare import Comparison
+from vegglue.workflow.extend import StepwiseExtension
+
+
+def show(case: Case, runs: Path, result: Any) -> None:
+    """Print a result of a case: what a verb returns, or a sentence as it is."""
+    folder = runs / case.name
+    match result:
+        case str():
+            print(result)
+        case CheckedCase():
+            _show_check(case, result)
+        case Diagnosis():
+            show_diagnosis(result)
+            print(f"Written to {folder / 'diagnosis.h5'}, drawn in {folder / 'diagnosis.png'}.")
+        case StepwiseExtension():
+            show_ladder(result.comparison)
+            print(result.sentence)
+            print(result.reason)
+            print(f"Last config: {result.cases[-1].source}")
+        case Comparison():
+            show_ladder(result)
+            print(f"Drawn in {folder / 'ladder.png'}")
+        case list():
+            show_questions(result)
+        case Ensemble():
+            print(f"{folder / 'ensemble.h5'}: {_solved(result)}")
+        case Posterior():
+            show_posterior(case, folder, result)
+        case Path():
+            print(f"Report: {result.resolve()}")
+
+
+def _show_check(case: Case, found: CheckedCase) -> None:
+    for sentence in found.remarks:
+        print(f"- {sentence}")
+    print(
+        f"{case.name}: {len(case.experiments)} experiment(s), {found.cells:,} cells, {found.used_stations} of "
+        f"{found.stations} stations in use, {len(found.remarks)} remark(s). Channel drawn in {found.picture}"
+    )
+
+
+def _solved(ensemble: Ensemble) -> str:
+    status = ensemble.status
+    marched, failed = (members_with(status, number) for number in (SOLVED_BY_MARCHING, FAILED))
+    return (
+        f"{len(status):,} members, {marched} by marching, {failed} failed, "
+        f"largest mass error {ensemble.mass_error[status != FAILED].max(initial=0.0):.1e}"
+    )
