@@ -38,7 +38,7 @@ def show_posterior(case: Case, folder: Path, posterior: Posterior) -> None:
 def brief_posterior(posterior: Posterior, kept_in: str, config: str) -> list[str]:
     """At most LINES lines of COLUMNS: how it was found, parameters, fit, doubts, and where all of it is."""
     head = _wrapped([_found(posterior)]) + _table(posterior)
-    foot = _wrapped([f"All of it is in {kept_in}; `vegglue report {config}` tells it in sentences and figures."])
+    foot = _wrapped([f"All of it: {kept_in}; in sentences and figures: vegglue report {config}"])
     body = [_wrapped([text]) for text in (*_fit(posterior), *doubts(posterior))]
     room, shown = LINES - len(head) - len(foot) - 1, []
     while body and len(body[0]) <= room:
@@ -53,7 +53,8 @@ def _wrapped(paragraphs: Sequence[str]) -> list[str]:
 
 
 def _found(posterior: Posterior) -> str:
-    sample, size = posterior.sample, _number(posterior.weighting.effective_size, 3)
+    sample, effective = posterior.sample, posterior.weighting.effective_size
+    size = f"{effective:,.0f}" if effective >= CLAIMED_FROM else _number(effective, 3)
     failed = f" ({sample.failed:,} failed)" if sample.failed else ""
     stations = f"{posterior.fit.used} of {len(posterior.station)} stations used"
     if posterior.refinement is None:
@@ -96,7 +97,7 @@ def _fit(posterior: Posterior) -> list[str]:
         return said
     if refined.error_model.errors == "estimated":
         sizes = errors_by_kind(posterior.fit.sigma, "for")
-        return [*said, f"Errors are estimated from what the best place leaves ({sizes}): they do not test the model."]
+        return [*said, f"Errors are estimated from this misfit ({sizes}): they do not test the model."]
     return [*said, _chi2(refined.misfit)]
 
 

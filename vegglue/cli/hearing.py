@@ -64,15 +64,14 @@ def moving_line(screen: "Console") -> Iterator[Watch]:
 
 
 def now_and_then(say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> Watch:
-    """Says a line for each phase, at most one in BETWEEN_LINES seconds within it, and one when all of it is done."""
+    """Says a line when a phase begins, and within it at most one in BETWEEN_LINES seconds."""
     timed, said_at, lock = with_pace(clock), -BETWEEN_LINES, Lock()
 
     def watch(progress: Progress) -> None:
         nonlocal said_at
         with lock:  # phases of one command may run side by side
             new, pace = timed(progress)
-            finished = progress.total is not None and progress.done >= progress.total
-            if new or finished or clock() - said_at >= BETWEEN_LINES:
+            if new or clock() - said_at >= BETWEEN_LINES:
                 say(f"... {progress}{pace}")
                 said_at = clock()
 
@@ -97,9 +96,13 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
     if progress.total is None or done <= 0 or seconds <= 0.0:
         return ""
     rate = done / seconds
-    each = f"{rate:.2g} a second" if rate >= 1.0 else f"{60.0 * rate:.2g} a minute"
+    each = f"{_short(rate)} a second" if rate >= 1.0 else f"{_short(60.0 * rate)} a minute"
     left = (progress.total - progress.done) / rate
     return f", {each}, {_duration(left)} left" if left > 0.0 else f", {each}"
+
+
+def _short(rate: float) -> str:
+    return f"{rate:,.0f}" if rate >= 10.0 else f"{rate:.1f}"
 
 
 def _duration(seconds: float) -> str:
