@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, at_point, fit, log_evidence_under, objective
@@ -168,7 +167,9 @@ def grid_difference(point: Point, on_coarse: Point | None) -> Array:
 
 def _starts(model: Model, noise: Noise) -> list[Point]:
     """The FITTED_POINTS with the least objective, of the middle of the prior and Sobol' points around it."""
-    prior_points = scipy.stats.norm.ppf(scipy.stats.qmc.Sobol(len(model.names), seed=1).random(PRIOR_POINTS))
+    from scipy.stats import norm, qmc  # late: what only looks at a case need not wait for it
+
+    prior_points = norm.ppf(qmc.Sobol(len(model.names), seed=1).random(PRIOR_POINTS))
     prior_points[0] = 0.0
     found = [point for z in prior_points if (point := linearise(model, 0.7 * z)) is not None]
     if not found:

@@ -96,13 +96,16 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
     if progress.total is None or done <= 0 or seconds <= 0.0:
         return ""
     rate = done / seconds
-    each = f"{_short(rate)} a second" if rate >= 1.0 else f"{_short(60.0 * rate)} a minute"
     left = (progress.total - progress.done) / rate
-    return f", {each}, {_duration(left)} left" if left > 0.0 else f", {each}"
+    return f", {_rate(rate)}, {_duration(left)} left" if left > 0.0 else f", {_rate(rate)}"
 
 
-def _short(rate: float) -> str:
-    return f"{rate:,.0f}" if rate >= 10.0 else f"{rate:.1f}"
+def _rate(each_second: float) -> str:
+    """In the shortest span of time in which at least one is done."""
+    spans = ((1.0, "a second"), (60.0, "a minute"), (3600.0, "an hour"))
+    seconds, words = next((span for span in spans if each_second * span[0] >= 1.0), spans[-1])
+    count = each_second * seconds
+    return f"{count:,.0f} {words}" if count >= 10.0 else f"{count:.1f} {words}"
 
 
 def _duration(seconds: float) -> str:
