@@ -66,12 +66,3 @@ def test_only_numpy_is_needed_to_refuse_an_effect(tmp_path: Path) -> None:
     code, imported = imported_by(tmp_path, "diagnose", config.name)
     assert code == 2
     assert imported & HEAVY == {"numpy"}
-
-
-def test_nothing_is_imported_with_the_package() -> None:
-    found = subprocess.run(
-        [sys.executable, "-c", "import vegglue, sys; print(*sys.modules)"],
-        env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    imported = {name.split(".")[0] for name in found.stdout.split()}
-    assert imported & (HEAVY | {"pydantic", "rich", "typer", "yaml"}) == set()

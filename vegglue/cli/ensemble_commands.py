@@ -40,8 +40,14 @@ def simulate_command(
     current = is_simulated(case, runs)
     with heard(quiet, as_object) as watch:
         ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch)
-    up_to_date = f"{runs / case.name / 'ensemble.h5'} is up to date."
-    tell(case, runs, up_to_date if current and not as_object else ensemble, as_object)
+    if as_object:
+        from vegglue.cli.objects import object_of
+
+        print_object(object_of(case, runs, ensemble) | {"up_to_date": current})
+    elif current:
+        print(f"{runs / case.name / 'ensemble.h5'} is up to date.")
+    else:
+        tell(case, runs, ensemble, as_object)
 
 
 def infer_command(
