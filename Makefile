@@ -1,15 +1,15 @@
 # Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests.
 PYTHON ?= python3
 JOBS ?= -1
-DEMO_MEMBERS ?= 256
+# Members of what the demo runs beside the paper's D3a, which has all 5,000: a first look.
+DEMO_MEMBERS ?= 64
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 VEGGLUE := $(BIN)/vegglue
 # One process a core, but no more than four: each takes some 1.2 GB. The tests of a file share what they set up.
 PYTEST := $(BIN)/pytest tests -n auto --maxprocesses 4 --dist loadfile
-CASES := d0 d3a d3b d3b_paper
-DEMO_CASES := d0 d3a d3b
+CASES := d0 d3a d3a_refined d3b d3b_paper
 SOURCES := $(wildcard vegglue/*.py vegglue/*/*.py vegglue/*/*.j2 vegglue/*/*.css vegglue/*/*.js)
 SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
@@ -27,13 +27,18 @@ $(READY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	touch $@
 
-demo: $(READY)  # the paper's cases with $(DEMO_MEMBERS) members each, to finished reports
-	@for case in $(DEMO_CASES); do \
-	  $(VEGGLUE) simulate configs/$$case.yaml --members $(DEMO_MEMBERS) --jobs $(JOBS) --runs runs/demo && \
-	  $(VEGGLUE) infer configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo && \
-	  $(VEGGLUE) report configs/$$case.yaml --members $(DEMO_MEMBERS) --runs runs/demo || exit $$?; \
+demo: $(READY)  # the loop on a site with a hidden effect, then the paper's cases, to finished reports
+	mkdir -p runs/demo/measured && cp -R data/open_cases/open-b/. runs/demo/measured/willows
+	$(VEGGLUE) import runs/demo/measured/willows --to runs/demo/willows.yaml
+	$(VEGGLUE) run runs/demo/willows.yaml --members $(DEMO_MEMBERS) --jobs $(JOBS) --runs runs/demo
+	@for case in d3a d3a_refined d0 d3b; do \
+	  case $$case in d3a*) few= ;; *) few="--members $(DEMO_MEMBERS)" ;; esac; \
+	  $(VEGGLUE) simulate configs/$$case.yaml $$few --jobs $(JOBS) --runs runs/demo && \
+	  $(VEGGLUE) infer configs/$$case.yaml $$few --runs runs/demo && \
+	  $(VEGGLUE) report configs/$$case.yaml $$few --runs runs/demo || exit $$?; \
 	done
-	@echo; echo "Reports:"; ls -1 $(CURDIR)/runs/demo/*/report.html
+	@echo; echo "Reports, the best one first:"
+	@for case in willows willows-secondary_current d3a_refined d3a d0 d3b; do ls $(CURDIR)/runs/demo/$$case/report.html; done
 
 paper: report  # the paper's cases with all 5,000 members
 simulate: $(CASES:%=runs/%/ensemble.h5)  # ensembles that are out of date

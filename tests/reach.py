@@ -1,4 +1,4 @@
-"""The short reach of the README as a user would have it: its files on disk, and the command line."""
+"""The brook of docs/own_case.md as a user would have it: its files on disk, and the command line."""
 
 import os
 import re
@@ -11,23 +11,23 @@ import pytest
 from vegglue.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+OWN_CASE = (ROOT / "docs" / "own_case.md").read_text(encoding="utf-8")
 ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg", "COLUMNS": "200"}
 COARSE = ("cell: [1.0, 0.5]", "cell: [1.25, 0.75]")  # solves several members in a hundredth of a second
 
 
 def block(language: str) -> str:
-    """The first code block of the README in a language."""
-    found = re.search(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
-    assert found, f"README.md has no {language} block"
+    """The first code block of the page in a language."""
+    found = re.search(rf"^```{language}\n(.*?)^```", OWN_CASE, re.MULTILINE | re.DOTALL)
+    assert found, f"own_case.md has no {language} block"
     return found[1]
 
 
 def write_reach(folder: Path, *changes: tuple[str, str]) -> Path:
-    """The config and the measurements of the README in a folder, with some text replaced; returns the config."""
+    """The config and the measurements of the page in a folder, with some text replaced; returns the config."""
     text = block("yaml")
     for old, new in changes:
-        assert old in text, f"the example of the README has no {old!r}"
+        assert old in text, f"the example has no {old!r}"
         text = text.replace(old, new)
     (folder / "velocities.csv").write_text(block("csv"), encoding="utf-8")
     (folder / "brook.yaml").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The line end to end through the real command line, on the example of the README; and what it says to mistakes."""
+"""The line end to end through the real command line, on the brook of docs/own_case.md; what it says to mistakes."""
 
 import re
 from html.parser import HTMLParser
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from reach import COARSE, README, ROOT, block, said_to, vegglue, write_reach
+from reach import COARSE, OWN_CASE, ROOT, block, said_to, vegglue, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
@@ -19,7 +19,7 @@ from vegglue.storage.result_files import read_ensemble, read_posterior, stored_h
 pytestmark = pytest.mark.slow  # whole runs through the shell
 MEMBERS = 128
 STEPS = ("check", "simulate", "infer", "report")
-TRUE_N_B = 0.05  # of the README's measurements
+TRUE_N_B = 0.05  # of docs/own_case.md's measurements
 Finished = tuple[Path, dict[str, str]]
 
 
@@ -100,13 +100,16 @@ def test_the_report_needs_no_network(finished: Finished) -> None:
     assert [place[:60] for place in places if not place.startswith(("#", "data:"))] == []
 
 
-def test_the_snippet_of_the_readme_runs(
+def test_the_snippet_on_files_runs(
     finished: Finished, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(finished[0])
     monkeypatch.setenv("MPLBACKEND", "agg")
     names: dict[str, object] = {}
-    exec(compile(block("python"), "README.md", "exec"), names)
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("## The files")[2]
+    found = re.search(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    assert found
+    exec(compile(found[1], "python.md", "exec"), names)
     said = capsys.readouterr().out
     assert re.search(r"n_b +0\.05", said)
     assert float(re.findall(r"([\d.]+) m/s is expected", said)[0]) == pytest.approx(0.40, abs=0.03)
@@ -131,7 +134,7 @@ def test_an_ensemble_without_measurements_can_be_simulated(
 
 
 def yaml_part(key: str) -> str:
-    """The lines of the README's case that belong to one key."""
+    """The lines of docs/own_case.md's case that belong to one key."""
     found = re.search(rf"^{key}:.*\n(?:  .*\n)*", block("yaml"), re.MULTILINE)
     assert found
     return found[0]
@@ -192,24 +195,20 @@ def test_mistakes_show_no_traceback_in_a_process_of_their_own(tmp_path: Path) ->
     assert done.stderr == "nowhere.yaml cannot be read: No such file or directory; check the path.\n"
 
 
-def test_the_readme_names_commands_and_targets_that_exist() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = set(re.findall(r"^([a-z]+):", makefile, re.MULTILINE))
-    named = set(re.findall(r"`make ([a-z ]+)`", README)) | set(re.findall(r"^make ([a-z]+)", README, re.MULTILINE))
-    assert {"demo", "test", "paper"} <= {word for words in named for word in words.split()} <= targets
-    commands = set(re.findall(r"^\| `vegglue ([a-z]+)", README, re.MULTILINE))
-    assert commands == {str(command.name or command.callback.__name__) for command in app.registered_commands}
-    members = re.search(r"^DEMO_MEMBERS \?= (\d+)$", makefile, re.MULTILINE)
-    assert members
-    demo = next(line for line in README.splitlines() if line.startswith("make demo"))
-    assert f"{int(members[1]):,} members" in demo
-    assert "`make paper`" in demo
+def test_documents_name_commands_and_targets_that_exist() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md")) + readme
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    named = set(re.findall(r"`make ([a-z]+)`", pages)) | set(re.findall(r"^make ([a-z]+)", readme, re.MULTILINE))
+    assert {"demo", "test", "paper"} <= named <= targets
+    listed = set(re.findall(r"^\| `vegglue ([a-z]+)", pages, re.MULTILINE))
+    assert listed == {str(command.name) for command in app.registered_commands}
 
 
-def test_every_key_of_the_readmes_table_is_one_of_a_case() -> None:
+def test_every_key_of_the_table_is_one_of_a_case() -> None:
     known = set(yaml.safe_load(block("yaml"))) | {"extends", "outlet", "infer", "numerics", "eddy_viscosity"}
     known |= {"survey", "reference", "canopy_correction", "model_error"}
-    rows = re.findall(r"^\| ((?:`[a-z_.: ]+`(?:, )?)+) \|", README, re.MULTILINE)
+    rows = re.findall(r"^\| ((?:`[a-z_.: ]+`(?:, )?)+) \|", OWN_CASE, re.MULTILINE)
     keys = {re.split(r"[.:]", key)[0] for row in rows for key in re.findall(r"`([^` ]+)[^`]*`", row)} - {"vegglue"}
     assert keys - known == set()
     assert len(keys) > 10

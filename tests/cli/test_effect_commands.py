@@ -19,13 +19,13 @@ WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 
 
 def own_case(folder: Path) -> Path:
-    """The README's reach with the effect of the page, its values merged into the config."""
+    """The reach of docs/own_case.md with the effect of the page, its values merged into the config."""
     (folder / "slow_stones.py").write_text(OWN, encoding="utf-8")
     return write_reach(folder, COARSE, *pasted(IN_CONFIG), WITH_ERROR)
 
 
 def pasted(text: str) -> tuple[tuple[str, str], ...]:
-    """What to replace in the README's config to have `effects:` and one more of its `parameters:`."""
+    """What to replace in the page's config to have `effects:` and one more of its `parameters:`."""
     effects, parameter = text.split("parameters:\n") if "parameters:\n" in text else (text, "")
     return ("observations:\n", f"{effects}observations:\n"), ("  phi: {dist", f"{parameter}  phi: {{dist")
 

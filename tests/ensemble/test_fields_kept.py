@@ -64,7 +64,7 @@ def test_a_point_outside_the_window_is_refused(x: float, y: float) -> None:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    """Sixteen members of the reach of the README with fields from its first section to its last."""
+    """Sixteen members of the reach of docs/own_case.md with fields from its first section to its last."""
     folder = tmp_path_factory.mktemp("fields")
     case = load_case(write_reach(folder, COARSE, SMALL))
     solve_ensemble(case, read_observations(case), folder / "ensemble.h5", 1, lambda progress: None)

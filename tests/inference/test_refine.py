@@ -1,4 +1,4 @@
-"""A refined posterior of the short reach of the README, made and stored as a user would, and its parts."""
+"""A refined posterior of the short reach of docs/own_case.md, made and stored as a user would, and its parts."""
 
 import math
 from dataclasses import replace

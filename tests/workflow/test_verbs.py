@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reach import COARSE, README, ROOT, write_reach
+from reach import COARSE, ROOT, write_reach
 
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
@@ -21,7 +21,6 @@ MEMBERS = 16
 HEAVY = ("numpy", "numba", "pandas", "scipy", "h5py", "matplotlib", "pydantic", "yaml", "typer", "joblib")
 SMALL = ("members: 1024", f"members: {MEMBERS}")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
-FROM_PYTHON = "## From Python"
 
 
 def test_nothing_heavy_is_imported_before_a_verb_is_used() -> None:
@@ -110,13 +109,14 @@ def test_an_ensemble_of_another_case_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow  # refines to the end, on all cores
-def test_the_readme_is_right_about_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = re.search(rf"^{FROM_PYTHON}$.*?^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+def test_the_page_is_right_about_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    found = re.search(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert found
     write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(compile(found[1], "README.md", "exec"), names)
+    exec(compile(found[1], "python.md", "exec"), names)
     assert isinstance(names["page"], Path)
     assert names["page"].exists()
     assert len(read_ensemble(tmp_path / "runs" / "brook" / "ensemble.h5").status) == MEMBERS

@@ -1,0 +1,122 @@
+"""The documents are true: commands shown are run, outputs shown are what they print, links lead somewhere."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from reach import ENVIRONMENT, ROOT, block, command
+
+import vegglue
+
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+# Pages whose commands are run, in this order, in one folder.
+SHOWN = (ROOT / "docs" / "tutorial.md", ROOT / "README.md")
+LEFT_OUT = "..."
+NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?")
+# Share by which a number may differ on another machine [-]: arithmetic there is another in the last digits, and what is
+# drawn at random follows it. Where one unit of the last digit shown is more, that may be.
+ANOTHER_MACHINE = 0.1
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A command of a page, and what the page says that it prints."""
+
+    command: str
+    lines: tuple[str, ...]
+
+
+def shown_in(page: Path) -> list[Shown]:
+    """Commands and outputs of the ```console blocks of a page."""
+    found = []
+    for shell in re.findall(r"^```console\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        for part in re.split(r"^\$ ", shell, flags=re.MULTILINE)[1:]:
+            first, *rest = part.splitlines()
+            found.append(Shown(first, tuple(line for line in rest if line.strip() not in ("", LEFT_OUT))))
+    return found
+
+
+def words_of(line: str) -> str:
+    """The line without its numbers and with single spaces, as far as it was not cut off by three dots."""
+    return " ".join(NUMBER.sub("#", line).split())
+
+
+def numbers_of(line: str) -> list[tuple[float, float]]:
+    """Each number of a line, and by how much it may differ."""
+    found = []
+    for text in NUMBER.findall(line):
+        value = float(text.replace(",", ""))
+        mantissa, _, power = text.partition("e")
+        last_digit = 10.0 ** (float(power or 0) - len(mantissa.partition(".")[2]))
+        found.append((value, max(ANOTHER_MACHINE * abs(value), last_digit)))
+    return found
+
+
+def is_said(shown: str, said: str) -> bool:
+    """Whether a line was printed, up to another machine's last digits; one that ends in three dots may go on."""
+    cut = shown.rstrip().endswith(LEFT_OUT)
+    shown = shown.rstrip().removesuffix(LEFT_OUT).rstrip()
+    if words_of(said) != words_of(shown) and not (cut and words_of(said).startswith(words_of(shown))):
+        return False
+    pairs = zip(numbers_of(shown), numbers_of(said), strict=False)
+    return all(abs(mine - other) <= off * (1 + 1e-9) for (mine, off), (other, _) in pairs)
+
+
+def test_lines_are_told_apart() -> None:
+    assert is_said("error 0.0392, then 0.0033", "error  0.0391, then  0.0034")
+    assert not is_said("error 0.0392", "error 0.0292")
+    assert not is_said("error 0.0392", "fault 0.0392")
+    assert is_said("12 stations, some ...", "12 stations, some 7.4 h")
+    assert not is_said("12 stations, some", "12 stations, some 7.4 h")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)", text):
+        there = (page.parent / target).resolve() if target else page
+        assert there.exists(), f"{page.name}: {target}"
+        if anchor:
+            titles = re.findall(r"^#+ (.*)$", there.read_text(encoding="utf-8"), re.MULTILINE)
+            assert anchor in [re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles]
+
+
+def test_the_readme_fits_two_screens() -> None:
+    """A screen holds some 45 lines."""
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 2 * 45
+
+
+def test_the_folder_of_the_page_becomes_a_case(tmp_path: Path) -> None:
+    site, folder = block("json"), tmp_path / "my-site"
+    folder.mkdir()
+    (folder / "site.json").write_text(site, encoding="utf-8")
+    (folder / "velocities.csv").write_text("experiment,section,x,y,u,u_se\nlow,A,50,0,0.4,0.01\n", encoding="utf-8")
+    case = vegglue.import_folder(folder, tmp_path / "my-site.yaml")
+    assert list(case.experiments) == list(json.loads(site)["experiments"])
+    assert len(case.plants.patches) == 1
+
+
+@pytest.mark.slow
+def test_commands_print_what_is_shown(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "data" / "open_cases" / "open-b", tmp_path / "willows")
+    shown = [one for page in SHOWN for one in shown_in(page)]
+    assert len(shown) > 4
+    for line in dict.fromkeys(one.command for one in shown):  # each once, where it is shown first
+        said = printed(line, tmp_path)
+        for wanted in [each for one in shown if one.command == line for each in one.lines]:
+            assert any(is_said(wanted, each) for each in said), "\n".join([f"$ {line}", f"shown: {wanted}", *said])
+
+
+def printed(line: str, folder: Path) -> list[str]:
+    """What a command of vegglue prints, in a folder."""
+    name, *arguments = line.split()
+    assert name == "vegglue", line
+    done = subprocess.run(
+        command(*arguments), cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=900, check=False
+    )
+    assert done.returncode == 0, f"$ {line}\n{done.stderr}"
+    return done.stdout.splitlines()
