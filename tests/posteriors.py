@@ -1,10 +1,23 @@
-"""What tests of posteriors share: one that differs in a few numbers, and whether two are the same."""
+"""What tests of posteriors share: a small one, the same with other numbers, and whether two are the same."""
 
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from stored import HASH, MEMBERS, a_header
+
+from vegglue.results.posterior import (
+    LEVELS,
+    CorrectedCanopy,
+    GoodnessOfFit,
+    InferenceSettings,
+    Marginals,
+    Posterior,
+    PredictiveDistribution,
+    WeightedSample,
+    WeightStatistics,
+)
 
 
 def changed(value: Any, **changes: object) -> Any:
@@ -27,3 +40,37 @@ def assert_same(one: Any, other: Any) -> None:
             assert_same(getattr(one, field.name), getattr(other, field.name))
     else:
         np.testing.assert_array_equal(one, other)
+
+
+def a_posterior(canopy: bool) -> Posterior:
+    """Two parameters, two stations of which one is used; every number differs from every other."""
+    random = np.random.default_rng(8)
+    names, station = ("n_b", "phi"), a_header().station
+    weights = random.random(MEMBERS)
+    two, levels = {"n_b": 0.1, "phi": 2.0}, {name: random.random(len(LEVELS)) for name in names}
+    sides = {name: random.random(2) for name in names}
+    per_kind = {"velocity": 0.02}
+    draws = random.integers(0, MEMBERS, (4, 500))
+    log_likelihood = random.random((MEMBERS, 2)) * [1, np.nan]
+    predictive = random.random((4, 500, 2))
+    corrected = CorrectedCanopy("phi", 0.8, 1.06, 1.36, random.random(MEMBERS), 1.5, 0.2, levels["phi"], 0.18, 0.12)
+    settings = InferenceSettings("glue", "gaussian", "best-member", -np.inf, HASH, 5, "0.1.0")
+    sample = WeightedSample(
+        members=MEMBERS, failed=1, best=3, unit={"n_b": "s m^(-1/3)", "phi": "-"},
+        theta={name: random.random(MEMBERS) for name in names}, weights=weights / weights.sum(), efficiency=weights - 1,
+        log_likelihood=log_likelihood, prediction=random.random((MEMBERS, 2)),
+    )  # fmt: skip
+    marginals = Marginals(
+        median=two, sd=two, quantiles=levels, prior_quantiles=levels, log10_median={"phi": 0.3}, log10_sd={"phi": 0.1},
+        correlation=random.random((2, 2)), width_ratio=two, identified={"n_b": True, "phi": False}, bounds=sides,
+        bound_mass=sides, bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])},
+    )  # fmt: skip
+    fit = GoodnessOfFit(
+        used=1, chi2=np.nan, sigma=per_kind, rmse=per_kind, best_rmse=per_kind, noise=np.array([0.02, np.nan]),
+        residual=random.random(2), best_residual=random.random(2),
+    )  # fmt: skip
+    predicted = PredictiveDistribution(random.random((5, 2)), random.random((5, 2)), draws, predictive)
+    return Posterior(
+        settings=settings, sample=sample, weighting=WeightStatistics(11, 7.5, 0.3, 0.4), marginals=marginals, fit=fit,
+        predicted=predicted, station=station, canopy=corrected if canopy else None, refinement=None, transfer=None,
+    )  # fmt: skip

@@ -5,61 +5,19 @@ from pathlib import Path
 from typing import get_type_hints
 
 import h5py
-import numpy as np
 import pytest
-from posteriors import assert_same, changed
-from stored import HASH, MEMBERS, a_header, no_space
+from posteriors import a_posterior, assert_same, changed
+from stored import HASH, no_space
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.layout import stored_fields
 from vegglue.results.posterior import (
-    LEVELS,
     CorrectedCanopy,
-    GoodnessOfFit,
-    InferenceSettings,
-    Marginals,
     Posterior,
-    PredictiveDistribution,
     Transfer,
-    WeightedSample,
-    WeightStatistics,
 )
 from vegglue.results.refinement import Refinement
 from vegglue.storage.result_files import read_posterior, stored_hash, write_posterior
-
-
-def a_posterior(canopy: bool) -> Posterior:
-    """Two parameters, two stations of which one is used; every number differs from every other."""
-    random = np.random.default_rng(8)
-    names, station = ("n_b", "phi"), a_header().station
-    weights = random.random(MEMBERS)
-    two, levels = {"n_b": 0.1, "phi": 2.0}, {name: random.random(len(LEVELS)) for name in names}
-    sides = {name: random.random(2) for name in names}
-    per_kind = {"velocity": 0.02}
-    draws = random.integers(0, MEMBERS, (4, 500))
-    log_likelihood = random.random((MEMBERS, 2)) * [1, np.nan]
-    predictive = random.random((4, 500, 2))
-    corrected = CorrectedCanopy("phi", 0.8, 1.06, 1.36, random.random(MEMBERS), 1.5, 0.2, levels["phi"], 0.18, 0.12)
-    settings = InferenceSettings("glue", "gaussian", "best-member", -np.inf, HASH, 5, "0.1.0")
-    sample = WeightedSample(
-        members=MEMBERS, failed=1, best=3, unit={"n_b": "s m^(-1/3)", "phi": "-"},
-        theta={name: random.random(MEMBERS) for name in names}, weights=weights / weights.sum(), efficiency=weights - 1,
-        log_likelihood=log_likelihood, prediction=random.random((MEMBERS, 2)),
-    )  # fmt: skip
-    marginals = Marginals(
-        median=two, sd=two, quantiles=levels, prior_quantiles=levels, log10_median={"phi": 0.3}, log10_sd={"phi": 0.1},
-        correlation=random.random((2, 2)), width_ratio=two, identified={"n_b": True, "phi": False}, bounds=sides,
-        bound_mass=sides, bound_hit={"n_b": np.array([True, False]), "phi": np.array([False, False])},
-    )  # fmt: skip
-    fit = GoodnessOfFit(
-        used=1, chi2=np.nan, sigma=per_kind, rmse=per_kind, best_rmse=per_kind, noise=np.array([0.02, np.nan]),
-        residual=random.random(2), best_residual=random.random(2),
-    )  # fmt: skip
-    predicted = PredictiveDistribution(random.random((5, 2)), random.random((5, 2)), draws, predictive)
-    return Posterior(
-        settings=settings, sample=sample, weighting=WeightStatistics(11, 7.5, 0.3, 0.4), marginals=marginals, fit=fit,
-        predicted=predicted, station=station, canopy=corrected if canopy else None, refinement=None, transfer=None,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("canopy", [True, False])

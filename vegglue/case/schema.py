@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
+from vegglue.in_short import counted, in_short
 
 
 class Experiment(Part):
@@ -186,3 +187,22 @@ class Case(Part):
     validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
     reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")
+
+    def __repr__(self) -> str:
+        (west, east), (south, north), (dx, dy) = self.grid.x, self.grid.y, self.grid.cell
+        measured = dict.fromkeys(f"{one.kind} in {one.file.name}" for one in self.observations)
+        unknowns = [f"{name} [{one.unit}]" for name, one in self.parameters.items()]
+        patches = counted(len(self.plants.patches), "patch", "patches")
+        return in_short(
+            f"Case {self.name}: {self.title}".removesuffix(": "),
+            [
+                f"grid of {east - west:g} m by {north - south:g} m, cells of {dx:g} m by {dy:g} m; {patches} of plants",
+                f"experiments: {', '.join(self.experiments)}",
+                f"unknown: {', '.join(unknowns) or 'nothing'}; effects: {', '.join(self.effects) or 'none'}",
+                f"measured: {', '.join(measured) or 'nothing'}",
+                f"{counted(self.simulate.members, 'member')}, seed {self.simulate.seed}; read from {self.source.name}",
+            ],
+        )
+
+    def __str__(self) -> str:
+        return repr(self)

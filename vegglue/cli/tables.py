@@ -8,7 +8,6 @@ from rich.table import Table
 from vegglue.cli.output import console
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
-from vegglue.diagnosis.next_measurement import SEPARATES
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.compare import Comparison
@@ -90,14 +89,4 @@ def show_questions(found: Sequence[Question]) -> None:
     if not found:
         console().print("Nothing is left to be told apart; no further measurement is proposed.")
     for question in found:
-        what, worths = question.tells_apart, question.measurements
-        useful = [one for one in worths if one.then >= SEPARATES and one.then > 1.1 * one.now]
-        if not useful:
-            best = max(worths, key=lambda one: one.then, default=None)
-            most = f" (D2 at most {best.then:.2g}: {best.plan.name})" if best else ""
-            console().print(f"To tell {what}: none of {len(worths)} measurements would by itself{most}.")
-            continue
-        console().print(f"To tell {what} (D2 now {useful[0].now:.2g} squared standard errors):")
-        for one in useful[:4]:
-            plan = one.plan
-            console().print(f"- {plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h")
+        console().print(repr(question))

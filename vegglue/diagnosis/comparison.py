@@ -17,6 +17,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
+from vegglue.in_short import counted
 from vegglue.inference.homogeneity import equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
@@ -104,6 +105,19 @@ def held_out_rmse(rung: Rung, by: By = "sections") -> float:
     """Root mean square held-out error of velocities [m/s]."""
     error = _of_velocities(rung, by)
     return root_mean_square(error[np.isfinite(error)])
+
+
+def rung_in_short(rung: Rung) -> str:
+    """One line: errors of velocity [m/s] at what the model has seen, and at what was held out or never seen."""
+    told = {
+        "seen": rung.in_sample.rmse[STREAMWISE],
+        "section held out": held_out_rmse(rung),
+        "experiment held out": held_out_rmse(rung, "experiments"),
+        "never seen": rung.validation,
+        "noise floor": rung.in_sample.noise_floor,
+    }
+    known = [f"{words} {value:.2g}" for words, value in told.items() if np.isfinite(value)]
+    return f"{rung.name}, {counted(len(rung.values), 'parameter')}: {', '.join(known)}"
 
 
 def rung_json(rung: Rung) -> dict[str, Any]:

@@ -4,6 +4,7 @@ A new kind is one entry here and its reader in `flow/readers.py`; `adv` in a cas
 velocities, no kind of its own.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.errors import InputError
+from vegglue.in_short import counted
 
 
 @dataclass(frozen=True)
@@ -77,3 +79,16 @@ def kind_of(name: str, where: str = "observations") -> Kind:
 def velocity_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
     """Which stations measure a velocity, in whatever direction (station,). Errors: InputError for an unknown kind."""
     return np.array([kind_of(str(name)).velocity for name in station["kind"]], dtype=bool)
+
+
+def errors_in_short(by_kind: Mapping[str, float]) -> str:
+    """`velocity 0.0098 m/s, level 0.0021 m`: one error of each kind that is known."""
+    known = {kind_of(name): value for name, value in by_kind.items() if np.isfinite(value)}
+    return ", ".join(f"{kind.words} {value:.2g} {kind.unit}" for kind, value in known.items())
+
+
+def stations_in_short(station: pd.DataFrame) -> str:
+    """`18 stations, in use 15 of velocity, 2 of level`."""
+    used = station[station["used"].to_numpy(bool)]
+    counts = [f"{(used['kind'] == name).sum()} of {kind_of(name).words}" for name in dict.fromkeys(station["kind"])]
+    return f"{counted(len(station), 'station')}, in use {', '.join(counts) or 'none'}"

@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.in_short import in_short, interval_in_short
+from vegglue.measurements.kinds import stations_in_short
 from vegglue.results.causes import FaultyInstrument, FieldFound, FieldMapKept, Location, ModelErrorUsed, PlaceMap
 
 # instrument: nothing is missing but that some readings are off.
@@ -221,3 +223,16 @@ class Diagnosis:
     def suspect(self, name: str) -> Suspect:
         """The effect of that name; KeyError without."""
         return {one.name: one for one in self.suspects}[name]
+
+    def __repr__(self) -> str:
+        misfit, sizes = self.misfit, [(name, self.suspect(name).amplitude) for name in self.set]
+        tested = f"{len(self.suspects)} effects tested, vegglue {self.version}"
+        return in_short(
+            f"Diagnosis of {self.name}: {self.verdict.kind}",
+            [
+                self.verdict.sentence,
+                *(interval_in_short(name, one.value, *one.interval95, one.unit) for name, one in sizes),
+                f"chi2 {misfit.chi2:.0f} for {misfit.freedom} degrees of freedom (p = {misfit.p:.2g}), {tested}",
+                stations_in_short(self.predictions.station),
+            ],
+        )

@@ -7,10 +7,11 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from vegglue.measurements.kinds import KINDS
+from vegglue.in_short import counted, in_short
+from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
-from vegglue.solver.status import NOT_YET
+from vegglue.solver.status import FAILED, NOT_YET, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
@@ -57,6 +58,23 @@ class Ensemble:
     config_hash: str
     seed: int
     version: str
+
+    def __repr__(self) -> str:
+        newton, marched, failed = (
+            members_with(self.status, how) for how in (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING, FAILED)
+        )
+        solved = f"{newton:,} solved by Newton's method, {marched:,} by marching, {failed:,} failed"
+        worst = self.mass_error[np.isfinite(self.mass_error)].max(initial=0.0)
+        return in_short(
+            f"Ensemble of {counted(len(self.status), 'member')}: {solved}",
+            [
+                f"parameters: {', '.join(self.parameters)}",
+                f"experiments: {', '.join(self.experiments)}",
+                stations_in_short(self.station),
+                f"largest mass error {worst:.1g} of the discharge",
+                f"seed {self.seed}, vegglue {self.version}",
+            ],
+        )
 
 
 ROWS = stored_fields(Ensemble)  # what is stored of each member

@@ -9,6 +9,8 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
+from vegglue.in_short import counted, in_short, interval_in_short
+from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
 from vegglue.results.layout import Stored
 from vegglue.results.refinement import OWN_UNIT, Refinement
@@ -169,3 +171,20 @@ class Posterior:
     def claimed(self) -> bool:
         """Whether enough effective members carry the weight for anything to rest on it."""
         return self.weighting.effective_size >= CLAIMED_FROM
+
+    def __repr__(self) -> str:
+        sample, marginals, worth = self.sample, self.marginals, self.weighting.effective_size
+        ends, errors = [LEVELS.index(0.025), LEVELS.index(0.975)], errors_in_short(self.fit.rmse)
+        ranges = {name: values[ends] for name, values in marginals.quantiles.items()}
+        return in_short(
+            f"Posterior of {', '.join(self.parameters)} ({self.settings.method})",
+            [
+                f"{sample.members:,} members, {sample.failed:,} failed, worth {worth:.0f} of equal weight",
+                "" if self.claimed else f"no posterior is claimed from fewer than {CLAIMED_FROM}",
+                *(
+                    interval_in_short(name, marginals.median[name], low, high, sample.unit[name])
+                    for name, (low, high) in ranges.items()
+                ),
+                f"root mean square errors of the median at {counted(self.fit.used, 'station')}: {errors}",
+            ],
+        )

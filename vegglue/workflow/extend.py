@@ -18,6 +18,7 @@ from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.errors import InputError
+from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -55,6 +56,10 @@ class StepwiseExtension:
     comparison: Comparison
     sentence: str
     reason: str
+
+    def __repr__(self) -> str:
+        names = " -> ".join(case.name for case in self.cases)
+        return in_short(f"Extension: {names}", [self.sentence, self.reason, *repr(self.comparison).splitlines()])
 
 
 def extend(

@@ -21,7 +21,7 @@ from vegglue.workflow.run_folder import calibrated, folder_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
-# Measurements kept of each question for the page: more than these nobody plans in one season.
+# Measurements shown of each question, and kept for the page: more than these nobody plans in one season.
 KEPT = 4
 # A measurement that raises D^2 by less than a tenth is said to add nothing.
 ADDS = 1.1
@@ -33,6 +33,29 @@ class Question:
 
     tells_apart: str
     measurements: tuple[MeasurementWorth, ...]
+
+    @property
+    def useful(self) -> tuple[MeasurementWorth, ...]:
+        """Those that would tell it apart by themselves, the few that are worth a thought."""
+        enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
+        return tuple(enough)[:KEPT]
+
+    @property
+    def nearest(self) -> tuple[MeasurementWorth, ...]:
+        """The one that comes nearest to it, where there is any."""
+        return tuple(sorted(self.measurements, key=lambda one: -one.then)[:1])
+
+    def __repr__(self) -> str:
+        if not self.useful:
+            most = "".join(f" (D2 at most {best.then:.2g}: {best.plan.name})" for best in self.nearest)
+            return f"To tell {self.tells_apart}: none of {len(self.measurements)} measurements would by itself{most}."
+        heading = f"To tell {self.tells_apart} (D2 now {self.useful[0].now:.2g} squared standard errors):"
+        return "\n".join([heading, *(f"- {_worth_in_short(one)}" for one in self.useful)])
+
+
+def _worth_in_short(one: MeasurementWorth) -> str:
+    plan = one.plan
+    return f"{plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h"
 
 
 @one_thread()
@@ -66,13 +89,12 @@ def next_measurement(
 
 def open_question(question: Question) -> OpenQuestion:
     """A question with the few measurements that would answer it, or the one that comes nearest."""
-    useful = [one for one in question.measurements if one.then >= SEPARATES and one.then > ADDS * one.now]
-    nearest = sorted(question.measurements, key=lambda one: -one.then)[:1]
+    enough = bool(question.useful)
     return OpenQuestion(
         question.tells_apart,
         tuple(
-            ProposedMeasurement(one.plan.name, one.plan.rows.size, one.plan.hours, one.now, one.then, bool(useful))
-            for one in (useful[:KEPT] or nearest)
+            ProposedMeasurement(one.plan.name, one.plan.rows.size, one.plan.hours, one.now, one.then, enough)
+            for one in (question.useful or question.nearest)
         ),
     )
 

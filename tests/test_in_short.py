@@ -1,0 +1,100 @@
+"""How values show themselves in a notebook: a few lines, with units and the sentence that matters."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnoses import NOTHING, a_diagnosis
+from reach import write_reach
+from stored import ALL, a_header, write_chunks
+
+from vegglue.case.config import load_case
+from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.diagnosis.excluded_stations import MEASUREMENT
+from vegglue.diagnosis.next_measurement import MeasurementPlan, MeasurementWorth
+from vegglue.in_short import counted, in_short, interval_in_short
+from vegglue.measurements.kinds import KINDS, errors_in_short
+from vegglue.storage.result_files import read_ensemble
+from vegglue.workflow.compare import Comparison
+from vegglue.workflow.extend import StepwiseExtension
+from vegglue.workflow.next_measurement import Question
+
+MOST_LINES, MOST_LETTERS = 12, 600
+
+
+def a_rung(name: str, validation: float = np.nan) -> Rung:
+    """Three parameters; held-out errors of 0.03 and 0.04 m/s at its two velocities."""
+    rmse = dict.fromkeys(KINDS, np.nan) | {"velocity": 0.021, "level": 0.002}
+    held_out = HeldOut(np.array([0.03, 0.04]), np.full(2, np.nan), np.array([True, True]), ("June A", "June B"))
+    values = dict.fromkeys(("n_b", "phi", "k_s"), (1.0, 0.9, 1.1))
+    return Rung(
+        name, "", (), values, InSample(rmse, 8.0, 2, 0.01), held_out, PredictiveScores(1.0, 0.5, 0.95), {}, validation
+    )
+
+
+def test_building_blocks() -> None:
+    assert in_short("heading", ["one", "", "two"]) == "heading\n  one\n  two"
+    assert (counted(1, "patch", "patches"), counted(2000, "patch", "patches")) == ("1 patch", "2,000 patches")
+    assert interval_in_short("phi", 8.123, 7.0, 9.35, "-") == "phi: 8.12, 95 % 7 to 9.35"
+    assert interval_in_short("k_s", 0.5, 0.4, 0.6, "m").endswith("0.6 m")
+    assert errors_in_short({"level": 0.0021, "velocity": np.nan}) == "level 0.0021 m"
+
+
+def test_a_case_says_what_it_holds(tmp_path: Path) -> None:
+    case = load_case(write_reach(tmp_path))
+    assert repr(case) == str(case)
+    assert repr(case).splitlines() == [
+        "Case brook: A short reach with one patch of willows",
+        "  grid of 30 m by 9 m, cells of 1 m by 0.5 m; 1 patch of plants",
+        "  experiments: June",
+        "  unknown: n_b [s m^(-1/3)], phi [-]; effects: none",
+        "  measured: velocity in velocities.csv",
+        "  1,024 members, seed 7; read from brook.yaml",
+    ]
+
+
+def test_an_ensemble_counts_its_members(tmp_path: Path) -> None:
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header())
+    shown = repr(read_ensemble(tmp_path / "ensemble.h5")).splitlines()
+    assert shown[0] == "Ensemble of 12 members: 4 solved by Newton's method, 4 by marching, 4 failed"
+    assert "  2 stations, in use 1 of velocity, 0 of level" in shown
+    assert "  largest mass error 1e-05 of the discharge" in shown
+
+
+@pytest.mark.parametrize("found", [a_diagnosis(), NOTHING])
+def test_a_diagnosis_says_its_sentence(found) -> None:
+    shown = repr(found)
+    assert shown.startswith(f"Diagnosis of open-x: {found.verdict.kind}\n  {found.verdict.sentence}\n")
+    assert all(f"  {name}: 0.3, 95 % -inf to 0.333 m2/s" in shown for name in found.set)
+    assert len(shown) < MOST_LETTERS
+
+
+def test_a_comparison_is_a_line_for_each_model() -> None:
+    nothing = pd.DataFrame(columns=MEASUREMENT)
+    found = Comparison((a_rung("brook"), a_rung("brook-wind", 0.025)), nothing)
+    assert repr(found).splitlines() == [
+        "Comparison of 2 models, root mean square errors of velocity [m/s]",
+        "  brook, 3 parameters: seen 0.021, section held out 0.035, noise floor 0.01",
+        "  brook-wind, 3 parameters: seen 0.021, section held out 0.035, never seen 0.025, noise floor 0.01",
+    ]
+    aside = pd.DataFrame([["June", "velocity", "A", 1.0, 2.0, 0.5]], columns=MEASUREMENT)
+    assert "1 station is left out of every model" in repr(Comparison(found.rungs, aside))
+    cases = tuple(SimpleNamespace(name=one.name) for one in found.rungs)
+    extension = repr(StepwiseExtension(cases, found, "Missing: wind.", "Added: wind."))
+    assert extension.startswith("Extension: brook -> brook-wind\n  Missing: wind.\n  Added: wind.\n")
+
+
+def test_a_question_names_its_best_measurements() -> None:
+    plans = [
+        MeasurementPlan(f"section {n}", np.arange(3), pd.DataFrame(), 1.5, 0.0, "June", SimpleNamespace())
+        for n in range(6)
+    ]
+    useful = Question("wind from waves", tuple(MeasurementWorth(plan, 2.0, 9.0) for plan in plans))
+    assert repr(useful).splitlines() == [
+        "To tell wind from waves (D2 now 2 squared standard errors):",
+        *(f"- section {n}: 9, 3 station(s), 1.5 h" for n in range(4)),
+    ]
+    useless = Question("wind from waves", (MeasurementWorth(plans[0], 2.0, 2.1),))
+    assert repr(useless).endswith("none of 1 measurements would by itself (D2 at most 2.1: section 0).")

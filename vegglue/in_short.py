@@ -1,0 +1,18 @@
+"""How values show themselves where they are printed: a heading, and below it a few lines with units."""
+
+from collections.abc import Iterable
+
+
+def in_short(heading: str, lines: Iterable[str]) -> str:
+    """The heading, and the lines that say something, indented below it."""
+    return "\n".join([heading, *(f"  {line}" for line in lines if line)])
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """`1 station`, `1,024 stations`; many: where it is not the one with an s."""
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:
+    """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit behind unless it is none."""
+    return f"{name}: {value:.3g}, 95 % {low:.3g} to {high:.3g} {unit.removesuffix('-')}".rstrip()
