@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from vegglue.workflow.extend import extend, extend_stepwise
     from vegglue.workflow.import_folder import import_folder
     from vegglue.workflow.infer import infer
+    from vegglue.workflow.load import load
     from vegglue.workflow.next_measurement import next_measurement
     from vegglue.workflow.report import report
     from vegglue.workflow.run import run
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "extend", "extend_stepwise",
-    "import_folder", "infer", "load_case", "make_twin", "next_measurement", "report", "reveal", "run", "simulate",
+    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "report", "reveal", "run",
+    "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION

@@ -1,0 +1,85 @@
+"""`vegglue.load`: what lies in the folder of a run, as xarray and ArviZ know it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnoses import a_diagnosis
+from posteriors import a_posterior
+from stored import ALL, HASH, MEMBERS, WINDOW, a_header, write_chunks
+
+import vegglue
+from vegglue.storage import labelled_arrays
+from vegglue.storage.result_files import write_diagnosis, write_posterior
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """A folder in which every step has left its result."""
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header(window=WINDOW))
+    write_posterior(tmp_path / "posterior.h5", a_posterior(canopy=True), "name: d0\n", HASH)
+    write_diagnosis(tmp_path / "diagnosis.h5", a_diagnosis(), "name: d0\n", HASH)
+    return tmp_path
+
+
+def test_everything_in_a_folder_is_loaded(run: Path) -> None:
+    loaded = vegglue.load(str(run))
+    assert dict(loaded.ensemble.sizes)["member"] == MEMBERS
+    assert loaded.ensemble.prediction.dims == ("member", "station")
+    np.testing.assert_array_equal(loaded.ensemble.z_last, np.linspace(1, 2, MEMBERS))
+    assert loaded.ensemble.z_last.attrs["units"] == "m"
+    assert loaded.fields.u.dims == ("member", "experiment", "x", "y")
+    assert float(loaded.members.weights.sum()) == pytest.approx(1.0)
+    assert loaded.posterior.posterior["phi"].dims == ("chain", "draw")
+    assert loaded.diagnosis.verdict == a_diagnosis().verdict
+    assert loaded.stations["kind"].tolist() == ["velocity", "level"]
+    assert loaded.stations["used"].dtype == bool
+    for data in (loaded.ensemble, loaded.members):
+        assert (data.attrs["config"], data.attrs["config_hash"]) == ("name: d0\n", HASH)
+
+
+def test_a_loaded_run_says_what_it_holds(run: Path) -> None:
+    shown = repr(vegglue.load(run))
+    for part in ("Run in", "ensemble: 12 member", "fields:", "posterior: n_b, phi", "Missing: eddies", "2 rows"):
+        assert part in shown
+
+
+def test_files_are_closed_so_that_a_command_may_write_them(run: Path) -> None:
+    loaded = vegglue.load(run)
+    for path in run.glob("*.h5"):
+        path.unlink()
+    assert float(loaded.fields.u.max()) > 0.0
+    assert loaded.posterior.posterior["phi"].values.size == 2000
+
+
+def test_what_was_not_done_is_none(tmp_path: Path) -> None:
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header())
+    loaded = vegglue.load(tmp_path)
+    assert (loaded.fields, loaded.members, loaded.posterior, loaded.diagnosis) == (None,) * 4
+    assert len(loaded.stations) == 2
+    assert repr(loaded).count("\n") == 2
+
+
+def test_an_empty_folder_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(vegglue.InputError, match=r"expected results of a run .* run `vegglue simulate CONFIG`"):
+        vegglue.load(tmp_path / "no" / "such")
+
+
+def test_a_broken_file_is_told(run: Path) -> None:
+    (run / "posterior.h5").write_bytes(b"no HDF5")
+    with pytest.raises(vegglue.StorageError, match=r"posterior\.h5: cannot be opened"):
+        vegglue.load(run)
+
+
+@pytest.mark.parametrize("missing", ["xarray", "arviz", "h5netcdf"])
+def test_a_missing_library_is_one_sentence(run: Path, missing: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = labelled_arrays.import_module
+
+    def without(name: str) -> object:
+        if name == missing:
+            raise ImportError(name)
+        return known(name)
+
+    monkeypatch.setattr(labelled_arrays, "import_module", without)
+    with pytest.raises(vegglue.InputError, match=rf"the library {missing}, .* `pip install 'vegglue\[arviz\]'`"):
+        vegglue.load(run)

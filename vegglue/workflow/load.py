@@ -1,0 +1,85 @@
+"""folder of a run -> what lies there, as xarray and ArviZ know it: for notebooks, from any step of the line."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import pandas as pd
+
+from vegglue.errors import InputError
+from vegglue.in_short import in_short
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.storage.labelled_arrays import read_inference_data, read_labelled
+from vegglue.storage.result_files import read_diagnosis
+
+if TYPE_CHECKING:
+    import arviz
+    import xarray
+
+FILES = ("ensemble.h5", "fields.h5", "posterior.h5", "diagnosis.h5")
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True)
+class LoadedRun:
+    """What lies in the folder of a run; None where a step was not done.
+
+    ensemble: all members: their parameters, prediction (member, station), status, reason, mass_error and so on.
+    fields: level, u and v (member, experiment, x, y), where the case keeps them. members: of the posterior, with
+    theta (parameter, member), weights and what follows from them. posterior: draws of equal weight for ArviZ, with the
+    groups prior, log_likelihood, posterior_predictive and others. stations: one row for each measurement.
+    Attributes of a dataset say from which config, seed and version it is; its variables have `units`.
+    """
+
+    folder: Path
+    ensemble: "xarray.Dataset | None"
+    fields: "xarray.Dataset | None"
+    members: "xarray.Dataset | None"
+    posterior: "arviz.InferenceData | None"
+    diagnosis: Diagnosis | None
+    stations: pd.DataFrame | None
+
+    def __repr__(self) -> str:
+        sized = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
+        lines = [
+            f"{name}: {', '.join(f'{size:,} {dim}' for dim, size in data.sizes.items())}"
+            for name, data in sized.items()
+            if data is not None
+        ]
+        if self.posterior is not None:
+            drawn: xarray.Dataset = self.posterior["posterior"]
+            lines.append(f"posterior: {', '.join(map(str, drawn.data_vars))}")
+        if self.diagnosis is not None:
+            lines.append(f"diagnosis: {self.diagnosis.verdict.kind}. {self.diagnosis.verdict.sentence}")
+        if self.stations is not None:
+            lines.append(f"stations: {len(self.stations):,} rows")
+        return in_short(f"Run in {self.folder}", lines)
+
+
+def load(folder: Path | str) -> LoadedRun:
+    """Read all results in the folder of a run, such as runs/brook.
+
+    Errors: InputError when there are none, or xarray or ArviZ is not installed; StorageError for a broken file.
+    """
+    folder = Path(folder)
+    there = {name for name in FILES if (folder / name).exists()}
+    if not there:
+        raise InputError(
+            f"{folder}: expected results of a run ({', '.join(FILES)}), found none; check the folder, or run "
+            "`vegglue simulate CONFIG`."
+        )
+
+    def read(name: str, how: Callable[..., Read], *groups: str) -> Read | None:
+        return how(folder / name, *groups) if name in there else None
+
+    stated = next((name for name in ("posterior.h5", "ensemble.h5") if name in there), None)
+    return LoadedRun(
+        folder=folder,
+        ensemble=read("ensemble.h5", read_labelled, "members", "parameters"),
+        fields=read("fields.h5", read_labelled, "fields"),
+        members=read("posterior.h5", read_labelled, "members"),
+        posterior=read("posterior.h5", read_inference_data),
+        diagnosis=read("diagnosis.h5", read_diagnosis),
+        stations=None if stated is None else read_labelled(folder / stated, "stations").to_dataframe(),
+    )
