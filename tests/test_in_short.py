@@ -14,7 +14,7 @@ from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
 from vegglue.diagnosis.next_measurement import MeasurementPlan, MeasurementWorth
-from vegglue.in_short import counted, in_short, interval_in_short
+from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import KINDS, errors_in_short
 from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.compare import Comparison
@@ -36,7 +36,7 @@ def a_rung(name: str, validation: float = np.nan) -> Rung:
 
 def test_building_blocks() -> None:
     assert in_short("heading", ["one", "", "two"]) == "heading\n  one\n  two"
-    assert (counted(1, "patch", "patches"), counted(2000, "patch", "patches")) == ("1 patch", "2,000 patches")
+    assert (so_many(1, "patch", "patches"), so_many(2000, "patch", "patches")) == ("1 patch", "2,000 patches")
     assert interval_in_short("phi", 8.123, 7.0, 9.35, "-") == "phi: 8.12, 95 % 7 to 9.35"
     assert interval_in_short("k_s", 0.5, 0.4, 0.6, "m").endswith("0.6 m")
     assert errors_in_short({"level": 0.0021, "velocity": np.nan}) == "level 0.0021 m"

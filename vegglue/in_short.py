@@ -8,7 +8,7 @@ def in_short(heading: str, lines: Iterable[str]) -> str:
     return "\n".join([heading, *(f"  {line}" for line in lines if line)])
 
 
-def counted(number: int, one: str, many: str = "") -> str:
+def so_many(number: int, one: str, many: str = "") -> str:
     """`1 station`, `1,024 stations`; many: where it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
 

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
-from vegglue.in_short import counted, in_short
+from vegglue.in_short import in_short, so_many
 
 
 class Experiment(Part):
@@ -192,7 +192,7 @@ class Case(Part):
         (west, east), (south, north), (dx, dy) = self.grid.x, self.grid.y, self.grid.cell
         measured = dict.fromkeys(f"{one.kind} in {one.file.name}" for one in self.observations)
         unknowns = [f"{name} [{one.unit}]" for name, one in self.parameters.items()]
-        patches = counted(len(self.plants.patches), "patch", "patches")
+        patches = so_many(len(self.plants.patches), "patch", "patches")
         return in_short(
             f"Case {self.name}: {self.title}".removesuffix(": "),
             [
@@ -200,7 +200,7 @@ class Case(Part):
                 f"experiments: {', '.join(self.experiments)}",
                 f"unknown: {', '.join(unknowns) or 'nothing'}; effects: {', '.join(self.effects) or 'none'}",
                 f"measured: {', '.join(measured) or 'nothing'}",
-                f"{counted(self.simulate.members, 'member')}, seed {self.simulate.seed}; read from {self.source.name}",
+                f"{so_many(self.simulate.members, 'member')}, seed {self.simulate.seed}; read from {self.source.name}",
             ],
         )
 

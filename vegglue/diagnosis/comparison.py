@@ -17,7 +17,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
-from vegglue.in_short import counted
+from vegglue.in_short import so_many
 from vegglue.inference.homogeneity import equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
@@ -117,7 +117,7 @@ def rung_in_short(rung: Rung) -> str:
         "noise floor": rung.in_sample.noise_floor,
     }
     known = [f"{words} {value:.2g}" for words, value in told.items() if np.isfinite(value)]
-    return f"{rung.name}, {counted(len(rung.values), 'parameter')}: {', '.join(known)}"
+    return f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known)}"
 
 
 def rung_json(rung: Rung) -> dict[str, Any]:

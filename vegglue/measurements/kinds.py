@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.errors import InputError
-from vegglue.in_short import counted
+from vegglue.in_short import so_many
 
 
 @dataclass(frozen=True)
@@ -91,4 +91,4 @@ def stations_in_short(station: pd.DataFrame) -> str:
     """`18 stations, in use 15 of velocity, 2 of level`."""
     used = station[station["used"].to_numpy(bool)]
     counts = [f"{(used['kind'] == name).sum()} of {kind_of(name).words}" for name in dict.fromkeys(station["kind"])]
-    return f"{counted(len(station), 'station')}, in use {', '.join(counts) or 'none'}"
+    return f"{so_many(len(station), 'station')}, in use {', '.join(counts) or 'none'}"

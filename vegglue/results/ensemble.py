@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from vegglue.in_short import counted, in_short
+from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
@@ -66,7 +66,7 @@ class Ensemble:
         solved = f"{newton:,} solved by Newton's method, {marched:,} by marching, {failed:,} failed"
         worst = self.mass_error[np.isfinite(self.mass_error)].max(initial=0.0)
         return in_short(
-            f"Ensemble of {counted(len(self.status), 'member')}: {solved}",
+            f"Ensemble of {so_many(len(self.status), 'member')}: {solved}",
             [
                 f"parameters: {', '.join(self.parameters)}",
                 f"experiments: {', '.join(self.experiments)}",

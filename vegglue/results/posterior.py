@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from vegglue.in_short import counted, in_short, interval_in_short
+from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
 from vegglue.results.layout import Stored
@@ -185,6 +185,6 @@ class Posterior:
                     interval_in_short(name, marginals.median[name], low, high, sample.unit[name])
                     for name, (low, high) in ranges.items()
                 ),
-                f"root mean square errors of the median at {counted(self.fit.used, 'station')}: {errors}",
+                f"root mean square errors of the median at {so_many(self.fit.used, 'station')}: {errors}",
             ],
         )

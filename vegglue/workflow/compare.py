@@ -11,7 +11,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import excluded_by, exclusion_in_words
 from vegglue.figures.error_ladder import save_ladder_figure
-from vegglue.in_short import counted, in_short
+from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -31,7 +31,7 @@ class Comparison:
     left_out: pd.DataFrame
 
     def __repr__(self) -> str:
-        heading = f"Comparison of {counted(len(self.rungs), 'model')}, root mean square errors of velocity [m/s]"
+        heading = f"Comparison of {so_many(len(self.rungs), 'model')}, root mean square errors of velocity [m/s]"
         return in_short(heading, [*map(rung_in_short, self.rungs), exclusion_in_words(self.left_out)])
 
 
