@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import startup
 from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
@@ -48,6 +49,7 @@ QUARTER, MARCHED_STEP, NEAR, LONGEST = 15, 1.0, 1e-6, 300
 def main() -> None:
     case = load_case(CONFIG)
     print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}")
+    startup.main()
     step = marching(case)
     member = steady(case)
     print(f"steady state by Newton / {PAPER_STEPS:,} marched steps: {PAPER_STEPS * step / member:.0f} times faster")
