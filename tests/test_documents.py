@@ -16,7 +16,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.
 SHOWN = (ROOT / "docs" / "tutorial.md", ROOT / "README.md")
 LEFT_OUT = "..."
-NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?")
+NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?")
 # Share by which a number may differ on another machine [-]: arithmetic there is another in the last digits, and what is
 # drawn at random follows it. Where one unit of the last digit shown is more, that may be.
 ANOTHER_MACHINE = 0.1

@@ -66,3 +66,12 @@ def test_only_numpy_is_needed_to_refuse_an_effect(tmp_path: Path) -> None:
     code, imported = imported_by(tmp_path, "diagnose", config.name)
     assert code == 2
     assert imported & HEAVY == {"numpy"}
+
+
+@pytest.mark.parametrize("verb", ["simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
+def test_nothing_draws_before_there_is_something_to_draw(verb: str) -> None:
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys, vegglue; vegglue.{verb}; print(*sys.modules)"],
+        env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert {name.split(".")[0] for name in found.stdout.split()} & {"jinja2", "matplotlib", "rich", "typer"} == set()

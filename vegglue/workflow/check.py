@@ -5,7 +5,6 @@ from pathlib import Path
 
 from vegglue.case.schema import Case
 from vegglue.checks.case_check import check_case
-from vegglue.checks.effect_contract import breaches
 from vegglue.effects.library import effects_of
 from vegglue.errors import InputError
 from vegglue.figures.channel import save_channel_figure
@@ -50,4 +49,6 @@ def check_effects(file: Path, *, trust: bool = False) -> dict[str, list[str]]:
         raise InputError(f"{file}: runs as code when it is checked: read it, and add --trust if you trust it.")
     if not file.is_file():
         raise InputError(f"{file}: expected an existing Python file of effects; correct the path.")
+    from vegglue.checks.effect_contract import breaches
+
     return {effect.name: breaches(effect, file.resolve()) for effect in effects_of(file.resolve())}

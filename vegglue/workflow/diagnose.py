@@ -13,7 +13,6 @@ from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
@@ -36,6 +35,8 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     with at_most(jobs):
         found = diagnose_model(model_in(case), watch, validation_of(case))
     write_diagnosis(path, found, resolved_yaml(case), wanted)
+    from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
+
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.parameters.first)
     return found
@@ -52,6 +53,8 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     trace, station = fingerprint_of(case, folder, effect)
     amplitude = effect.amplitude
     unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
+    from vegglue.report_page.diagnosis_pictures import save_fingerprint_figure
+
     save_fingerprint_figure(trace, station, unit, path)
     return path
 

@@ -14,7 +14,6 @@ from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 from vegglue.workflow.infer import infer
 from vegglue.workflow.next_measurement import next_measurement
-from vegglue.workflow.report import report
 from vegglue.workflow.run_folder import folder_of, of_size
 from vegglue.workflow.simulate import is_simulated, simulate
 
@@ -48,6 +47,8 @@ def run(
     last = extension.cases[-1]
     picture = draw_ladder_of(extension.comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
+    from vegglue.workflow.report import report
+
     both = {one.source: one for one in (case, last)}.values()
     # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
     for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show)]:
