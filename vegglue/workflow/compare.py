@@ -8,15 +8,9 @@ import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-<<<<<<< HEAD
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import excluded_by, exclusion_in_words
-from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.in_short import in_short, so_many
-=======
-from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung
-from vegglue.diagnosis.excluded_stations import excluded_by
->>>>>>> 57e4ab5 (workflow: import what draws when there is something to draw)
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
