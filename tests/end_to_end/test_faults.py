@@ -5,6 +5,7 @@ import os
 import resource
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -65,13 +66,26 @@ def running(folder: Path, *arguments: str | int) -> Iterator["subprocess.Popen[s
         process.communicate(timeout=60)
 
 
-def wait_for_chunks(process: "subprocess.Popen[str]", chunks: int) -> None:
-    """Read what a run says until so many chunks are stored."""
-    assert process.stdout
-    for line in process.stdout:
-        if f" {chunks * CHUNK} of " in line:
-            return
+def wait_for_chunks(process: "subprocess.Popen[str]", part: Path, chunks: int) -> None:
+    """Look at what a run writes until so many chunks are stored; it says so only now and then."""
+    while process.poll() is None:
+        with suppress(OSError, KeyError), h5py.File(part, "r", locking=False) as file:  # it may be half written
+            if file["progress/finished"][:].sum() >= chunks:
+                return
+        time.sleep(0.01)
     pytest.fail(f"the run ended too early: {process.stderr.read() if process.stderr else ''}")
+
+
+def stop_between_chunks(process: "subprocess.Popen[str]", part: Path) -> None:
+    """Stop a run while no chunk is half written: such a one is solved again, and does not count as from before."""
+    for _ in range(1000):
+        os.kill(process.pid, signal.SIGSTOP)
+        with suppress(OSError, KeyError), h5py.File(part, "r", locking=False) as file:
+            if np.isfinite(file["members/seconds"][:]).sum() == CHUNK * file["progress/finished"][:].sum():
+                return
+        os.kill(process.pid, signal.SIGCONT)
+        time.sleep(0.01)
+    pytest.fail("chunks are always half written")
 
 
 def stored(part: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +100,8 @@ def stored(part: Path) -> tuple[np.ndarray, np.ndarray]:
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemble, jobs: int) -> None:
     config = several_chunks(tmp_path)
     with running(tmp_path, "simulate", config.name, "--jobs", jobs) as process:
-        wait_for_chunks(process, 1)
+        wait_for_chunks(process, tmp_path / PART, 1)
+        stop_between_chunks(process, tmp_path / PART)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
     there, seconds = stored(tmp_path / PART)
@@ -96,7 +111,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemb
     assert refused.returncode == 2
     assert "found only a part of the members; run `vegglue simulate CONFIG`" in refused.stderr
     said = vegglue(tmp_path, "simulate", config.name, "--jobs", 3 - jobs).stdout
-    assert f"{there.size} of {CHUNKS * CHUNK} members ({there.size} from before)" in said
+    assert f"{there.size:,} of {CHUNKS * CHUNK:,} members ({there.size:,} from before)" in said
     ensemble = read_ensemble(tmp_path / ENSEMBLE)
     assert not (tmp_path / PART).exists()
     assert_same_numbers(ensemble, uninterrupted)
@@ -125,7 +140,7 @@ def interruptible() -> Iterator[None]:
 def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)
     with running(tmp_path, "simulate", config.name, "--jobs", 1) as process:
-        wait_for_chunks(process, 1)
+        wait_for_chunks(process, tmp_path / PART, 1)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         _, error = process.communicate(timeout=60)
     assert process.returncode == 130, error
@@ -138,7 +153,7 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
 def test_a_second_run_of_one_name_is_refused(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)
     with running(tmp_path, "simulate", config.name, "--jobs", 1) as process:
-        wait_for_chunks(process, 0)
+        wait_for_chunks(process, tmp_path / PART, 0)
         os.kill(process.pid, signal.SIGSTOP)  # holds its lock for as long as this test wants
         second = vegglue(tmp_path, "simulate", config.name, "--jobs", 1, succeed=False)
         assert second.returncode == 3

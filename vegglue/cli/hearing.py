@@ -46,7 +46,7 @@ def moving_line(screen: "Console") -> Iterator[Watch]:
     words = (TextColumn(f"{{task.{part}}}", markup=False) for part in ("description", "fields[count]"))
     columns = (SpinnerColumn(), next(words), BarColumn(bar_width=16), next(words), TimeElapsedColumn())
     with Bar(*columns, console=screen, transient=True) as bar:
-        task, timed = bar.add_task("", total=None, count=""), with_pace()
+        task, timed = bar.add_task("", total=None, count="", visible=False), with_pace()
 
         def watch(progress: Progress) -> None:
             new, pace = timed(progress)
@@ -57,6 +57,7 @@ def moving_line(screen: "Console") -> Iterator[Watch]:
                 description=progress.phase,
                 completed=progress.done,
                 total=progress.total,
+                visible=True,
                 count=str(progress).removeprefix(progress.phase).removeprefix(": ") + pace,
             )
 
