@@ -106,7 +106,7 @@ def test_the_snippet_on_files_runs(
     monkeypatch.chdir(finished[0])
     monkeypatch.setenv("MPLBACKEND", "agg")
     names: dict[str, object] = {}
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("## The files")[2]
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("## What lies in the folder of a run")[2]
     found = re.search(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert found
     exec(compile(found[1], "python.md", "exec"), names)
@@ -114,8 +114,6 @@ def test_the_snippet_on_files_runs(
     assert re.search(r"n_b +0\.05", said)
     assert float(re.findall(r"([\d.]+) m/s is expected", said)[0]) == pytest.approx(0.40, abs=0.03)
     assert isinstance(names["weights"], xr.DataArray)
-    for file in ("members", "ensemble"):
-        names[file].close()  # type: ignore[attr-defined]
 
 
 def test_an_ensemble_without_measurements_can_be_simulated(

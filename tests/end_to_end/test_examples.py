@@ -13,7 +13,8 @@ import vegglue
 
 PAGE = ROOT / "docs" / "python.md"
 EXAMPLES = ROOT / "docs" / "examples"
-SMALL = ("members: 1024", "members: 64")
+MEMBERS = 64
+SMALL = ("members: 1024", f"members: {MEMBERS}")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 pytestmark = pytest.mark.slow
 
@@ -39,6 +40,7 @@ def test_the_page_is_right(user: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert len(blocks) == 3
     names = run_code("\n".join(blocks), PAGE.name)
     assert Path(str(names["page"])).exists()
+    assert len(names["ensemble"].status) == MEMBERS
     said = capsys.readouterr().out
     for part in ("Posterior of n_b, phi", "Diagnosis of brook", "Run in runs/brook", "is the mean of phi"):
         assert part in said

@@ -1,7 +1,6 @@
 """`import vegglue`: the verbs on the nouns from Python, on the example of the README; fast to import."""
 
 import ast
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
-from vegglue.storage.result_files import read_ensemble, stored_hash
+from vegglue.storage.result_files import stored_hash
 
 MEMBERS = 16
 HEAVY = ("numpy", "numba", "pandas", "scipy", "h5py", "matplotlib", "pydantic", "yaml", "typer", "joblib")
@@ -106,17 +105,3 @@ def test_an_ensemble_of_another_case_is_refused(tmp_path: Path) -> None:
     other = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, ("level: 0.95", "level: 0.96")))
     with pytest.raises(vegglue.InputError, match="brook: expected its own ensemble"):
         vegglue.infer(other, ensemble, runs=tmp_path / "runs")
-
-
-@pytest.mark.slow  # refines to the end, on all cores
-def test_the_page_is_right_about_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
-    found = re.search(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    assert found
-    write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    exec(compile(found[1], "python.md", "exec"), names)
-    assert isinstance(names["page"], Path)
-    assert names["page"].exists()
-    assert len(read_ensemble(tmp_path / "runs" / "brook" / "ensemble.h5").status) == MEMBERS
