@@ -69,6 +69,14 @@ def slope(field: Field, wet: Field, step: float, axis: int) -> Field:
     return np.moveaxis(total / np.maximum(number, 1.0) / step, 0, axis)
 
 
+def gradients(s: State) -> tuple[Field, Field, Field, Field]:
+    """du/dx, du/dy, dv/dx, dv/dy [1/s]."""
+    wet = s.flow.h > DRY
+    u_x, u_y = (slope(s.flow.u, wet, step, axis) for axis, step in enumerate(s.spacing))
+    v_x, v_y = (slope(s.flow.v, wet, step, axis) for axis, step in enumerate(s.spacing))
+    return u_x, u_y, v_x, v_y
+
+
 def shear(s: State) -> Field:
     """|du/dy| [1/s]."""
     return np.abs(slope(s.flow.u, s.flow.h > DRY, s.spacing[1], 1))
@@ -148,9 +156,7 @@ DRAG: dict[str, Effect] = {
 
 
 def _strain(s: State, coefficient: float) -> Field:
-    wet, (dx, dy) = s.flow.h > DRY, s.spacing
-    u_x, v_x = (slope(field, wet, dx, 0) for field in (s.flow.u, s.flow.v))
-    u_y, v_y = (slope(field, wet, dy, 1) for field in (s.flow.u, s.flow.v))
+    u_x, u_y, v_x, v_y = gradients(s)
     return coefficient**2 * USER_CELL * np.sqrt(2.0 * u_x**2 + 2.0 * v_y**2 + (u_y + v_x) ** 2)
 
 
@@ -178,9 +184,7 @@ Stress = tuple[Field, Field, Field]
 
 def _helix(s: State, share: float) -> Stress:
     """Kalkwijk and Booij (1986): the stress of a spiral in balance, of the curvature of stream lines."""
-    (u, v), wet, (dx, dy) = (s.flow.u, s.flow.v), s.flow.h > DRY, s.spacing
-    u_x, v_x = slope(u, wet, dx, 0), slope(v, wet, dx, 0)
-    u_y, v_y = slope(u, wet, dy, 1), slope(v, wet, dy, 1)
+    (u, v), (u_x, u_y, v_x, v_y) = (s.flow.u, s.flow.v), gradients(s)
     turn = s.h * (u**2 * v_x - v**2 * u_y + u * v * (v_y - u_x)) / (u**2 + v**2 + 0.0025) ** 1.5
     turn = turn / np.sqrt(1.0 + 4.0 * turn**2)
     a = np.minimum(np.sqrt(s.bed_k * s.h) / KARMAN, 0.5)

@@ -1,7 +1,7 @@
 """A second solver of the shallow-water equations; it shares neither code nor scheme nor grid with the package.
 
     dh/dt + d(hu)/dx + d(hv)/dy = s
-    d(hu)/dt + d(hu^2 + g h^2/2)/dx + d(huv)/dy = -g h dz/dx - h k |U| u + div(h nu grad u) - d(K h u^2)/dy, v alike
+    d(hu)/dt + d(hu^2 + g h^2/2)/dx + d(huv)/dy = -g h dz/dx - h k |U| u + div(h nu grad u) + push, v alike
 
 Explicit finite volumes on collocated cells: HLLC (Toro 2001), hydrostatic reconstruction (Audusse et al. 2004,
 doi:10.1137/S1064827503431090) about a bed known at the faces, slopes after van Albada, Heun's steps, friction implicit
@@ -46,7 +46,7 @@ class Flow:
 @dataclass(frozen=True)
 class Reach:
     """A channel on cells dx by dy [m]: bed at centres z, at faces zx (nx+1, ny) and zy (nx, ny+1) [m]; source: water
-    added [m/s]; twist: K at y faces (ny+1) [-]; mixing: l [m] of nu + l^2 |du/dy|; closure: of a flow.
+    added [m/s]; closure: of a flow.
     """
 
     dx: float
@@ -55,9 +55,7 @@ class Reach:
     zx: Field
     zy: Field
     source: Field
-    twist: Field
     closure: Callable[[Flow], Closure]
-    mixing: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,8 +80,8 @@ def rates(reach: Reach, ends: Ends, flow: Flow, acting: Closure) -> tuple[Field,
     kernels.rates_y(h, eta, u, v, *slopes, reach.zy, reach.dy, rh, ru, rv)
     kernels.walls(h, eta, reach.zy, reach.dy, rv)
     kernels.ends(h, eta, u, v, reach.zx, reach.dx, reach.dy, ends.discharge, ends.level, ends.share, rh, ru, rv)
-    kernels.mixing_x(h, u, v, reach.dx, reach.dy, acting.viscosity, reach.mixing, ru, rv)
-    kernels.mixing_y(h, u, v, reach.dy, acting.viscosity, reach.mixing, reach.twist, ru, rv)
+    kernels.mixing_x(h, u, v, reach.dx, acting.viscosity, ru, rv)
+    kernels.mixing_y(h, u, v, reach.dy, acting.viscosity, ru, rv)
     return rh, ru, rv
 
 

@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ SETTINGS = {
     "exp": "experiment whose true discharge is factor times the reported one (low, mid, high)",
     "factor": "true over reported discharge",
     "mixk": "nu_t = nu + l^2 |du/dy|, l = mixk in metres",
-    "ervine": "force per unit mass -(1/h) d(K h u^2)/dy with K(y) = ervine sin(pi y/1.5) exp(-(y/2.2)^4)",
+    "ervine": "force per unit mass -(1/h) d(K h u^2)/dy with K(y) = ervine sin(pi y/1.5) exp(-(y/2.25)^4)",
     "pier": "[x, y, s]: extra drag c |U| u per unit mass, c = s exp(-((X-x)/0.35)^2-((Y-y)/0.3)^2)",
     "scour": "[x, y, depth, lx, ly]: the bed is lower by depth exp(-((X-x)/lx)^2-((Y-y)/ly)^2), a bar if negative",
     "station": "y of the probe that reads too much by bias in all experiments [m]",
@@ -36,8 +37,14 @@ SETTINGS = {
     "skew": "the inflow is spread by h^(5/3) (1 + skew y/1.5), at least 0.1 h^(5/3)",
     "banktrend": "drag in 1/m, added on |y| > 1.5 m: banktrend (x/100 - 0.5) + |banktrend|/2",
 }
-# Error of the survey of the bed [m], and over what it is the same [m].
-BED_ERROR, BED_LENGTHS = 0.01, (2.0, 0.5)
+# Settings by the effect they are: its name, that of its amplitude, and its shapes.
+AS_EFFECTS: dict[str, tuple[str, str, dict[str, float]]] = {
+    "chi": ("streamlining", "vogel_exponent", {"reference_speed": 0.35}),
+    "mixk": ("mixing_length", "length", {}),
+    "ervine": ("secondary_current", "strength", {}),
+}
+# Error of the survey of the bed [m], over what it is the same [m], and how densely it is drawn [m].
+BED_ERROR, BED_LENGTHS, BED_STEP = 0.01, (2.0, 0.5), 0.125
 
 
 @dataclass(frozen=True)
@@ -84,14 +91,21 @@ def _survey_error(x: Field, y: Field, truth: Truth) -> Field:
     """Smooth noise of one site, the same at every place whatever the grid [m]."""
     if truth.bed_seed is None:
         return np.zeros(np.broadcast(x, y).shape)
-    step = 0.125
-    noise = np.random.default_rng(truth.bed_seed).standard_normal((int(truth.channel.length / step) + 1, 81))
-    # a Gaussian filter of width s correlates over exp(-d^2/(4 s^2)): 1/e at the stated lengths
-    smooth = gaussian_filter(noise, [0.5 * length / step for length in BED_LENGTHS], mode="nearest")
-    smooth *= BED_ERROR / smooth.std()
-    i = np.clip(np.rint(x / step).astype(int), 0, smooth.shape[0] - 1)
-    j = np.clip(np.rint((y + 5.0) / step).astype(int), 0, smooth.shape[1] - 1)
+    smooth = _smooth_noise(truth.bed_seed, truth.channel.length)
+    i = np.clip(np.rint(x / BED_STEP).astype(int), 0, smooth.shape[0] - 1)
+    j = np.clip(np.rint((y + 5.0) / BED_STEP).astype(int), 0, smooth.shape[1] - 1)
     return smooth[i, j]
+
+
+@lru_cache(maxsize=4)  # a flow asks for it at centres and faces of three grids
+def _smooth_noise(seed: int, length: float) -> Field:
+    """Errors every BED_STEP along a channel of this length [m], and across 10 m about its axis [m]."""
+    noise = np.random.default_rng(seed).standard_normal((int(length / BED_STEP) + 1, 81))
+    # a Gaussian filter of width s correlates over exp(-d^2/(4 s^2)): 1/e at the stated lengths
+    smooth = gaussian_filter(noise, [0.5 * length / BED_STEP for length in BED_LENGTHS], mode="nearest")
+    smooth *= BED_ERROR / smooth.std()
+    smooth.flags.writeable = False
+    return smooth
 
 
 def centres(cells: tuple[float, float], level: float, channel: Channel = PAPER) -> tuple[Field, Field]:
@@ -107,21 +121,25 @@ def centres(cells: tuple[float, float], level: float, channel: Channel = PAPER) 
 def reach_of(truth: Truth, cells: tuple[float, float], level: float) -> Reach:
     """The site on cells of this size [m]."""
     (dx, dy), (x, y) = cells, centres(cells, level, truth.channel)
-    settings, channel = truth.settings, truth.planted
+    channel = truth.planted
     x_faces, y_faces = np.arange(len(x) + 1)[:, None] * dx, np.append(y[0] - dy / 2, y[0, -1] + dy / 2)[None, :]
-    edges = y_faces[0]
-    effects = dict(truth.effects)
-    if "chi" in settings:
-        effects["streamlining"] = {"vogel_exponent": float(settings["chi"]), "reference_speed": 0.35}
+    effects = {**truth.effects, **_effects_of(truth.settings)}
     ground = Ground(truth.nb, truth.ks, truth.phi, truth.hd, truth.nu, truth.stems, truth.formulation, effects)
     extra = _extra_drag(x, y, truth)
     return Reach(
         dx=dx, dy=dy, z=bed_level(x, y, truth), zx=bed_level(x_faces, y, truth), zy=bed_level(x, y_faces, truth),
         source=_source(x, y, cells, truth),
-        twist=settings.get("ervine", 0.0) * np.sin(np.pi * edges / 1.5) * np.exp(-((edges / 2.2) ** 4)),
         closure=closure_of(ground, channel, lie_of(channel, x, y, dx, dy), cells, extra),
-        mixing=float(settings.get("mixk", 0.0)),
     )  # fmt: skip
+
+
+def _effects_of(settings: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Settings that are effects of `second_effects` under another name."""
+    return {
+        effect: {amplitude: float(settings[name]), **shapes}
+        for name, (effect, amplitude, shapes) in AS_EFFECTS.items()
+        if name in settings
+    }
 
 
 def _extra_drag(x: Field, y: Field, truth: Truth) -> Field:

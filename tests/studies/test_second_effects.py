@@ -57,7 +57,7 @@ def numbers_of(model, name):
 
 @pytest.mark.slow
 def test_where_nothing_is_hidden_both_codes_agree(short, plain):
-    """0.002 m/s, a fifth of the error of a probe; no number was fitted to the other."""
+    """0.003 m/s, a third of the error of a probe; no number was fitted to the other."""
     model, _, point = short
     velocity = (model.station["kind"] == "velocity").to_numpy()
     error = (plain - point.prediction)[velocity]

@@ -27,7 +27,7 @@ def strip(slope=0.002, length=60.0, patches=()):
     z = -slope * x + zeros
     zx = -slope * np.arange(31)[:, None] * length / 30 + np.zeros((31, 4))
     return Reach(
-        dx=2.0, dy=0.25, z=z, zx=zx, zy=-slope * x + np.zeros((30, 5)), source=zeros, twist=np.zeros(5),
+        dx=2.0, dy=0.25, z=z, zx=zx, zy=-slope * x + np.zeros((30, 5)), source=zeros,
         closure=closure_of(ground, channel, lie_of(channel, x, y, 2.0, 0.25), (2.0, 0.25), zeros),
     )  # fmt: skip
 
