@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from blind_page import write_page
-from blind_sets import NULL_NOISE, OBJECTS, PAIRS, DataSet, Trial, made, model_of
+from blind_sets import INSTRUMENTS, NULL_NOISE, OBJECTS, PAIRS, DataSet, Trial, data_set, model_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import baseline
@@ -26,8 +26,10 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.diagnosis.excluded_stations import excluded_by, excluding
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
+from vegglue.inference.likelihood import root_mean_square
 from vegglue.parallel import as_finished, at_most
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of
@@ -86,7 +88,7 @@ def _hide(case: str, group: str, number: int) -> tuple[str, ...]:
     if group == "unlisted":
         return (UNLISTED + list(OBJECTS)[number % len(OBJECTS)],)
     if group == "instrument":
-        return (("position", "gauge", "reading")[number % 3],)
+        return (INSTRUMENTS[number % len(INSTRUMENTS)],)
     if group == "pair":
         return PAIRS[number % len(PAIRS)]
     model = model_of(case)
@@ -101,7 +103,7 @@ def study(trial: Trial) -> dict[str, Any]:
     began = time.process_time()
     with at_most(1):
         try:
-            data = made(trial)
+            data = data_set(trial)
         except VisibilityError as error:
             return record | {"left_out": str(error)}
         except (InputError, RuntimeError) as error:
@@ -160,10 +162,8 @@ def held_out(trial: Trial, data: DataSet, found: Diagnosis) -> dict[str, float |
 
 def _calibrated_error(model: Model, data: DataSet, found: Diagnosis, noise: float) -> float | None:
     """Error of a model that is calibrated to the same stations, without those that the diagnosis set aside."""
-    used = model.station["used"].to_numpy(bool).copy()
-    used[list(found.errors.flagged)] = False
     try:
-        point = baseline(replace(model, station=model.station.assign(used=used))).fitted.point
+        point = baseline(excluding(model, excluded_by(found))).fitted.point
     except InputError:
         return None
     return _error_at(data, model.case, point.z, noise)
@@ -181,7 +181,7 @@ def _error_at(data: DataSet, case: Case, z: Array, noise: float) -> float | None
         return None
     error = data.unseen["value"].to_numpy(float) - point.prediction
     known = np.isfinite(error)
-    return float(np.sqrt(np.mean(error[known] ** 2) + noise**2))
+    return float(np.hypot(root_mean_square(error[known]), noise))
 
 
 def main() -> None:

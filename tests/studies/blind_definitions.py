@@ -14,8 +14,9 @@ SAID = ("identified", "one-of", "none-of-these", "instrument")
 # A place further off points at something else [m].
 NEAR = 1.5
 FEW = 3
-# Named rightly where eddy viscosity is off, but each by its own law.
+# Named rightly where eddy viscosity is off: itself, and those that stand in for it, each by its own law.
 STAND_INS = ("elder", "smagorinsky", "mixing_length", "coherent_structures")
+EDDIES = ("viscosity", *STAND_INS)
 ORACLE_SHARE, MISSED_SHARE = 1.1, 1.3
 SENSORS = {effect.name for effect in sensor.EFFECTS}
 

@@ -20,8 +20,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import MODEL_ERROR
-from vegglue.screening import score_test
-from vegglue.twins.hidden_effect import TwinBase, candidate_of, case_hiding, chosen_effect
+from vegglue.twins.hidden_effect import BAD, TwinBase, candidate_of, case_hiding, chosen_effect, visible_length
 from vegglue.twins.sealed_answer import UNLISTED, Hidden
 from vegglue.twins.twin import errors_named, finer, true_place
 from vegglue.workflow.run_folder import model_in
@@ -42,8 +41,6 @@ PAIRS = (
 )  # fmt: skip
 # Sets of the parts before were seen when the errors of a site were chosen.
 EDITION = "second edition, part five: "
-# A bad reading beside an effect is off by so many standard errors.
-BAD = 10.0
 
 
 @dataclass(frozen=True)
@@ -97,11 +94,17 @@ def place_of(study: str, number: int) -> tuple[TwinBase, Array]:
     return base, model_error_columns(coarse, on_coarse, model.case.model_error)
 
 
-def made(trial: Trial) -> DataSet:
+def place_number(trial: Trial) -> int:
+    """The true place of a trial, 0 to PLACES - 1."""
+    # Steps of 7, which shares no factor with PLACES, visit all of them; groups begin at different ones.
+    return (trial.number * 7 + len(trial.group)) % PLACES
+
+
+def data_set(trial: Trial) -> DataSet:
     """The data set of a trial. Errors: VisibilityError where an effect cannot be made visible, RuntimeError where the
     second solver finds no steady flow.
     """
-    base, columns = place_of(trial.case, (trial.number * 7 + len(trial.group)) % PLACES)
+    base, columns = place_of(trial.case, place_number(trial))
     seed = hash_of(EDITION + trial.key)
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(trial.noise)
@@ -109,9 +112,8 @@ def made(trial: Trial) -> DataSet:
     sizing = with_model_error(with_grid_error(errors, base.difference), columns)
     found = [_hidden(base, sizing, name, trial.signal, random) for name in trial.hide]
     flows = [one for one in found if not one["stations"]]
-    station, unseen = base.model.station, unseen_stations(trial.case, base.model)
-    everything = pd.concat([station, unseen], ignore_index=True)
-    truly, also_true = _truly(trial, base, everything, flows, seed)
+    station, unseen = base.model.station, unseen_stations(base.model)
+    truly, also_true = _truly(trial, base, _everywhere(base.model), flows, seed)
     value = truly[: len(station)].copy()
     value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
     for one in found:
@@ -125,7 +127,7 @@ def hash_of(text: str) -> int:
     return int.from_bytes(text.encode(), "big") % (2**61 - 1)
 
 
-def unseen_stations(study: str, model: Model) -> pd.DataFrame:
+def unseen_stations(model: Model) -> pd.DataFrame:
     """The stations of velocities moved to sections halfway between those measured, and behind the last."""
     velocity = model.station[model.station["kind"] == "velocity"]
     places = np.unique(velocity["x"])
@@ -160,9 +162,7 @@ def _instrument(base: TwinBase, sizing: Noise, kind: str, signal: float, random:
         return {"amplitude": sign * BAD * error, "stations": chosen.tolist()}
     trace = np.zeros(len(station))
     trace[chosen] = 1.0
-    white, slopes = sizing.whiten(sizing.used(trace[:, None])), sizing.whiten(sizing.used(base.here.slope))
-    length = score_test.project(slopes, white[:, 0], np.zeros(slopes.shape[1]), white).length[0]
-    return {"amplitude": sign * signal / float(length), "stations": chosen.tolist()}
+    return {"amplitude": sign * signal / visible_length(base, sizing, trace), "stations": chosen.tolist()}
 
 
 def _truly(
@@ -171,24 +171,31 @@ def _truly(
     """What is true at stations, and what may rightly be named besides what is hidden."""
     if trial.truth == "own":
         return _own_truth(base, station, hidden), {}
-    case, theta, measured = base.model.case, theta_at(base.model.case, base.here.z), len(base.model.station)
-    site = perfect_site(case, trial.case, {name: float(values[0]) for name, values in theta.items()}, measured)
+    site = _perfect_site(base, trial.case)
     if trial.imperfect:
-        site = site_of_nature(site, case, seed % 2**31, trial.hide)
+        site = site_of_nature(site, base.model.case, seed % 2**31, trial.hide)
+    elif not hidden:
+        return _perfect_values(trial.case, place_number(trial)), site.also_true
     numbers: dict[str, Numbers] = {one["name"]: {one["parameter"]: one["amplitude"], **one["shapes"]} for one in hidden}
-    return _kept_values(site, case, trial.case, station, numbers), site.also_true
+    return true_values(site, base.model.case, trial.case, station, numbers), site.also_true
 
 
-def _kept_values(site: Site, case: Case, study: str, station: pd.DataFrame, numbers: Mapping[str, Numbers]) -> Array:
-    """True values; those of a perfect site without anything hidden are kept in this process."""
-    if site.truth.bed_seed is not None or numbers:
-        return true_values(site, case, study, station, numbers)
-    if (known := _VALUES.get(repr(site.truth))) is None:
-        known = _VALUES[repr(site.truth)] = true_values(site, case, study, station, numbers)
-    return known
+def _perfect_site(base: TwinBase, study: str) -> Site:
+    case, theta = base.model.case, theta_at(base.model.case, base.here.z)
+    numbers = {name: float(values[0]) for name, values in theta.items()}
+    return perfect_site(case, study, numbers, len(base.model.station))
 
 
-_VALUES: dict[str, Array] = {}
+@lru_cache
+def _perfect_values(study: str, number: int) -> Array:
+    """True values where nothing is hidden on a perfect site: the same in all data sets of one true place."""
+    base, _ = place_of(study, number)
+    return true_values(_perfect_site(base, study), base.model.case, study, _everywhere(base.model), {})
+
+
+def _everywhere(model: Model) -> pd.DataFrame:
+    """The stations that are measured, and those that nobody measures."""
+    return pd.concat([model.station, unseen_stations(model)], ignore_index=True)
 
 
 def _own_truth(base: TwinBase, station: pd.DataFrame, hidden: Sequence[Mapping[str, Any]]) -> Array:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from blind import SIZES, planned_trials, records_in, study
-from blind_sets import Trial, hash_of, made, model_of, unseen_stations
+from blind_sets import Trial, data_set, hash_of, model_of, unseen_stations
 from blind_truth import PROBE, perfect_site, site_of_nature
 from second_channel import SHORT
 from second_solver import Flow
@@ -82,7 +82,7 @@ def test_a_wider_patch_resists_more():
 
 def test_unseen_stations_stand_elsewhere():
     model = model_of("twin")
-    unseen = unseen_stations("twin", model)
+    unseen = unseen_stations(model)
     measured = set(model.station["x"])
     assert not measured & set(unseen["x"])
     assert unseen["x"].max() < model.case.grid.x[1]
@@ -90,7 +90,7 @@ def test_unseen_stations_stand_elsewhere():
 
 
 def test_errors_and_what_is_off_are_those_of_the_trial():
-    clean, off, again = (made(trial("instrument", hide=("position",), signal=signal)) for signal in (0.0, 6.0, 6.0))
+    clean, off, again = (data_set(trial("instrument", hide=("position",), signal=signal)) for signal in (0.0, 6.0, 6.0))
     difference = (off.model.station["value"] - clean.model.station["value"]).to_numpy()
     (hidden,) = off.hidden
     assert sorted(np.flatnonzero(np.abs(difference) > 1e-12)) == hidden["stations"]

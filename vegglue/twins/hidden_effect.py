@@ -165,7 +165,7 @@ def _first_size(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hid
     case = _knowing(base.model.case, hidden)
     changed = cause_of(case, candidate, hidden.shapes)
     trace = responses(replace(base.model, case=case), base.here, [changed])
-    return amplitude.size(snr / max(_visible(base, errors, trace[:, 0]), 1e-300))
+    return amplitude.size(snr / max(visible_length(base, errors, trace[:, 0]), 1e-300))
 
 
 def _signal(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden) -> float:
@@ -174,10 +174,10 @@ def _signal(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden)
     point = linearise(replace(base.model, case=case), base.here.z, base.here)
     if point is None:
         return 0.0
-    return _visible(base, errors, point.prediction - base.here.prediction)
+    return visible_length(base, errors, point.prediction - base.here.prediction)
 
 
-def _visible(base: TwinBase, errors: Noise, trace: Array) -> float:
+def visible_length(base: TwinBase, errors: Noise, trace: Array) -> float:
     """|(I - P_J) W d| of a change d (station,) of the predictions."""
     white = errors.whiten(errors.used(trace[:, None]))
     slopes = errors.whiten(errors.used(base.here.slope))
