@@ -236,7 +236,8 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_what_was_there(tmp_path: 
         assert "cannot be written" in error
     assert {name: (run / name).read_bytes() for name in kept} == kept
     assert not (run / "report.html").exists()
-    write_reach(tmp_path, *SIXTEEN, ("name: brook", "name: pond"))
+    # Other members: the same ones would be taken over from the brook without being written.
+    write_reach(tmp_path, *SIXTEEN, ("name: brook", "name: pond"), ("high: 0.10", "high: 0.12"))
     with room_for(10_000):
         code, error = say("simulate")
     assert code == 3

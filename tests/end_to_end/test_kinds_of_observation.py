@@ -172,9 +172,9 @@ def test_the_page_names_every_kind_and_its_unit(line: Line) -> None:
     text = re.sub(r"data:[^\"')]*", "", page.read_text(encoding="utf-8"))
     for kind in KINDS.values():
         assert f"misses the {kind.words} measurements by" in text, kind.name
-        assert (line.folder / "figures" / f"residuals-{kind.name}.png").is_file()
+        assert (line.folder / "figures" / f"residuals-{kind.name}.svg").is_file()
     assert "m<sup>3</sup>/s" in text
-    assert (line.folder / "figures" / "velocity_across-June-patch.png").is_file()
+    assert (line.folder / "figures" / "velocity_across-June-patch.svg").is_file()
 
 
 def test_a_twin_keeps_every_kind(line: Line, tmp_path: Path) -> None:
