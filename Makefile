@@ -3,6 +3,8 @@ PYTHON ?= python3
 JOBS ?= -1
 # Members of what the demo runs beside the paper's D3a, which has all 5,000: a first look.
 DEMO_MEMBERS ?= 64
+# What the demo's one page shows, the best thing first.
+DEMO_CONFIGS := runs/demo/willows.yaml $(addprefix configs/,d3a_refined.yaml d3a.yaml d0.yaml d3b.yaml)
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -37,8 +39,7 @@ demo: $(READY)  # the loop on a site with a hidden effect, then the paper's case
 	  $(VEGGLUE) infer configs/$$case.yaml $$few --runs runs/demo && \
 	  $(VEGGLUE) report configs/$$case.yaml $$few --runs runs/demo || exit $$?; \
 	done
-	@echo; echo "Reports, the best one first:"
-	@for case in willows willows-secondary_current d3a_refined d3a d0 d3b; do ls $(CURDIR)/runs/demo/$$case/report.html; done
+	$(VEGGLUE) overview $(DEMO_CONFIGS) --runs runs/demo
 
 paper: report  # the paper's cases with all 5,000 members
 simulate: $(CASES:%=runs/%/ensemble.h5)  # ensembles that are out of date

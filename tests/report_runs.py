@@ -64,10 +64,7 @@ def a_run(folder: Path, case: Case, observations: Observations, truth: dict[str,
 
 
 def written(run: Run) -> str:
-    path = write_report(
-        run.folder, run.case, run.observations, run.ensemble, run.posterior, run.flow, run.cylinder, run.diagnosis,
-        run.loop,
-    )  # fmt: skip
+    path = write_report(run)
     assert path == run.folder / "report.html"
     return path.read_text(encoding="utf-8")
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from vegglue.workflow.infer import infer
     from vegglue.workflow.load import load
     from vegglue.workflow.next_measurement import next_measurement
+    from vegglue.workflow.overview import overview
     from vegglue.workflow.report import report
     from vegglue.workflow.run import run
     from vegglue.workflow.simulate import simulate
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "extend", "extend_stepwise",
-    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "report", "reveal", "run",
-    "simulate",
+    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "overview", "report", "reveal",
+    "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION

@@ -22,12 +22,14 @@ from vegglue.engine.model import model_of
 from vegglue.ensemble.solve_ensemble import solve_ensemble, solve_flow
 from vegglue.figures.channel import save_channel_figure
 from vegglue.figures.error_ladder import save_ladder_figure
+from vegglue.flow.sensor import FlowFields
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
 from vegglue.report_page.page import write_report
+from vegglue.report_page.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -162,13 +164,18 @@ def test_models_are_compared_and_measurements_planned(line: Line) -> None:
 
 
 @pytest.mark.slow
+def _as_run(line: Line, flow: dict[str, FlowFields]) -> Run:
+    site = build_site(line.case)
+    return Run(
+        line.folder, line.case, site, line.observations, line.ensemble, line.posterior, flow, None, line.diagnosis
+    )
+
+
 def test_the_page_names_every_kind_and_its_unit(line: Line) -> None:
     posterior = line.folder / "posterior.h5"
     write_posterior(posterior, line.posterior, "", "")
     flow = solve_flow(line.case, line.posterior.marginals.median)
-    page = write_report(
-        line.folder, line.case, line.observations, line.ensemble, read_posterior(posterior), flow, None, line.diagnosis
-    )
+    page = write_report(_as_run(replace(line, posterior=read_posterior(posterior)), flow))
     text = re.sub(r"data:[^\"')]*", "", page.read_text(encoding="utf-8"))
     for kind in KINDS.values():
         assert f"misses the {kind.words} measurements by" in text, kind.name
@@ -203,7 +210,5 @@ def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
 @pytest.mark.slow
 def test_their_page_is_written(other: Line) -> None:
     flow = solve_flow(other.case, other.posterior.marginals.median)
-    page = write_report(
-        other.folder, other.case, other.observations, other.ensemble, other.posterior, flow, None, other.diagnosis
-    )
+    page = write_report(_as_run(other, flow))
     assert "misses the speed measurements by" in page.read_text(encoding="utf-8")

@@ -70,7 +70,8 @@ def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
 
 
 def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:
-    loop = LoopResults(ladder=LADDER, questions=(OpenQuestion("eddies from <wind>", (GAUGE,)),), pages=("toy-eddies",))
+    question, page = OpenQuestion("eddies from <wind>", (GAUGE,)), {"toy-eddies": "../toy-eddies/report.html"}
+    loop = LoopResults(ladder=LADDER, questions=(question,), pages=page)
     better, measure, *_ = next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))
     assert '<a href="../toy-eddies/report.html">' in better
     assert "Measure <b>a gauge at x = 5 m</b>, to tell eddies from &lt;wind&gt;: 1 station" in measure

@@ -106,6 +106,20 @@ def compare_command(
     tell(cases[-1], runs, found, as_object)
 
 
+def overview_command(
+    configs: Annotated[list[Path], typer.Argument(help="Cases with a posterior, the best first.", show_default=False)],
+    runs: Runs = Path("runs"),
+    as_object: Json = False,
+    quiet: Quiet = False,
+    trust: Trust = False,
+) -> None:
+    """Make one page of several runs: their answers, parameters side by side, and the way to each report."""
+    cases = [vegglue.load_case(config, trust) for config in configs]
+    with heard(quiet, as_object) as watch:
+        page = vegglue.overview(cases, runs=runs, watch=watch)
+    tell(cases[0], runs, page, as_object)
+
+
 def next_command(
     config: Config,
     between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,

@@ -13,6 +13,7 @@ from vegglue.cli.loop_commands import (
     extend_command,
     import_command,
     next_command,
+    overview_command,
 )
 from vegglue.cli.twin_commands import reveal_command, twin_command
 from vegglue.errors import InputError, StorageError
@@ -43,7 +44,12 @@ COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "compare": compare_command,
         "next": next_command,
     },
-    "Ensemble": {"simulate": simulate_command, "infer": infer_command, "report": report_command},
+    "Ensemble": {
+        "simulate": simulate_command,
+        "infer": infer_command,
+        "report": report_command,
+        "overview": overview_command,
+    },
     "More": {
         "effects": effects_command,
         "twin": twin_command,

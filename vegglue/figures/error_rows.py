@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.figures.style import COLOUR
 from vegglue.figures.svg_text import (
     Scale,
+    axis_below,
     linear_scale,
     round_ticks,
     svg_document,
@@ -37,22 +38,11 @@ def draw_error_rows(rows: Mapping[str, Sequence[float]], floor: float, unit: str
     shown = np.array([value for values in rows.values() for value in values] + [floor])
     end, foot = BEYOND * float(np.nanmax(shown)), ROW_HEIGHT * len(rows)
     scale = linear_scale(0.0, end, ROWS_START, ROWS_END)
-    parts = [*_axis(scale, end, foot, unit), *_floor(scale, floor, foot)]
+    ticks = round_ticks(0.0, end, 5)
+    parts = [*axis_below(scale, ticks, tick_labels(ticks), foot, ROWS_WIDTH, unit), *_floor(scale, floor, foot)]
     for place, (words, values) in enumerate(rows.items()):
         parts += _row(scale, words, values, ROW_HEIGHT * place + 38.0)
     return svg_document(ROWS_WIDTH, foot + ROWS_FOOT, parts, title, ROWS_LETTERS)
-
-
-def _axis(scale: Scale, end: float, foot: float, unit: str) -> list[str]:
-    ticks = round_ticks(0.0, end, 5)
-    parts = []
-    for tick, words in zip(ticks, tick_labels(ticks), strict=True):
-        at = float(scale(tick))
-        parts.append(svg_element("path", d=f"M{at:.1f},{foot:g}v5", stroke=COLOUR["muted"]))
-        anchor = "start" if tick == 0 else "middle"
-        parts.append(svg_words(at if tick else 0.0, foot + 19, words, "muted", text_anchor=anchor))
-    parts.append(svg_words(ROWS_WIDTH, foot + 19, unit, "muted", text_anchor="end"))
-    return parts
 
 
 def _floor(scale: Scale, floor: float, foot: float) -> list[str]:

@@ -15,6 +15,8 @@ from vegglue.figures.style import COLOUR
 from vegglue.figures.typography import decimals, fixed
 
 Scale = Callable[[Any], Array]  # values to places [px]
+# A number this near to the left edge [px] begins there instead of standing amid its stroke.
+CLOSE_TO_THE_EDGE = 10.0
 FACE = "system-ui, 'Liberation Sans', Helvetica, Arial, sans-serif"
 
 
@@ -84,6 +86,20 @@ def tick_labels(ticks: Sequence[float]) -> list[str]:
     """Each with as many decimals as the step between them needs."""
     places = decimals(ticks[1] - ticks[0], 1) if len(ticks) > 1 else 2
     return [fixed(value, places) for value in ticks]
+
+
+def axis_below(
+    scale: Scale, ticks: Sequence[float], labels: Sequence[str], foot: float, width: float, unit: str
+) -> list[str]:
+    """Strokes and numbers below rows that end `foot` px down, the unit at the right of a picture `width` px wide."""
+    parts = [svg_words(width, foot + 19, unit, "muted", text_anchor="end")] if unit else []
+    for tick, words in zip(ticks, labels, strict=True):
+        at = float(scale(tick))
+        parts.append(svg_element("path", d=f"M{at:.1f},{foot:g}v5", stroke=COLOUR["muted"]))
+        anchor = "start" if at < 2.0 * CLOSE_TO_THE_EDGE else "middle"
+        place = max(at - CLOSE_TO_THE_EDGE, 0.0) if anchor == "start" else at
+        parts.append(svg_words(place, foot + 19, words, "muted", text_anchor=anchor))
+    return parts
 
 
 def _written(value: object) -> str:

@@ -218,7 +218,7 @@ def _page_of(run: Run, step: LadderStep) -> str:
     config = f"<code>{html.escape(step.config)}</code>"
     if step.name not in run.loop.pages:
         return config
-    return f'{config} (<a href="../{html.escape(step.name)}/report.html">its report</a>)'
+    return f'{config} (<a href="{html.escape(run.loop.pages[step.name])}">its report</a>)'
 
 
 def _measurements(run: Run, command: str) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """What one report is about: everything known of a run, and where in its channel things stand."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,14 +32,14 @@ class LoopResults:
     """What the loop from misfit to missing effect left beside a case; None for what was not made.
 
     behind: the diagnosis that names what is missing, of the case itself or of the model it extends; ladder: the error
-    ladder with the case in it; questions: what that diagnosis leaves open; pages: other models of the ladder that have
-    a page.
+    ladder with the case in it; questions: what that diagnosis leaves open; pages: where the reports of models of the
+    ladder lie, seen from the page that is made, by their names.
     """
 
     behind: Diagnosis | None = None
     ladder: Ladder | None = None
     questions: tuple[OpenQuestion, ...] | None = None
-    pages: tuple[str, ...] = ()
+    pages: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

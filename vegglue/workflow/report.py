@@ -1,5 +1,6 @@
 """case -> page: everything known of a run as one HTML file, and its figures beside it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash, simulation_hash
@@ -9,7 +10,8 @@ from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.page import write_report
-from vegglue.report_page.run import LoopResults
+from vegglue.report_page.run import LoopResults, Run
+from vegglue.site.gridded_site import build_site
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.workflow.median_flow import median_flow
@@ -23,30 +25,39 @@ def report(case: Case, *, runs: Path | str = "runs", members: int | None = None,
 
     Errors: InputError when there is no ensemble or posterior of this case; StorageError when a file cannot be written.
     """
-    sized = of_size(case, members)
+    known = results_of(of_size(case, members), case, runs)
+    watch(Progress(f"solving the flow of {case.name} at its medians"))
+    flow = median_flow(known.case, known.posterior, known.folder)
+    watch(Progress(f"drawing the figures of {case.name}"))
+    return write_report(replace(known, flow=flow))
+
+
+def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = "../") -> Run:
+    """All that is kept of a run but its flow. sized: the case with as many members as its ensemble has, which is all
+    that a diagnosis does not depend on; above: the folder of all runs, seen from the page that is made.
+
+    Errors: InputError when there is no ensemble or posterior of this case; StorageError for a broken file.
+    """
     observations = read_observations(sized)
     folder = folder_of(runs, case)
     ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(sized))
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
-    watch(Progress(f"solving the flow of {case.name} at its medians"))
-    flow = median_flow(sized, posterior, folder)
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
-    # A diagnosis needs no ensemble: it is that of the case, whatever the size of this one.
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
-    loop = loop_results_of(case, runs)
-    watch(Progress(f"drawing the figures of {case.name}"))
-    return write_report(folder, sized, observations, ensemble, posterior, flow, survey, diagnosis, loop)
+    loop = loop_results_of(case, runs, above)
+    return Run(folder, sized, build_site(sized), observations, ensemble, posterior, {}, survey, diagnosis, loop)
 
 
-def loop_results_of(case: Case, runs: Path | str = "runs") -> LoopResults:
+def loop_results_of(case: Case, runs: Path | str = "runs", above: str = "../") -> LoopResults:
     """What diagnose, extend, compare and next left of exactly this case, and of the model its ladder begins with."""
     runs, wanted = Path(runs), case_hash(case)
     ladder = ladder_that_fits(runs / case.name, wanted)
     first, first_hash = (case.name, wanted) if ladder is None else (ladder.steps[0].name, ladder.steps[0].config_hash)
     steps = () if ladder is None else ladder.steps
+    made = [one.name for one in steps if (runs / one.name / "posterior.h5").exists()]
     return LoopResults(
         behind=diagnosis_that_fits(runs / first / "diagnosis.h5", first_hash),
         ladder=ladder,
         questions=questions_that_fit(runs / first, first_hash),
-        pages=tuple(one.name for one in steps if (runs / one.name / "posterior.h5").exists()),
+        pages={name: f"{above}{name}/report.html" for name in made},
     )

@@ -1,0 +1,49 @@
+"""A page as a file: one self-contained HTML file that needs no network, filled from a template beside this file."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from vegglue.errors import StorageError
+from vegglue.figures.style import palette_css
+
+# What is inlined in every page, from the files beside this one.
+STYLE, SCRIPT = "page.css", "sections.js"
+
+
+def write_page(path: Path, page: Callable[[], str]) -> Path:
+    """Write what `page` makes, which may write pictures on its way; a page that was there stays until it is whole.
+
+    Errors: StorageError when a file cannot be written.
+    """
+    try:
+        text = page()
+        path.with_name(f"{path.name}.new").write_text(text, encoding="utf-8")
+        os.replace(path.with_name(f"{path.name}.new"), path)
+    except OSError as error:
+        raise StorageError(f"{path}: the report cannot be written ({error}); make room and run it again.") from error
+    return path
+
+
+def rendered(template: str, **values: Any) -> str:
+    """A page of a template of this folder, with the palette, the style and the script of all pages."""
+    light, dark = palette_css()
+    shared = {"light": light, "dark": dark, "style": _beside(STYLE), "script": _beside(SCRIPT)}
+    return _environment().get_template(template).render(**shared, **values)
+
+
+def _beside(name: str) -> str:
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
