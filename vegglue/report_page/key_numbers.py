@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
@@ -143,7 +143,7 @@ def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
     count = max(int(used.sum()), 1)
     error, refined = measurement_error(posterior, kind), posterior.refinement
     doubted = refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < UNBELIEVED
-    return miss > error * float(np.sqrt(scipy.stats.chi2.isf(UNBELIEVED, count) / count)) or (doubted and miss > error)
+    return miss > error * float(np.sqrt(scipy.special.chdtri(count, UNBELIEVED) / count)) or (doubted and miss > error)
 
 
 def with_unit(value: float, kind: str) -> str:

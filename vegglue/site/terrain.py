@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
-from scipy.spatial import QhullError
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
@@ -77,6 +75,9 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
 
     Errors: InputError when the file cannot be read, or all points lie on one line.
     """
+    from scipy.interpolate import LinearNDInterpolator  # late: a bed without points need not wait for it
+    from scipy.spatial import QhullError
+
     points = read_points(path)
     try:
         surface = LinearNDInterpolator(points[:, :2], points[:, 2])

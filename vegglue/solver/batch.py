@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RBFInterpolator
 
 from vegglue.arrays import Array
 from vegglue.compilation import compiled
@@ -200,6 +199,8 @@ def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedM
     near = nearest_members(coordinates, by_newton, reference.linearised.point @ metric.axes, SPLINE_MEMBERS)
     if near.size < 3 * (coordinates.shape[1] + 1):
         return rows_inside(reference.linearised.predict(metric.points[members]), reference.band)
+    from scipy.interpolate import RBFInterpolator  # late: what only looks at a solved run need not wait for it
+
     spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel="cubic", degree=1)
     blended = blend(np.moveaxis(solved.state, -1, 0), near, spline(coordinates[members]), *reference.band)
     return walled(blended)
