@@ -1,6 +1,6 @@
-"""Work spread over the cores: the one place that knows joblib, so that a cluster's backend may take its place.
+"""Work spread over the cores of this machine by processes and threads, or handed to whoever takes it to others.
 
-`joblib.parallel_config(backend="dask")` around a command spreads the same tasks over more than one machine.
+`cluster` takes tasks to other machines. This file knows nothing of how: it only asks whether someone does, see `taken`.
 """
 
 import os
@@ -24,11 +24,48 @@ from vegglue.progress import silent
 
 # Threads that may be begun beside those at work, in what is done within `at_most`.
 _SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
+# Given work and tasks, the position of each task and work(*task), in the order in which they end.
+Taker = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
+# Who takes tasks to other machines, in what is done within `taken`.
+_TAKER: ContextVar[Taker | None] = ContextVar("taker of tasks", default=None)
+
+
+@contextmanager
+def taken(taker: Taker) -> Iterator[None]:
+    """Whatever `as_finished` and `side_by_side` are asked to do within is handed to the taker."""
+    token = _TAKER.set(taker)
+    try:
+        yield
+    finally:
+        _TAKER.reset(token)
 
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
-    """work(*task) for every task, in the order in which they end."""
-    yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+    """work(*task) for every task, in the order in which they end. What all tasks share is best held by `work`, as in
+    functools.partial: it then travels once to each process of a cluster.
+    """
+    taker = _TAKER.get()
+    if taker is not None:
+        yield from (found for _, found in taker(work, tasks))
+    else:
+        yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+
+
+def side_by_side(
+    work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
+) -> list[Any]:
+    """As `in_threads`, for work that is worth a journey: it and its tasks go to other machines where there are any.
+
+    Work that a task begins in its turn stays on the machine of the task.
+    """
+    taker, waiting = _TAKER.get(), list(tasks)
+    if taker is None:
+        return in_threads(work, waiting, finished)
+    found: list[Any] = [None] * len(waiting)
+    for ended, (position, one) in enumerate(taker(work, waiting), 1):
+        found[position] = one
+        finished(ended)
+    return found
 
 
 @contextmanager
@@ -99,6 +136,11 @@ def one_thread() -> Iterator[None]:
     """One thread for linear algebra in this process: its matrices are small, and the cores have tasks of their own."""
     with threadpool_limits(1):
         yield
+
+
+def one_thread_for_good() -> None:
+    """The same for the rest of this process: its threads may work on several tasks at once, and none may undo it."""
+    threadpool_limits(1)
 
 
 def _pool(jobs: int, order: str) -> Parallel:

@@ -9,6 +9,7 @@ Source: Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not chec
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_u
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise
-from vegglue.parallel import in_threads
+from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import Suspect
 from vegglue.screening.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
@@ -65,8 +66,9 @@ class Refit:
 def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:
     """Each trial refitted, side by side; None where no flow is found."""
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
-    tasks = [(search, trial, start) for trial in trials for start in trial.starts]
-    ends = iter(in_threads(_refitted, tasks, counted(watch, "refitting with each", len(tasks), "refits")))
+    tasks = [(trial, start) for trial in trials for start in trial.starts]
+    finished = counted(watch, "refitting with each", len(tasks), "refits")
+    ends = iter(side_by_side(partial(_refitted, search), tasks, finished))
     found: list[Refit | None] = []
     for trial in trials:
         fits = [end for end in [next(ends) for _ in trial.starts] if end is not None]

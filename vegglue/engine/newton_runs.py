@@ -12,7 +12,7 @@ from vegglue.engine.interface import Model, Point
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import read_sensors
-from vegglue.parallel import in_threads
+from vegglue.parallel import side_by_side
 from vegglue.solver.batch import solve_members
 from vegglue.solver.march import fall_back
 from vegglue.solver.status import FAILED
@@ -31,14 +31,13 @@ def predict_members(predict_near: PredictNear, model: Model, points: Sequence[Po
     away = np.stack([np.linalg.norm(z - point.z, axis=1) for point in points])
     nearest = away.argmin(axis=0)
     sets = [
-        (model, points[k], part)
+        (k, part)
         for k in range(len(points))
         for part in _sets(np.flatnonzero(nearest == k)[np.argsort(away[k, nearest == k], kind="stable")])
     ]
     found = np.full((len(z), len(model.station)), np.nan)
-    rows = [part for _, _, part in sets]
-    tasks = [(model, point, z[part]) for model, point, part in sets]
-    for part, prediction in zip(rows, in_threads(predict_near, tasks), strict=True):
+    work, tasks = partial(_from_one, predict_near, model, points), [(k, z[part]) for k, part in sets]
+    for (_, part), prediction in zip(sets, side_by_side(work, tasks), strict=True):
         found[part] = prediction
     left = np.flatnonzero(np.isnan(found).any(axis=1))
     if left.size:
@@ -50,11 +49,16 @@ def _sets(index: np.ndarray) -> list[np.ndarray]:
     return [index[first : first + RUNS_TOGETHER] for first in range(0, index.size, RUNS_TOGETHER)]
 
 
+def _from_one(predict_near: PredictNear, model: Model, points: Sequence[Point], k: int, z: Array) -> Array:
+    return predict_near(model, points[k], z)
+
+
 def _alone(model: Model, z: Array) -> Array:
     """The same from no point, as members of an ensemble are solved."""
     found = np.full((len(z), len(model.station)), np.nan)
-    tasks = [(model, experiment, z) for experiment in model.case.experiments]
-    for experiment, readings in zip(model.case.experiments, in_threads(_read_alone, tasks), strict=True):
+    tasks = [(experiment, z) for experiment in model.case.experiments]
+    readings_of = side_by_side(partial(_read_alone, model), tasks)
+    for experiment, readings in zip(model.case.experiments, readings_of, strict=True):
         found[:, model.rows[experiment]] = readings
     found[np.isnan(found).any(axis=1)] = np.nan
     return found

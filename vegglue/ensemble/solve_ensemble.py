@@ -95,12 +95,12 @@ def _solve_all(
     start_from: StartFrom,
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
-    tasks = ((index, case, site, observations, sample.take(chunks[index]), start_from) for index in todo)
-    yield from as_finished(_solve_numbered, tasks, jobs)
+    work = partial(_solve_numbered, case, site, observations, start_from)
+    yield from as_finished(work, ((index, sample.take(chunks[index])) for index in todo), jobs)
 
 
 def _solve_numbered(
-    index: int, case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom
+    case: Case, site: Site, observations: Observations, start_from: StartFrom, index: int, sample: PriorSample
 ) -> tuple[int, Rows]:
     return index, solve_chunk(case, site, observations, sample, start_from)
 

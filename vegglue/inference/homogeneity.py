@@ -9,6 +9,7 @@ estimated from the separate fits: the residual of the joint one would hold the d
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.stats
@@ -21,7 +22,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.engine.newton import DIFFERENCE_STEP
 from vegglue.inference.posterior_summary import on_flat_scale
-from vegglue.parallel import in_threads
+from vegglue.parallel import side_by_side
 from vegglue.results.posterior import Transfer
 
 # Posterior over prior variance of z [-] above which an experiment does not determine a parameter. Chosen, not measured:
@@ -40,7 +41,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         return None
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
-    fits = in_threads(_alone, [(*part, joint) for part in parts])
+    fits = side_by_side(partial(_alone, joint), parts)
     scale = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
     for e, fitted in enumerate(fits):
@@ -129,7 +130,7 @@ def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, 
     return replace(model, case=case, station=model.station[here].reset_index(drop=True)), part
 
 
-def _alone(own: Model, errors: Noise, joint: Point) -> MapEstimate | None:
+def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
     start = linearise(own, joint.z, joint)
     return None if start is None else fit(own, errors, start)
 

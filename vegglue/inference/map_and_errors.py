@@ -5,6 +5,7 @@ and are finished on the case's own grid. Fits that end at the same point count o
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from vegglue.engine.interface import Model, Point, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
-from vegglue.parallel import in_threads
+from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.screening.residual_screening import screen
@@ -73,7 +74,7 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
 
 def _fit_all(model: Model, noise: Noise, starts: Array, watch: Watch) -> list[MapEstimate]:
     finished = counted(watch, "following the best members downhill", len(starts), "members")
-    ends = in_threads(_fit_from, [(model, noise, z) for z in starts], finished)
+    ends = side_by_side(partial(_fit_from, model, noise), [(z,) for z in starts], finished)
     return distinct_modes([end for end in ends if end is not None])
 
 
@@ -84,7 +85,7 @@ def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
 
 def _refine_all(model: Model, coarse: Model, noise: Noise, ends: list[MapEstimate], watch: Watch) -> list[MapEstimate]:
     finished = counted(watch, "refining modes on the cells of the case", len(ends), "modes")
-    finer = in_threads(_refine, [(model, coarse, noise, end) for end in ends], finished)
+    finer = side_by_side(partial(_refine, model, coarse, noise), [(end,) for end in ends], finished)
     return distinct_modes([end for end in finer if end is not None])
 
 
