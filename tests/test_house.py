@@ -30,7 +30,9 @@ HOMES = {
     "yaml": {"case"},
 }  # fmt: skip
 # Homes of what vegglue can do without: an extra, imported where it is used.
-HOMES_OF_EXTRAS = {"arviz": {"storage", "workflow"}, "xarray": {"storage", "workflow"}}
+HOMES_OF_EXTRAS = {
+    "arviz": {"storage", "workflow"}, "xarray": {"storage", "workflow"}, "dask": {"cluster"}, "distributed": {"cluster"},
+}  # fmt: skip
 DISTRIBUTIONS = {"yaml": "pyyaml"}
 LONGEST_FILE, LONGEST_FUNCTION, MEDIAN_FILE, MEDIAN_FUNCTION = 400, 45, 150, 8
 CATCH_ALLS = {"utils", "helpers", "base", "types", "constants", "common", "misc"}
@@ -87,7 +89,8 @@ def test_what_is_imported_is_what_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[<>=\[ ]", requirement)[0] for requirement in project["dependencies"]}
     assert declared == {DISTRIBUTIONS.get(library, library) for library in HOMES} | NOWHERE_ELSE
-    assert set(HOMES_OF_EXTRAS) <= {re.split("[<>=]", one)[0] for one in project["optional-dependencies"]["arviz"]}
+    extras = [*project["optional-dependencies"]["arviz"], *project["optional-dependencies"]["cluster"]]
+    assert set(HOMES_OF_EXTRAS) <= {re.split("[<>=]", one)[0] for one in extras}
 
 
 def test_files_are_short_and_say_what_they_are() -> None:

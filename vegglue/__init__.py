@@ -15,6 +15,7 @@ from vegglue import version
 
 if TYPE_CHECKING:
     from vegglue.case.config import load_case
+    from vegglue.cluster import on_cluster
     from vegglue.errors import InputError, StorageError
     from vegglue.workflow.check import check
     from vegglue.workflow.compare import compare
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "extend", "extend_stepwise",
-    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "overview", "report", "reveal",
-    "run", "simulate",
+    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "on_cluster", "overview", "report",
+    "reveal", "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION
@@ -42,6 +43,7 @@ _ELSEWHERE = {
     "InputError": "errors",
     "StorageError": "errors",
     "load_case": "case.config",
+    "on_cluster": "cluster",
     "extend_stepwise": "workflow.extend",
     "make_twin": "workflow.twin",
     "reveal": "workflow.twin",

@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Config, Jobs, Json, Members, Quiet, Runs, Trust
+from vegglue.cli.options import Cluster, Config, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 
@@ -26,6 +26,7 @@ def simulate_command(
     config: Config,
     members: Members = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -38,7 +39,7 @@ def simulate_command(
 
     case = of_size(case, members)
     current = is_simulated(case, runs)
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch)
     if as_object:
         from vegglue.cli.objects import object_of
@@ -58,6 +59,7 @@ def infer_command(
     ] = None,
     members: Members = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -65,7 +67,7 @@ def infer_command(
 ) -> None:
     """Infer the parameters from the measurements and say what was found."""
     case = vegglue.load_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         posterior = vegglue.infer(case, runs=runs, method=method, members=members, jobs=jobs, watch=watch)
     tell(case, runs, posterior, as_object)
 
@@ -89,6 +91,7 @@ def run_command(
     config: Config,
     members: Members = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -102,7 +105,7 @@ def run_command(
         if not as_object:
             tell(of, runs, result, as_object)
 
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show)
     if as_object:
         from vegglue.cli.objects import run_object

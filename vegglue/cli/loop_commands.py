@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Config, Jobs, Json, Quiet, Runs, Trust, number_given
+from vegglue.cli.options import Cluster, Config, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
@@ -43,6 +43,7 @@ def import_command(
 def diagnose_command(
     config: Config,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -50,7 +51,7 @@ def diagnose_command(
 ) -> None:
     """Say where the model fails, which effect is missing, and how sure that is."""
     case = vegglue.load_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
 

@@ -20,6 +20,13 @@ def _some(jobs: int) -> int:
 Jobs = Annotated[
     int, typer.Option(min=-1, callback=_some, help="Cores at once; -1 for all. Results do not depend on it.")
 ]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers compute, tcp://HOST:PORT; or local:N, for N processes here.",
+    ),
+]
 Members = Annotated[
     int | None,
     typer.Option(min=1, help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),

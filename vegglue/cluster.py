@@ -1,0 +1,186 @@
+"""Work spread over more than one machine by Dask: tasks travel to workers, results come back as they end.
+
+What all tasks share travels once to each worker. The scheduler keeps the bytes of whatever it has sent until its result
+is here, so that a worker may leave or come at any moment: what it had in hand is done again by another, with the same
+bits.
+"""
+
+import logging
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import cache, partial
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+from vegglue.errors import InputError
+from vegglue.parallel import at_most, one_thread_for_good, taken
+from vegglue.version import VERSION
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# How long a scheduler is waited for [s]. Chosen, not measured: long for a network, short for someone who mistyped.
+LONGEST_WAIT = 10
+# Tasks under way for each thread of a worker [-]: one at work, one that waits beside it. And in all at least, so that
+# workers that come find some.
+EACH_THREAD, AT_LEAST = 2, 16
+# What numbers hang on beside the processor.
+DECIDING = ("numpy", "scipy", "numba")
+GOES_ON = "what was finished is kept, and the same command goes on from there"
+Work = Callable[..., Any]
+
+
+@contextmanager
+def on_cluster(where: str | None) -> Iterator[None]:
+    """Members, fits and predictions within are computed by the workers of a Dask cluster, with the same bits as here.
+
+    where: the address of its scheduler, e.g. tcp://host:8786, or local:N for N processes on this machine; None for the
+    threads and processes of `jobs`, as without it.
+
+    Errors: InputError when `distributed` is missing, nobody answers at the address, or a worker has other versions.
+    """
+    if where is None:
+        yield
+        return
+    with ExitStack() as stack:
+        client = stack.enter_context(_connected(where))
+        refuse_other_versions(client)
+        stack.enter_context(taken(partial(_sent, client)))
+        yield
+
+
+@contextmanager
+def _connected(where: str) -> Iterator["Client"]:
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise InputError(
+            "--cluster needs the package distributed, which is not installed: pip install 'vegglue[cluster]'."
+        ) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told in a sentence
+    # What tasks share is sent with care, once, and may be large: the warning against large graphs tells nothing.
+    quiet = {"distributed.admin.large-graph-warning-threshold": "1 TB"}
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(quiet))
+        address: Any = where
+        if count := _local(where):
+            # No limit of memory and no page: as processes without a cluster.
+            address = stack.enter_context(
+                LocalCluster(
+                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+            )  # fmt: skip
+        try:
+            client = Client(address, timeout=LONGEST_WAIT, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise InputError(
+                f"--cluster: expected a Dask scheduler that answers within {LONGEST_WAIT} s at {where}, got "
+                f"{_first_line(error)}; start one with `dask scheduler`, correct the address, or use local:N."
+            ) from None
+        yield stack.enter_context(client)
+
+
+def _local(where: str) -> int:
+    """N of local:N, 0 for an address. Errors: InputError when it is neither."""
+    if re.fullmatch(r"([a-z]+://)?[^\s/]+:\d{1,5}", where) and not where.startswith("local:"):
+        return 0
+    found = re.fullmatch(r"local:([1-9]\d{0,3})", where)
+    if found is None:
+        raise InputError(f"--cluster: expected tcp://HOST:PORT, or local:N with N processes, got {where!r}; e.g. local:2.")
+    return int(found[1])
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
+
+
+@cache
+def versions_here() -> Mapping[str, str]:
+    """Of this process: Python, vegglue and the libraries that decide the last digits."""
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return {"Python": python, "vegglue": VERSION} | {name: version(name) for name in DECIDING}
+
+
+def refuse_other_versions(client: "Client") -> None:
+    """Errors: InputError when a worker that is there now has other versions than this process, or no vegglue."""
+    try:
+        found = client.run(versions_here)
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"--cluster: expected vegglue {VERSION} on every worker, got {_first_line(error)}; install it there."
+        ) from None
+    for worker, there in found.items():
+        _refuse_others(versions_here(), there, worker)
+
+
+def _refuse_others(wanted: Mapping[str, str], there: Mapping[str, str], worker: str) -> None:
+    for name, here in wanted.items():
+        if there.get(name) != here:
+            raise InputError(
+                f"--cluster: expected {name} {here} on every worker, as here, got {there.get(name)} at {worker}: "
+                "results would depend on who computes them; install the same versions."
+            )
+
+
+def _sent(client: "Client", work: Work, tasks: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    """The position and the result of each task as they end; few are under way at once, so that memory stays bounded."""
+    from distributed import as_completed
+    from distributed.protocol.pickle import dumps
+
+    # A task that anyone can do again, and no value that is lost with its holder.
+    shared = client.submit(_unpacked, dumps(work), key=f"shared-{uuid4().hex}")
+    waiting, under_way, ends = enumerate(tasks), dict[Any, int](), as_completed(loop=client.loop)
+    try:
+        while True:
+            room = max(EACH_THREAD * sum(client.nthreads().values()), AT_LEAST) - len(under_way)
+            for _, (position, task) in zip(range(room), waiting, strict=False):
+                one = client.submit(_at_work, versions_here(), shared, dumps(task), key=f"task-{uuid4().hex}")
+                under_way[one] = position
+                ends.add(one)
+            if not under_way:
+                return
+            future = next(ends)
+            yield under_way.pop(future), _result(client, future)
+    finally:
+        client.cancel([*under_way, shared])
+
+
+def _result(client: "Client", future: "Future[Any]") -> Any:
+    """Errors: what the task raised; InputError when workers died of it, or there is no scheduler any more."""
+    from distributed import CancelledError, KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker:
+        raise InputError(
+            f"--cluster: one task ended several workers, most likely for want of memory; {GOES_ON}. Give workers more "
+            "memory, or start fewer of them on a machine."
+        ) from None
+    except CancelledError:
+        raise InputError(f"--cluster: the scheduler is gone; {GOES_ON}, once there is one.") from None
+    except Exception:
+        refuse_other_versions(client)  # the likeliest reason, of a worker that came later
+        raise
+
+
+def _unpacked(packed: bytes) -> Work:
+    from distributed.protocol.pickle import loads
+
+    work: Work = loads(packed)
+    return work
+
+
+def _at_work(wanted: Mapping[str, str], work: Work, packed: bytes) -> Any:
+    """What a worker does: one task a thread."""
+    from distributed import get_worker
+    from distributed.protocol.pickle import loads
+
+    _refuse_others(wanted, versions_here(), get_worker().address)
+    one_thread_for_good()
+    with at_most(1):
+        return work(*loads(packed))
