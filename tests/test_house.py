@@ -31,8 +31,11 @@ HOMES = {
 }  # fmt: skip
 # Homes of what vegglue can do without: an extra, imported where it is used.
 HOMES_OF_EXTRAS = {
-    "arviz": {"storage", "workflow"}, "xarray": {"storage", "workflow"}, "dask": {"cluster"}, "distributed": {"cluster"},
-}  # fmt: skip
+    "arviz": {"storage", "workflow"},
+    "dask": {"cluster"},
+    "distributed": {"cluster"},
+    "xarray": {"storage", "workflow"},
+}
 DISTRIBUTIONS = {"yaml": "pyyaml"}
 LONGEST_FILE, LONGEST_FUNCTION, MEDIAN_FILE, MEDIAN_FUNCTION = 400, 45, 150, 8
 CATCH_ALLS = {"utils", "helpers", "base", "types", "constants", "common", "misc"}

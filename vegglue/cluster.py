@@ -71,7 +71,7 @@ def _connected(where: str) -> Iterator["Client"]:
             # No limit of memory and no page: as processes without a cluster.
             address = stack.enter_context(
                 LocalCluster(
-                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
+                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 )
             )  # fmt: skip

@@ -1,0 +1,166 @@
+"""More than one machine: the same bits as here, nothing lost with a worker, and one sentence for what cannot be."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from reach import COARSE, said_to, write_reach
+from workers import Workers, workers_in
+
+import vegglue
+from vegglue import cluster
+from vegglue.cluster import on_cluster
+from vegglue.errors import InputError
+from vegglue.parallel import as_finished, side_by_side
+from vegglue.progress import Progress
+
+MEMBERS, CHUNKS = 512, 8
+FEWER = 128
+# With errors this small the diagnosis finds something missing, and refits.
+CHANGES = (
+    COARSE,
+    ("members: 1024", f"members: {MEMBERS}"),
+    ("experiment: June}", "experiment: June, standard_error: 0.004}"),
+)
+# What a member cost is no result.
+TIMES = {"members/seconds"}
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
+    with workers_in(tmp_path_factory.mktemp("two"), 2) as workers:
+        yield workers
+
+
+@pytest.fixture
+def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.FEWEST_CHUNKS", CHUNKS)
+    return vegglue.load_case(write_reach(tmp_path, *CHANGES))
+
+
+def bits(path: Path) -> dict[str, bytes]:
+    """All that a file of results holds, but times."""
+    found: dict[str, bytes] = {}
+
+    def look(name: str, one: object) -> None:
+        if isinstance(one, h5py.Dataset) and name not in TIMES:
+            values = np.asarray(one[()])
+            found[name] = repr(values.tolist()).encode() if values.dtype.kind == "O" else values.tobytes()
+
+    with h5py.File(path) as file:
+        file.visititems(look)
+    return found
+
+
+def the_same(one: Path, other: Path, *names: str) -> None:
+    for name in names:
+        expected, found = bits(one / f"{name}.h5"), bits(other / f"{name}.h5")
+        assert expected.keys() == found.keys()
+        assert [key for key in expected if expected[key] != found[key]] == [], name
+
+
+@pytest.mark.slow
+def test_jobs_and_workers_give_the_same_bits(tmp_path: Path, case, two: Workers) -> None:  # type: ignore[no-untyped-def]
+    """simulate, infer and diagnose with one job, with two, and with two workers: nine commands take long."""
+
+    def all_of(runs: Path, jobs: int = 1) -> Path:
+        ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, members=FEWER)
+        vegglue.infer(case, ensemble, runs=runs, jobs=jobs)
+        vegglue.diagnose(case, runs=runs, jobs=jobs)
+        return runs / "brook"
+
+    alone = all_of(tmp_path / "one")
+    the_same(alone, all_of(tmp_path / "two", jobs=2), "ensemble", "posterior", "diagnosis")
+    with on_cluster(two.address):
+        the_same(alone, all_of(tmp_path / "workers"), "ensemble", "posterior", "diagnosis")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("left", [1, 0])
+def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, case, left: int) -> None:  # type: ignore[no-untyped-def]
+    """One of two; and the only one, whose place another takes: with it goes all that workers knew."""
+    heard = list[Progress]()
+    with workers_in(tmp_path, 1 + left) as workers:
+
+        def watch(progress: Progress) -> None:
+            heard.append(progress)
+            if len(heard) == 3:
+                workers.kill()
+                if not left:
+                    workers.begin()
+
+        with on_cluster(workers.address):
+            vegglue.simulate(case, runs=tmp_path / "workers", watch=watch)
+    assert [one.done for one in heard] == [64 * count for count in range(CHUNKS + 1)]
+    vegglue.simulate(case, runs=tmp_path / "here", jobs=1)
+    the_same(tmp_path / "here" / "brook", tmp_path / "workers" / "brook", "ensemble")
+
+
+@pytest.mark.slow
+def test_results_stream_back_and_stand_in_order(two: Workers) -> None:
+    with on_cluster(two.address):
+        ended = list[int]()
+        assert side_by_side(abs, [(-number,) for number in range(40)], ended.append) == list(range(40))
+        assert ended == list(range(1, 41))
+        assert set(as_finished(abs, ((-number,) for number in range(3)), 1)) == {0, 1, 2}
+        assert list(as_finished(abs, (), 1)) == []
+
+
+@pytest.mark.slow
+def test_what_a_task_raises_is_raised_here(two: Workers) -> None:
+    with on_cluster(two.address), pytest.raises(ZeroDivisionError):
+        side_by_side(divmod, [(1, 1), (1, 0)])
+
+
+@pytest.mark.slow
+def test_processes_of_this_machine_need_no_scheduler() -> None:
+    with on_cluster("local:2"):
+        assert side_by_side(abs, [(-1,), (-2,)]) == [1, 2]
+
+
+@pytest.mark.slow
+def test_workers_of_other_versions_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, two: Workers) -> None:
+    monkeypatch.setattr(cluster, "VERSION", "99.0")
+    cluster.versions_here.cache_clear()
+    expected = r"--cluster: expected vegglue 99\.0 on every worker, as here, got .* at tcp://127.*: results would"
+    try:
+        with pytest.raises(InputError, match=expected), on_cluster(two.address):
+            pass
+    finally:
+        cluster.versions_here.cache_clear()
+
+
+@pytest.mark.slow
+def test_a_worker_of_another_version_that_comes_later_is_refused(tmp_path: Path) -> None:
+    with workers_in(tmp_path, 0) as workers, on_cluster(workers.address):
+        workers.begin("import vegglue.version; vegglue.version.VERSION = '0.0'; ")
+        with pytest.raises(InputError, match=r"expected vegglue .* on every worker, as here, got 0\.0 at tcp://127"):
+            side_by_side(abs, [(1,)])
+
+
+@pytest.mark.parametrize("where", ["local:0", "local:", "local:two", "local:-1", "somewhere", "tcp://here", "a b:1"])
+def test_an_address_has_a_port(where: str) -> None:
+    with pytest.raises(InputError, match=r"--cluster: expected tcp://HOST:PORT, or local:N .* got "), on_cluster(where):
+        pass
+
+
+def test_nobody_is_waited_for_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "LONGEST_WAIT", 1)
+    expected = r"--cluster: expected a Dask scheduler that answers within 1 s at tcp://127\.0\.0\.1:9, got "
+    with pytest.raises(InputError, match=expected), on_cluster("tcp://127.0.0.1:9"):
+        pass
+
+
+@pytest.mark.parametrize("verb", ["simulate", "infer", "diagnose", "run"])
+def test_commands_say_that_the_extra_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
+    config = write_reach(tmp_path, *CHANGES)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.chdir(tmp_path)
+    code, error = said_to(monkeypatch, capsys, verb, config, "--cluster", "local:2")
+    assert (code, error.count("\n")) == (2, 1)
+    assert "--cluster needs the package distributed, which is not installed: pip install 'vegglue[cluster]'" in error
