@@ -1,5 +1,6 @@
 """More than one machine: the same bits as here, nothing lost with a worker, and one sentence for what cannot be."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -97,6 +98,34 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, case, left: int) 
     assert [one.done for one in heard] == [64 * count for count in range(CHUNKS + 1)]
     vegglue.simulate(case, runs=tmp_path / "here", jobs=1)
     the_same(tmp_path / "here" / "brook", tmp_path / "workers" / "brook", "ensemble")
+
+
+@pytest.mark.slow
+def test_without_its_scheduler_a_run_stops_and_keeps_what_it_has(  # type: ignore[no-untyped-def]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case
+) -> None:
+    heard, again = list[Progress](), list[Progress]()
+    monkeypatch.setattr(cluster, "LONGEST_WAIT", 5)
+    with workers_in(tmp_path, 1) as workers:
+
+        def watch(progress: Progress) -> None:
+            heard.append(progress)
+            if len(heard) == 3:
+                workers.kill_scheduler()
+
+        expected = "--cluster: expected the scheduler to stay, got no answer any more; what was finished is kept"
+        with pytest.raises(InputError, match=expected), on_cluster(workers.address):
+            vegglue.simulate(case, runs=tmp_path, watch=watch)
+    vegglue.simulate(case, runs=tmp_path, jobs=1, watch=again.append)
+    assert again[0].resumed == heard[-1].done >= 2 * 64
+
+
+@pytest.mark.slow
+def test_a_task_that_ends_its_workers_is_told(tmp_path: Path) -> None:
+    with workers_in(tmp_path, 4) as workers, on_cluster(workers.address):
+        expected = "--cluster: expected workers to live, got a task that ended several, .* what was finished is kept"
+        with pytest.raises(InputError, match=expected):
+            side_by_side(os._exit, [(1,)])
 
 
 @pytest.mark.slow

@@ -1,11 +1,12 @@
 """A Dask scheduler and workers in processes of their own on this machine, on ports the system chooses."""
 
+import json
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from reach import ENVIRONMENT, ROOT
@@ -22,7 +23,7 @@ class Workers:
 
     address: str
     folder: Path
-    processes: list["subprocess.Popen[bytes]"] = field(default_factory=list)
+    processes: list["subprocess.Popen[bytes]"]  # the scheduler first
 
     def begin(self, before: str = "") -> None:
         """One more worker, of one thread; before: Python that it runs first. It may take seconds until it serves."""
@@ -32,9 +33,10 @@ class Workers:
 
     def kill(self) -> None:
         """Ends the oldest worker as the system would, without a word."""
-        worker = self.processes.pop(0)
-        worker.kill()
-        worker.wait()
+        _end(self.processes.pop(1))
+
+    def kill_scheduler(self) -> None:
+        _end(self.processes.pop(0))
 
 
 @contextmanager
@@ -42,16 +44,20 @@ def workers_in(folder: Path, count: int) -> Iterator[Workers]:
     """A scheduler with workers, all ended on the way out."""
     at = folder / "scheduler.json"
     options = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", at)
-    scheduler = _begun(folder, SCHEDULER, *options)
+    begun = [_begun(folder, SCHEDULER, *options)]
     try:
-        workers = Workers(_address(at), folder)
+        workers = Workers(_address(at), folder, begun)
         for _ in range(count):
             workers.begin()
         yield workers
     finally:
-        for process in (*workers.processes, scheduler):
-            process.kill()
-            process.wait()
+        for process in begun:
+            _end(process)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.wait()
 
 
 def _begun(folder: Path, program: str, *arguments: object) -> "subprocess.Popen[bytes]":
@@ -61,8 +67,6 @@ def _begun(folder: Path, program: str, *arguments: object) -> "subprocess.Popen[
 
 
 def _address(file: Path) -> str:
-    import json
-
     began = time.monotonic()
     while time.monotonic() - began < LONGEST_START:
         try:

@@ -7,6 +7,7 @@ bits.
 
 import logging
 import re
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -20,7 +21,7 @@ from vegglue.parallel import at_most, one_thread_for_good, taken
 from vegglue.version import VERSION
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, LocalCluster
 
 # How long a scheduler is waited for [s]. Chosen, not measured: long for a network, short for someone who mistyped.
 LONGEST_WAIT = 10
@@ -30,6 +31,7 @@ EACH_THREAD, AT_LEAST = 2, 16
 # What numbers hang on beside the processor.
 DECIDING = ("numpy", "scipy", "numba")
 GOES_ON = "what was finished is kept, and the same command goes on from there"
+GONE = f"--cluster: expected the scheduler to stay, got no answer any more; {GOES_ON}, once there is one."
 Work = Callable[..., Any]
 
 
@@ -56,25 +58,18 @@ def on_cluster(where: str | None) -> Iterator[None]:
 def _connected(where: str) -> Iterator["Client"]:
     try:
         import dask
-        from distributed import Client, LocalCluster
+        from distributed import Client
     except ImportError:
         raise InputError(
             "--cluster needs the package distributed, which is not installed: pip install 'vegglue[cluster]'."
         ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told in a sentence
+    _hush()
     # What tasks share is sent with care, once, and may be large: the warning against large graphs tells nothing.
     quiet = {"distributed.admin.large-graph-warning-threshold": "1 TB"}
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(quiet))
-        address: Any = where
-        if count := _local(where):
-            # No limit of memory and no page: as processes without a cluster.
-            address = stack.enter_context(
-                LocalCluster(
-                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                )
-            )  # fmt: skip
+        count = _local(where)
+        address = stack.enter_context(_processes_here(count)) if count else where
         try:
             client = Client(address, timeout=LONGEST_WAIT, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
@@ -85,13 +80,41 @@ def _connected(where: str) -> Iterator["Client"]:
         yield stack.enter_context(client)
 
 
+def _processes_here(count: int) -> "LocalCluster":
+    """A cluster of processes with one thread each; no limit of memory and no page, as without a cluster."""
+    from distributed import LocalCluster
+
+    return LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        memory_limit=0,
+        silence_logs=logging.CRITICAL,
+        preload=[__name__],
+    )
+
+
+def _hush() -> None:
+    """Dask's own log is not shown: what goes wrong is told in a sentence."""
+    for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def dask_setup(worker: object) -> None:
+    """What Dask asks each process of local:N to do first: Ctrl-C is left to the command that it serves."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _local(where: str) -> int:
     """N of local:N, 0 for an address. Errors: InputError when it is neither."""
     if re.fullmatch(r"([a-z]+://)?[^\s/]+:\d{1,5}", where) and not where.startswith("local:"):
         return 0
     found = re.fullmatch(r"local:([1-9]\d{0,3})", where)
     if found is None:
-        raise InputError(f"--cluster: expected tcp://HOST:PORT, or local:N with N processes, got {where!r}; e.g. local:2.")
+        raise InputError(
+            f"--cluster: expected tcp://HOST:PORT, or local:N with N processes, got {where!r}; e.g. local:2."
+        )
     return int(found[1])
 
 
@@ -137,7 +160,7 @@ def _sent(client: "Client", work: Work, tasks: Iterable[tuple[Any, ...]]) -> Ite
     waiting, under_way, ends = enumerate(tasks), dict[Any, int](), as_completed(loop=client.loop)
     try:
         while True:
-            room = max(EACH_THREAD * sum(client.nthreads().values()), AT_LEAST) - len(under_way)
+            room = max(EACH_THREAD * _threads(client), AT_LEAST) - len(under_way)
             for _, (position, task) in zip(range(room), waiting, strict=False):
                 one = client.submit(_at_work, versions_here(), shared, dumps(task), key=f"task-{uuid4().hex}")
                 under_way[one] = position
@@ -150,6 +173,14 @@ def _sent(client: "Client", work: Work, tasks: Iterable[tuple[Any, ...]]) -> Ite
         client.cancel([*under_way, shared])
 
 
+def _threads(client: "Client") -> int:
+    """Threads of all workers that are there now."""
+    try:
+        return sum(client.nthreads().values())
+    except (OSError, ValueError):
+        raise InputError(GONE) from None
+
+
 def _result(client: "Client", future: "Future[Any]") -> Any:
     """Errors: what the task raised; InputError when workers died of it, or there is no scheduler any more."""
     from distributed import CancelledError, KilledWorker
@@ -158,11 +189,11 @@ def _result(client: "Client", future: "Future[Any]") -> Any:
         return future.result()
     except KilledWorker:
         raise InputError(
-            f"--cluster: one task ended several workers, most likely for want of memory; {GOES_ON}. Give workers more "
-            "memory, or start fewer of them on a machine."
+            "--cluster: expected workers to live, got a task that ended several, most likely for want of memory; "
+            f"{GOES_ON}. Give workers more memory, or start fewer of them on a machine."
         ) from None
     except CancelledError:
-        raise InputError(f"--cluster: the scheduler is gone; {GOES_ON}, once there is one.") from None
+        raise InputError(GONE) from None
     except Exception:
         refuse_other_versions(client)  # the likeliest reason, of a worker that came later
         raise
