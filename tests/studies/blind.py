@@ -1,6 +1,7 @@
 """The study behind docs/blind.md: many data sets, something hidden in each, all diagnosed. `make blind`.
 
-    python tests/studies/blind.py [--jobs N] [--share S] [--only KEY ...] [--page] [--runs FOLDER] [--anew]
+    python tests/studies/blind.py [--jobs N | --cluster ADDRESS] [--share S] [--only KEY ...] [--page] [--runs FOLDER]
+        [--anew]
 
 The truth is that of the second solver, on a site with small imperfections drawn anew for each data set, or that of the
 model's own equations on a finer grid. Calibration starts where a user's does. One line of JSON for
@@ -24,6 +25,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import baseline
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
+from vegglue.cluster import on_cluster
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding
@@ -187,6 +189,7 @@ def _error_at(data: DataSet, case: Case, z: Array, noise: float) -> float | None
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--jobs", type=int, default=-1)
+    parser.add_argument("--cluster", help="Dask scheduler, or local:N; workers need tests/studies on their PYTHONPATH")
     parser.add_argument("--share", type=float, default=1.0, help="share of all data sets, 0 to 1")
     parser.add_argument("--only", nargs="+", default=[""], help="how keys begin: second/twin, own/twin/listed6, ...")
     parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
@@ -196,7 +199,8 @@ def main() -> None:
     path = given.runs / "records.jsonl"
     kept = [] if given.anew else list(records_in(KEPT))
     if not given.page:
-        run(path, {record["key"] for record in kept}, given.jobs, given.share, given.only)
+        with on_cluster(given.cluster):
+            run(path, {record["key"] for record in kept}, given.jobs, given.share, given.only)
     write_page(list({record["key"]: record for record in (*kept, *records_in(path))}.values()), ROOT / "docs")
 
 
