@@ -1,6 +1,5 @@
 """Cases as files: YAML read with all that `extends` names, and refused in one sentence where it is wrong."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,10 @@ from pydantic import ValidationError
 from vegglue.case.consistency import disagreement
 from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal
 from vegglue.case.resolved_config import Tree
+from vegglue.case.safe_yaml import safe_yaml
 from vegglue.case.schema import Case
+from vegglue.case.size_limits import LARGEST_CONFIG, LONGEST_CHAIN
+from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
 
 # Keys whose value is a path, relative to the file it is written in.
@@ -52,6 +54,8 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
     if path in above:
         circle = " -> ".join(shown_path(file) for file in (*above[above.index(path) :], path))
         raise InputError(f"{shown_path(above[-1])}: `extends` goes round in a circle, {circle}: take one of them out.")
+    if len(above) == LONGEST_CHAIN:
+        raise InputError(f"{shown_path(path)}: `extends` names more than {LONGEST_CHAIN} files in a row: join some.")
     tree = _read(path, above)
     base = tree.pop("extends", None)
     layer = (path, _with_full_paths(tree, path.parent))
@@ -63,13 +67,10 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> Tree:
+    named = f"it is named by `extends` in {shown_path(above[-1])}, check the path" if above else "check the path"
+    text = read_text(path, LARGEST_CONFIG, named)
     try:
-        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
-    except OSError as error:
-        named = f", named by `extends` in {shown_path(above[-1])}," if above else ""
-        raise InputError(f"{shown_path(path)}{named} cannot be read: {error.strerror}; check the path.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{shown_path(path)} is not text in UTF-8: save it as UTF-8.") from None
+        tree = safe_yaml(text)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -81,24 +82,6 @@ def _read(path: Path, above: tuple[Path, ...]) -> Tree:
     if not isinstance(tree, dict):
         raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {type(tree).__name__}.")
     return tree
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML as its version 1.2 reads numbers (1e-7 is one), and no key twice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys: set[Any] = set()
-        for key_node, _ in node.value:
-            if isinstance(key_node, yaml.ScalarNode) and key_node.value in keys:
-                twice = f"the key `{key_node.value}` stands twice"
-                raise yaml.constructor.ConstructorError(None, None, twice, key_node.start_mark)
-            keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
-        return super().construct_mapping(node, deep)
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+"), list("-+.0123456789")
-)
 
 
 def _with_full_paths(tree: Any, folder: Path) -> Any:

@@ -1,10 +1,48 @@
-"""Text files written whole or not at all, and names of cases made of any words."""
+"""Text files read up to a size and written whole or not at all, and names of cases made of any words."""
 
 import os
 import re
+import stat
 from pathlib import Path
 
-from vegglue.errors import StorageError
+from vegglue.errors import InputError, StorageError, shown_path
+
+# Signs that no text of a case may hold: control characters but tabs and ends of lines, halves of characters (which no
+# file can hold), and marks that turn the direction of what follows.
+UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
+
+
+def read_text(path: Path, most: int, otherwise: str = "check the path") -> str:
+    """The text of a file in UTF-8, with or without its mark, of at most so many bytes; no more is ever read.
+
+    Errors: InputError when it is no file, cannot be read, is larger, or is not in UTF-8.
+    """
+    try:
+        regular = stat.S_ISREG(path.stat().st_mode)  # opening a pipe would wait, a device never ends
+        content = _beginning(path, most + 1) if regular else None
+    except OSError as error:
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; {otherwise}.") from None
+    except ValueError:  # a NUL in the name
+        raise InputError(f"{str(path)!a} cannot be read: no file has such a name; {otherwise}.") from None
+    if content is None:
+        raise InputError(f"{shown_path(path)} cannot be read: it is not a file; {otherwise}.")
+    if len(content) > most:
+        raise InputError(f"{shown_path(path)}: expected at most {most:,} bytes, got more: make it smaller.")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{shown_path(path)} is not text in UTF-8: save it as UTF-8.") from None
+
+
+def _beginning(path: Path, size: int) -> bytes:
+    with path.open("rb") as file:
+        return file.read(size)
+
+
+def unprintable(text: str) -> str | None:
+    """The first sign of a text that nothing can show, None when there is none."""
+    found = UNPRINTABLE.search(text)
+    return None if found is None else found[0]
 
 
 def write_text(path: Path, text: str, advice: str) -> None:

@@ -1,0 +1,116 @@
+"""YAML as a person means it, of bounded size: no tags, no recursion, no aliases that grow without end.
+
+Numbers are those of YAML 1.2: 1e-7 is one, 1:30 and 2024-05-01 are text; 010, which is 8 for some and 10 for others, is
+refused.
+"""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import yaml
+from yaml.constructor import ConstructorError
+
+from vegglue.case.size_limits import DEEPEST_KEYS, MOST_DIGITS, MOST_PARTS
+from vegglue.case.text_files import unprintable
+
+WHOLE = re.compile(r"[-+]?[0-9]+")
+BROKEN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+# Kinds of plain words that YAML 1.1 reads as something else than a person means, or with rules of its own.
+ANOTHER_WAY = ("int", "float", "timestamp", "value")
+
+
+def safe_yaml(text: str) -> Any:
+    """The keys and values of a YAML text. Errors: yaml.YAMLError, with the place and a sentence."""
+    return yaml.load(text, Loader=_Loader)
+
+
+class _Loader(yaml.SafeLoader):
+    """What is refused is refused while the text is read, before anything is made of it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._level = self._begun = 0
+        self._finished: dict[int, tuple[int, int]] = {}  # of each node that is whole: its height, and its parts
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            node = super().compose_node(parent, index)
+            if id(node) not in self._finished:
+                raise _refused("an alias stands within what it names: write its parts out", event)
+            return node
+        if getattr(event, "tag", None) not in (None, "!"):
+            raise _refused(f"the tag `{event.tag}` is not known here: leave it out", event)
+        self._level, self._begun = self._level + 1, self._begun + 1
+        if self._begun > MOST_PARTS:
+            raise _refused(f"there are more than {MOST_PARTS:,} parts: make it smaller", event)
+        if self._level > DEEPEST_KEYS:
+            raise _refused(f"keys stand within keys more than {DEEPEST_KEYS} times: write them flatter", event)
+        node = super().compose_node(parent, index)
+        self._level -= 1
+        self._finished[id(node)] = self._measured(node, event)
+        return node
+
+    def _measured(self, node: Any, event: yaml.Event) -> tuple[int, int]:
+        """Height and number of parts of a node, aliases written out."""
+        below = node.value if isinstance(node, yaml.CollectionNode) else []
+        inner = [one for item in below for one in (item if isinstance(item, tuple) else (item,))]
+        sizes = [self._finished[id(one)] for one in inner]
+        height, parts = 1 + max((high for high, _ in sizes), default=0), 1 + sum(many for _, many in sizes)
+        if height > DEEPEST_KEYS or parts > MOST_PARTS:
+            limits = f"{MOST_PARTS:,} parts and {DEEPEST_KEYS} keys within keys"
+            raise _refused(f"with its aliases written out it is larger than {limits}: make it smaller", event)
+        return height, parts
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys: set[Any] = set()
+        for key_node, _ in node.value:
+            if isinstance(key_node, yaml.ScalarNode) and key_node.value in keys:
+                raise _refused(f"the key `{key_node.value}` stands twice", key_node)
+            keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
+        return super().construct_mapping(node, deep)
+
+
+def _refused(problem: str, at: Any) -> ConstructorError:
+    return ConstructorError(None, None, problem, at.start_mark)
+
+
+def _whole(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    digits = node.value.lstrip("+-")
+    if len(digits) > 1 and digits.startswith("0"):
+        complaint = f"`{node.value}` may mean two numbers: write it without the 0 in front, or text in quotes"
+        raise _refused(complaint, node)
+    if len(digits) > MOST_DIGITS:
+        complaint = f"a number has {len(digits)} digits, more than {MOST_DIGITS}: correct it"
+        raise _refused(complaint, node)
+    return int(node.value)
+
+
+def _broken(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+    return float(node.value.lower().replace(".inf", "inf").replace(".nan", "nan"))
+
+
+def _words(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> str:
+    if (sign := unprintable(node.value)) is not None:
+        raise _refused(f"a text holds the sign {sign!a}, which is no letter", node)
+    return str(node.value)
+
+
+def _plain_words() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
+    """The rules of PyYAML for plain words, without those replaced here."""
+    replaced = {f"tag:yaml.org,2002:{kind}" for kind in ANOTHER_WAY}
+    return {
+        first: [(tag, pattern) for tag, pattern in rules if tag not in replaced]
+        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
+_Loader.yaml_implicit_resolvers = _plain_words()
+_CONSTRUCTORS: dict[str, Callable[..., Any]] = {"int": _whole, "float": _broken, "str": _words}
+for _kind, _construct in _CONSTRUCTORS.items():
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _construct)
+for _kind, _pattern in (("int", WHOLE), ("float", BROKEN)):
+    _Loader.add_implicit_resolver(
+        f"tag:yaml.org,2002:{_kind}", re.compile(rf"(?:{_pattern.pattern})$"), list("-+.0123456789")
+    )
