@@ -7,6 +7,7 @@ import pytest
 
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
+from vegglue.measurements import observations
 from vegglue.measurements.observations import STATION_COLUMNS, fitted_curve, read_observations
 
 ROOT = Path(__file__).parents[2]
@@ -147,7 +148,7 @@ def test_files_without_turbulence_and_duration_still_get_errors(tmp_path):
         ("D3a,p,103,4.0,-3.5,0.4,0.1,100", r"row 3: expected the same x in all rows of case 'D3a'"),
         (",p,102,4.0,-3.5,0.4,0.1,100", r"row 3: expected a name in column case"),
         ("", r"row 3"),
-        ("D3a,p,102,4.0,-3.5,0.4,0.1,100,7", r"cannot be read"),
+        ("D3a,p,102,4.0,-3.5,0.4,0.1,100,7", r"row 3: expected 8 fields as in the heading, got 9"),
     ],
 )
 def test_a_wrong_row_is_refused_by_file_and_row(tmp_path, line, sentence):
@@ -162,11 +163,11 @@ def test_wrong_files_are_refused(tmp_path):
         read_observations(with_file(tmp_path, POINTS.replace("z", "height") + row))
     with pytest.raises(InputError, match="expected rows below the heading"):
         read_observations(with_file(tmp_path, POINTS))
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"row 1: expected the columns .* got nothing, without case"):
         read_observations(with_file(tmp_path, ""))
     with pytest.raises(InputError, match="expected rows with case 'D3a', got only D9"):
         read_observations(with_file(tmp_path, POINTS + row.replace("D3a", "D9")))
-    with pytest.raises(InputError, match=r"nowhere\.csv: .* cannot be read"):
+    with pytest.raises(InputError, match=r"nowhere\.csv cannot be read: No such file"):
         read_observations(changed(CASES["d3a"], file=tmp_path / "nowhere.csv"))
 
 
@@ -233,3 +234,9 @@ def test_points_that_scatter_more_than_sampling_explains_widen_both_averages(nam
     fitted = READ[name].profiles.query("law != 'linear'")
     assert fitted["scatter"].max() > 1.05
     assert (fitted["linear_error"] / fitted["fitted_error"]).between(0.9, 1.3).all()
+
+
+def test_more_stations_than_a_covariance_can_hold_are_refused(monkeypatch):
+    monkeypatch.setattr(observations, "MOST_STATIONS", 20)
+    with pytest.raises(InputError, match=r"d3a\.yaml: expected at most 20 stations, got 21: average"):
+        read_observations(CASES["d3a"])

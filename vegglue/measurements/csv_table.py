@@ -1,11 +1,15 @@
 """Measured tables: CSV files read strictly, every fault named with its file and row."""
 
+import csv
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from vegglue.case.size_limits import LARGEST_DATA
+from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
 
 
@@ -19,20 +23,16 @@ def read_table(
     Errors: InputError, naming file and row, when the file cannot be read, has no rows or lacks a column, and for a name
     that is empty or a number that is missing, infinite or none.
     """
-    try:
-        raw = pd.read_csv(path, dtype=str, keep_default_na=False, skip_blank_lines=False, index_col=False)
-    except (OSError, ValueError, pd.errors.ParserWarning) as error:  # pandas' own errors are ValueErrors
-        why = " ".join(str(error).split())
-        raise InputError(
-            f"{shown_path(path)}: expected a CSV table in UTF-8, which cannot be read ({why}); check it."
-        ) from None
-    raw.columns = raw.columns.str.strip()
+    raw = _raw_table(path)
     missing = [column for column in (*names, *numbers) if column not in raw.columns]
     if missing:
         raise InputError(
             f"{shown_path(path)}, row 1: expected the columns {', '.join((*names, *numbers))}, got "
-            f"{', '.join(raw.columns)} without {', '.join(missing)}; rename or add what is missing."
+            f"{', '.join(raw.columns) or 'nothing,'} without {', '.join(missing)}; rename or add what is missing."
         )
+    for column in (*names, *numbers, *optional, *labels):
+        if list(raw.columns).count(column) > 1:
+            raise InputError(f"{shown_path(path)}, row 1: expected one column {column}, got two; rename one of them.")
     raw.index = pd.RangeIndex(2, len(raw) + 2)
     if raw.empty:
         raise InputError(f"{shown_path(path)}: expected rows below the heading, got none.")
@@ -42,6 +42,31 @@ def read_table(
         {column: _texts(path, raw[column]) for column in texts}
         | {column: _numbers(path, raw[column]) for column in values}
     )
+
+
+def _raw_table(path: Path) -> pd.DataFrame:
+    """All columns as text, their names without spaces around them; what a short row lacks is empty.
+
+    pandas would read a row that is longer than the heading without its last fields: with decimal commas all of `u`.
+    """
+    rows = csv.reader(StringIO(read_text(path, LARGEST_DATA)), strict=True)
+    try:
+        heading = [name.strip() for name in next(rows, [])]
+        fields = [_fields(path, number, row, len(heading)) for number, row in enumerate(rows, 2)]
+    except csv.Error as error:
+        raise InputError(
+            f"{shown_path(path)}: expected a CSV table, which cannot be read ({error}); check it."
+        ) from None
+    return pd.DataFrame(fields, columns=heading, dtype=str)
+
+
+def _fields(path: Path, number: int, row: list[str], columns: int) -> list[str]:
+    if any(field.strip() for field in row[columns:]):  # spreadsheets leave empty ones behind
+        raise InputError(
+            f"{shown_path(path)}, row {number}: expected {columns} fields as in the heading, got {len(row)}; write "
+            "numbers with a decimal point, and text that holds a comma in quotes."
+        )
+    return [*row[:columns], *[""] * (columns - len(row))]
 
 
 def refuse_rows(path: Path, wrong: pd.Series, complaint: str) -> None:
@@ -68,6 +93,10 @@ def _texts(path: Path, column: "pd.Series[str]") -> "pd.Series[str]":
         raise InputError(
             f"{shown_path(path)}, row {(text == '').idxmax()}: expected a name in column {column.name}, got nothing."
         )
+    wrong = text.map(unprintable).dropna()
+    if len(wrong):
+        sign = f"expected a name in column {column.name}, got one with the sign {wrong.iloc[0]!a}; take it out"
+        raise InputError(f"{shown_path(path)}, row {wrong.index[0]}: {sign}.")
     return text
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
+from vegglue.case.size_limits import MOST_STATIONS
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.adv_section import Section, average_of, read_section
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
@@ -79,6 +80,11 @@ def read_observations(case: Case) -> Observations:
             stations.append(_averaged(sections[key], observation))
         else:
             stations.append(_read_stations(case, observation, _kind_in(case, observation)))
+    if (number := sum(map(len, stations))) > MOST_STATIONS:
+        raise InputError(
+            f"{shown_path(case.source)}: expected at most {MOST_STATIONS:,} stations, got {number:,}: average "
+            "those that lie close together, or leave some out."
+        )
     table = _joined(stations)
     _refuse_unknown_limits(case, table)
     return Observations(

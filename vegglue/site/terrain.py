@@ -4,11 +4,14 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.size_limits import LARGEST_DATA
+from vegglue.case.text_files import read_text
 from vegglue.errors import InputError
 from vegglue.site.grid import centres
 
@@ -31,11 +34,11 @@ def read_raster(path: Path) -> Raster:
 
     Errors: InputError, naming file and line, when the header or the values are incomplete or no numbers.
     """
-    lines = _text(path).splitlines()
+    lines = read_text(path, LARGEST_DATA).splitlines()
     header, first = _header(path, lines)
     columns, rows, size = (
-        int(_positive(path, header, "ncols")),
-        int(_positive(path, header, "nrows")),
+        _whole(path, header, "ncols"),
+        _whole(path, header, "nrows"),
         _positive(path, header, "cellsize"),
     )
     values = _numbers(path, lines[first:], first, rows * columns).reshape(rows, columns)[::-1].T
@@ -90,13 +93,26 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
 
 def read_points(path: Path) -> Array:
     """The columns x, y, z of a CSV file, (points, 3) [m]. Errors: InputError for a missing column or number."""
-    rows = csv.DictReader(line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
-    missing = [name for name in "xyz" if name not in (rows.fieldnames or ())]
-    if missing:
-        raise InputError(f"{path}: expected a header with the columns x, y and z, got {rows.fieldnames}.")
-    return np.array([[_number(path, i, row[name], name) for name in "xyz"] for i, row in enumerate(rows, 1)]).reshape(
-        -1, 3
-    )
+    lines = (line for line in read_text(path, LARGEST_DATA).splitlines() if line.strip() and not line.startswith("#"))
+    try:
+        rows = csv.DictReader(lines)
+        missing = [name for name in "xyz" if name not in (rows.fieldnames or ())]
+        if missing:
+            raise InputError(f"{path}: expected a header with the columns x, y and z, got {rows.fieldnames}.")
+        points = [_point(path, number, row) for number, row in enumerate(rows, 1)]
+    except csv.Error as error:
+        raise InputError(f"{path}: expected a CSV table, which cannot be read ({error}); check it.") from None
+    return np.array(points).reshape(-1, 3)
+
+
+def _point(path: Path, number: int, row: dict[str | None, Any]) -> list[float]:
+    """x, y and z; `csv` keeps what goes beyond the heading under None."""
+    if any(text.strip() for text in row.get(None, ())):
+        raise InputError(
+            f"{path}, data row {number}: expected as many fields as in the heading, got more; write numbers with a "
+            "decimal point."
+        )
+    return [_number(path, number, row[name], name) for name in "xyz"]
 
 
 def _number(path: Path, row: int, text: str | None, name: str) -> float:
@@ -107,13 +123,6 @@ def _number(path: Path, row: int, text: str | None, name: str) -> float:
     if not math.isfinite(number):
         raise InputError(f"{path}, data row {row}: column {name} expected a number in m, got {text!r}.")
     return number
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read as text: {error}.") from None
 
 
 def _header(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
@@ -136,6 +145,13 @@ def _positive(path: Path, header: dict[str, float], key: str) -> float:
     return header[key]
 
 
+def _whole(path: Path, header: dict[str, float], key: str) -> int:
+    number = _positive(path, header, key)
+    if number != int(number):
+        raise InputError(f"{path}: expected a whole number of cells as `{key}`, got {number:g}; correct the header.")
+    return int(number)
+
+
 def _corner(path: Path, header: dict[str, float], axis: str, size: float) -> float:
     if f"{axis}llcorner" in header:
         return header[f"{axis}llcorner"]
@@ -145,14 +161,26 @@ def _corner(path: Path, header: dict[str, float], axis: str, size: float) -> flo
 
 
 def _numbers(path: Path, lines: list[str], before: int, count: int) -> Array:
-    words = [(number, word) for number, line in enumerate(lines, before + 1) for word in line.split()]
-    if len(words) != count:
-        raise InputError(f"{path}: expected nrows x ncols = {count} values after the header, got {len(words)}.")
+    """All values after the header; a line at a time, so that a large file takes little more than its numbers do."""
+    rows = [_row(path, number, line) for number, line in enumerate(lines, before + 1)]
+    values = np.concatenate([np.empty(0), *rows])
+    if len(values) != count:
+        raise InputError(f"{path}: expected nrows x ncols = {count} values after the header, got {len(values)}.")
+    return values
+
+
+def _row(path: Path, number: int, line: str) -> Array:
+    words = line.split()
     try:
-        return np.array([float(word) for _, word in words])
+        values = np.array(words, dtype=np.float64)
     except ValueError:
-        number, word = next((number, word) for number, word in words if not _is_number(word))
+        word = next(word for word in words if not _is_number(word))
         raise InputError(f"{path}, line {number}: expected numbers, got {word!r}.") from None
+    if np.isinf(values).any():
+        raise InputError(
+            f"{path}, line {number}: expected finite numbers, got {words[int(np.isinf(values).argmax())]!r}."
+        )
+    return values
 
 
 def _is_number(word: str) -> bool:
