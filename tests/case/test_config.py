@@ -98,6 +98,28 @@ def test_the_shipped_cases_differ_in_canopy_height_only_where_the_paper_does():
 
 
 REFUSED = [
+    (
+        "[1.0, 0.5]",
+        "[1e-5, 1e-3]",
+        "`grid` (regular grid of the model) expected at most 1,000,000 cells, where these make 3",
+    ),
+    ("[1.0, 0.5]", "[1e-308, 1e-308]", "expected at most 1,000,000 cells, where these make inf"),
+    ("x: [0, 40]", "x: [-1e308, 1e308]", "expected at most 1,000,000 cells, where these make inf"),
+    (
+        "[0, 40], y: [-4, 4], cell: [1.0, 0.5]",
+        "[0, 999], y: [0, 999], cell: [1, 1]",
+        "expected cells whose factors take at most 16 GB",
+    ),
+    (
+        "name: small",
+        "name: small\nsimulate: {members: 1073741824}",
+        "a number less than or equal to 1048576, got 1073741824",
+    ),
+    (
+        "name: small",
+        "name: small\nsimulate: {seed: 99999999999999999999999}",
+        "a number less than 9223372036854775808, got",
+    ),
     ("bottom_width", "botom_width", "`bed[0].trapezoid.botom_width` is not a known key: did you mean `bottom_width`?"),
     ("steeper_than: 0.2", "slope: 0.2", "`friction.zones[0].slope` is not a known key: known here are class"),
     ("name: small\n", "", "`name` is missing (lower-case letters, digits, _ and -): add it"),

@@ -17,6 +17,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import NEWTON
+from vegglue.errors import InputError
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow import run_folder
 
@@ -89,3 +90,9 @@ def test_the_same_again_gives_the_same(case: Case, tmp_path: Path, monkeypatch: 
     first = place(case, tmp_path / "runs", None)
     again = run_folder.calibrated(case, tmp_path / "runs", excluded_by())
     assert float(again.fitted.point.z[0]) == first
+
+
+@pytest.mark.parametrize("members", [0, -1, 2**30])
+def test_no_ensemble_is_larger_than_the_largest(members: int) -> None:
+    with pytest.raises(InputError, match="members: expected 1 to 1,048,576, got"):
+        run_folder.of_size(load_case(CONFIG), members)

@@ -31,9 +31,12 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    expected = expected.replace("greater than", "a number greater than").replace(
-        "String should match pattern", "text like"
-    )
+    for said, meant in (
+        ("greater", "a number greater"),
+        ("less", "a number less"),
+        ("String should match pattern", "text like"),
+    ):
+        expected = expected.replace(said, meant)
     quotes = "; write numbers without quotes" if isinstance(got, str) and "number" in expected else ""
     return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{quotes}".lstrip())
 

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
+from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.in_short import in_short, so_many
 
 
@@ -113,8 +114,12 @@ class KeptFields(Part):
 
 
 class Simulate(Part):
-    members: Annotated[int, Field(strict=True, gt=0)] = Field(default=4096, description="size of the ensemble")
-    seed: Annotated[int, Field(strict=True, ge=0)] = Field(default=1, description="seed of the Sobol' sequence")
+    members: Annotated[int, Field(strict=True, gt=0, le=MOST_MEMBERS)] = Field(
+        default=4096, description="size of the ensemble"
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(
+        default=1, description="seed of the Sobol' sequence"
+    )
     fields: KeptFields | None = Field(default=None, description="where level, u and v of all members are kept")
     field_budget: Positive = Field(default=200.0, description="most they may take before compression [MB]")
 

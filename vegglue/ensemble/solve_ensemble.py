@@ -15,6 +15,7 @@ import numpy as np
 from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.case.size_limits import MOST_PREDICTIONS
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.problem import Problem, take
 from vegglue.flow.problem_setup import build_problem
@@ -57,6 +58,11 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{shown_path(case.source)}: {sentence}")
+    if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
+        raise InputError(
+            f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "
+            f"have {predictions:,} predictions; expected at most {MOST_PREDICTIONS:,}, take fewer of either."
+        )
     sample = sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))

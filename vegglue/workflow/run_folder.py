@@ -17,10 +17,12 @@ from vegglue.calibration.fit import fit
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
+from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.case.text_files import write_text
 from vegglue.diagnosis.excluded_stations import excluding
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import model_of
+from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.storage.result_files import read_posterior, stored_hash
 
@@ -37,9 +39,11 @@ def folder_of(runs: Path | str, case: Case) -> Path:
 
 
 def of_size(case: Case, members: int | None) -> Case:
-    """The case with another number of members, or as it is."""
+    """The case with another number of members, or as it is. Errors: InputError for none, or for more than the most."""
     if members is None:
         return case
+    if not 0 < members <= MOST_MEMBERS:
+        raise InputError(f"members: expected 1 to {MOST_MEMBERS:,}, got {members:,}; give another number.")
     return case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
 
 
