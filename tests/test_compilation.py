@@ -29,10 +29,8 @@ def chezy(folder: Path, **environment: str) -> tuple[float, int]:
     return float(value), int(hits)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("where", ["beside the code", "in a read-only folder", "where the user says"])
-def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, where: str) -> None:
-    copy = tmp_path / "vegglue"
+def copied(copy: Path) -> None:
+    """What loops of resistance need of the package, in a folder."""
     for part in ("__init__.py", "version.py", "compilation.py", "resistance"):
         source = PACKAGE / part
         copy.mkdir(exist_ok=True)
@@ -40,6 +38,13 @@ def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, whe
             shutil.copytree(source, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copy(source, copy / part)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["beside the code", "in a read-only folder", "where the user says"])
+def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, where: str) -> None:
+    copy = tmp_path / "vegglue"
+    copied(copy)
     if where == "in a read-only folder":  # no folder for a cache can be made there
         (copy / "resistance" / "__pycache__").write_text("")
     elsewhere = {"NUMBA_CACHE_DIR": str(tmp_path / "own")} if where == "where the user says" else {}
@@ -51,6 +56,21 @@ def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, whe
     other = chezy(tmp_path, **elsewhere)
     assert other[0] > first[0]
     assert other[1] == 0
+
+
+@pytest.mark.slow
+def test_without_a_folder_to_write_to_loops_are_compiled_each_time_and_it_is_said_once(tmp_path: Path) -> None:
+    """As in a container with a read-only install and no home: a file stands where each folder would be."""
+    copied(tmp_path / "vegglue")
+    (tmp_path / "vegglue" / "resistance" / "__pycache__").write_text("")
+    (tmp_path / "home").write_text("")
+    nowhere = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
+    done = subprocess.run(
+        [sys.executable, "-c", CHEZY],
+        env=os.environ | nowhere, cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert float(done.stdout.split()[0]) > 0.0
+    assert done.stderr.count("No folder for compiled code can be written to") == len(done.stderr.splitlines()) == 1
 
 
 def test_loops_use_nothing_of_the_package_but_loops_and_shared_constants() -> None:

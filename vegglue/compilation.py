@@ -1,9 +1,11 @@
 """How loops are compiled: cached, and without the lock that would keep threads from running side by side."""
 
 import re
+import sys
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +18,33 @@ SHARED = ("compilation.py", "physical_constants.py")
 def compiled(loop: Callable[..., Any]) -> Any:
     """A loop whose products and sums may fuse."""
     # No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
-    return _fresh(njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")(loop))
+    return _cached(loop, fastmath={"contract", "nsz"})
 
 
 def compiled_exactly(loop: Callable[..., Any]) -> Any:
     """A loop whose order of operations is part of the result: an elimination."""
-    return _fresh(njit(cache=True, nogil=True, error_model="numpy")(loop))
+    return _cached(loop)
+
+
+def _cached(loop: Callable[..., Any], **flags: Any) -> Any:
+    """The loop, its machine code kept between runs where there is a folder for it."""
+    flags |= {"nogil": True, "error_model": "numpy"}
+    try:
+        return _fresh(njit(cache=True, **flags)(loop))
+    except RuntimeError:  # numba found no folder that it can write to: a read-only install without a home
+        _say_uncached()
+        return njit(**flags)(loop)
+
+
+@cache
+def _say_uncached() -> None:
+    """Once, and not by each worker."""
+    if current_process().name == "MainProcess":
+        print(
+            "No folder for compiled code can be written to, so that every command compiles anew, for a minute or two: "
+            "set NUMBA_CACHE_DIR to one that can.",
+            file=sys.stderr,
+        )
 
 
 def _fresh(loop: Any) -> Any:
