@@ -19,7 +19,9 @@ from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.solver.batch import CLUSTER_SIZE, blend, solve_members
+from vegglue.solver.block_elimination import minimise
 from vegglue.solver.chord import ChordSolution, stream
+from vegglue.solver.jacobian import eliminate
 from vegglue.solver.parameter_metric import clusters, principal_axes
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.storage.result_files import read_ensemble
@@ -209,3 +211,28 @@ def test_starts_are_weighted_sums_of_solved_states_in_the_rows_of_a_band() -> No
     some = np.array([7, 0, 3])
     expected = np.einsum("bn,nxej->xejb", weights, states[some][..., 2:6])
     assert blend(states, some, weights, 2, 6) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_singular_jacobian_fails_its_own_member_only(tmp_path: Path) -> None:
+    """On a bed of slope 0.05 water runs faster than its waves, the march runs away, and a block has no inverse."""
+    low = (OUTLET[0], (OUTLET[1][0], OUTLET[1][1].replace("-3", "-0.94")))
+    steep, briefly = ("bed_slope: 0.001", "bed_slope: 0.05"), ("simulate:", "numerics: {march_span: 20}\nsimulate:")
+    case, site, observations = reach_at(tmp_path, *low, steep, briefly)
+    sample = sample_at(case, np.array([[0.5, EMPTIED, 0.5], [0.5, FILLED, 0.5]]))
+    rows = solve_chunk(case, site, observations, sample)
+    assert rows["status"].tolist() == [FAILED, SOLVED_BY_NEWTON]
+    assert "no steady state" in rows["reason"][0]
+    assert np.isnan(rows["prediction"][0]).all()
+    assert np.isfinite(rows["prediction"][1]).all()
+
+
+def test_a_matrix_without_an_inverse_leads_nowhere() -> None:
+    columns, far = np.zeros((3, 3, 6, 6), np.float32), np.zeros((3, 6), np.float32)
+    eliminate(columns, far)
+    assert np.isnan(columns).all()
+
+
+def test_a_lane_without_numbers_is_mixed_by_itself() -> None:
+    gram, right = np.ones((1, 1, 3)), np.array([[1.0, np.nan, 1.0]])
+    gram[..., 2] = np.inf
+    assert minimise(gram, right).tolist() == [[pytest.approx(1.0), 0.0, 0.0]]

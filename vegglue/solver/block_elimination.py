@@ -127,7 +127,9 @@ def mix(state, step, sums, weights):
 
 @compiled_exactly
 def minimise(gram, right):
-    """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing."""
+    """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing; 0 for a lane
+    that has run away, whose numbers are none.
+    """
     depth, _, m = gram.shape
     weights = np.empty((depth, m))
     for k in range(m):
@@ -136,6 +138,9 @@ def minimise(gram, right):
             for b in range(depth):
                 matrix[a, b] = gram[a, b, k]
             matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
+        if not (np.isfinite(matrix).all() and np.isfinite(right[:, k]).all()):
+            weights[:, k] = 0.0
+            continue
         weights[:, k] = np.linalg.solve(matrix, np.ascontiguousarray(right[:, k]))
     return weights
 

@@ -39,16 +39,26 @@ class Factors:
     def step(self, rates: Array) -> Single:
         """-J^-1 R in the unknowns of chord steps (nx, 3, ny, m): levels, velocities times rho where water is thin."""
         nx, _, ny, m = rates.shape
-        work = np.multiply(rates, -1.0, dtype=np.float32, casting="same_kind")
+        with np.errstate(over="ignore"):  # of a member that runs away, told by its correction
+            work = np.multiply(rates, -1.0, dtype=np.float32, casting="same_kind")
         block_elimination.solve(self.columns, self.far, work.reshape(nx, 3 * ny, m))
         thin_water.tilt(work, self.answer)
         return work
 
 
+def eliminate(columns: Single, far: Single) -> None:
+    """Factors in place; of a Jacobian without an inverse no numbers, and no correction by them is taken for one."""
+    try:
+        block_elimination.factor(columns, far)
+    except np.linalg.LinAlgError:  # compiled loops raise; one member fails by it, not all that are solved beside it
+        columns.fill(np.nan)
+
+
 def solved(columns: Single, far: Single, right: Array) -> Array:
     """J^-1 right, (nx, 3, ny, m), of factors."""
     nx, _, ny, m = right.shape
-    work = right.astype(np.float32).reshape(nx, 3 * ny, m)
+    with np.errstate(over="ignore"):  # of a member that runs away, told by its correction
+        work = right.astype(np.float32).reshape(nx, 3 * ny, m)
     block_elimination.solve(columns, far, work)
     return work.reshape(right.shape).astype(np.float64)
 
@@ -77,5 +87,5 @@ def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
 def factors(problem: Problem, state: Array) -> Factors:
     """Factors of J at one state."""
     columns, far = jacobian(problem, state)
-    block_elimination.factor(columns, far)
+    eliminate(columns, far)
     return Factors(columns, far, slope_of_friction(problem, state), *thickness(problem, state))

@@ -13,9 +13,8 @@ from vegglue.arrays import Array, Single
 from vegglue.flow.chord_equations import eased, slope_of_friction
 from vegglue.flow.equations import storage
 from vegglue.flow.problem import LEVEL, Problem
-from vegglue.solver import block_elimination
 from vegglue.solver.chord import LONGEST_CORRECTION, ChordSolution, chord
-from vegglue.solver.jacobian import Factors, factors, jacobian, solved
+from vegglue.solver.jacobian import Factors, eliminate, factors, jacobian, solved
 
 # Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there: chosen, not
 # measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).
@@ -76,7 +75,7 @@ def _bounded_step(
     for _ in range(12):
         shifted = columns.copy()
         shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
-        block_elimination.factor(shifted, far)
+        eliminate(shifted, far)
         step = -solved(shifted, far, rates)
         if np.abs(step).max() < LONGEST_CORRECTION:
             break
