@@ -58,6 +58,13 @@ def test_a_sound_case_is_passed_in_silence(tmp_path):
     assert odd(tmp_path) == []
 
 
+def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
+    full = SOUND.replace("level: 1.0}", "level: 2.0}")
+    walled = full.replace("  default: bed", "  default: bed\n  walls: {law: manning, n: 0.011}")
+    assert [sentence for sentence in odd(tmp_path, full) if "widen" in sentence]
+    assert not [sentence for sentence in odd(tmp_path, walled) if "widen" in sentence]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [

@@ -29,8 +29,11 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
             yield f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {lowest:.3g} m."
         elif (froude := _froude(case, experiment, wet, site.grid.dy)) > 0.7:
             yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."
-        if (depth[:, [0, -1]] > 0).any():
-            yield f"Experiment {name} puts water on the side edges of the grid, which act as walls: widen the grid."
+        if case.friction.walls is None and (depth[:, [0, -1]] > 0).any():
+            yield (
+                f"Experiment {name} puts water on the side edges of the grid, which act as smooth walls: widen the grid, "
+                f"or for a flume give the roughness of its walls as `friction.walls`."
+            )
         for inflow, side in case.inflows.items():
             edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
             cells = inflow_cells(side, site.grid)
