@@ -31,8 +31,8 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
             yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."
         if case.friction.walls is None and (depth[:, [0, -1]] > 0).any():
             yield (
-                f"Experiment {name} puts water on the side edges of the grid, which act as smooth walls: widen the grid, "
-                f"or for a flume give the roughness of its walls as `friction.walls`."
+                f"Experiment {name} puts water on the side edges of the grid, which act as smooth walls: widen the "
+                f"grid, or for a flume give the roughness of its walls as `friction.walls`."
             )
         for inflow, side in case.inflows.items():
             edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
