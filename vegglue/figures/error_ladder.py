@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
@@ -115,6 +116,8 @@ def _paint_parameter(axes: Axes, rungs: Sequence[Rung], name: str) -> None:
     values = np.array([rung.values[name] for _, rung in known])
     if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():
         axes.set_yscale("log")
+        for set_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            set_formatter(LogFormatter())  # plain numbers: the usual one writes formulae
     moving = [rung.homogeneity[name] for _, rung in known if name in rung.homogeneity]
     homogeneity = f"\nsame everywhere: p = {fixed(moving[-1], 2)}" if moving else ""
     broken = "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), TITLE_LETTERS))

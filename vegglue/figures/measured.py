@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, label, styled
+from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, formula_labels, label, styled
 from vegglue.figures.typography import plus_minus
 
 
@@ -118,7 +118,7 @@ def draw_residuals(place: Array, axis: str, residual: Array, zone: Sequence[str]
         side = 7 if residual[last] >= 0 else -12
         label(axes, place[last], residual[last], name, "measured", ha="center", xytext=(0, side))
     axes.margins(y=0.18)
-    axes.set(xlabel=f"{axis} [m]", ylabel=f"measured − modelled [{unit}]")
+    formula_labels(axes, f"{axis} [m]", f"measured − modelled [{unit}]")
     return figure
 
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, HEIGHT, WIDTH, canvas, label, styled
+from vegglue.figures.style import COLOUR, HEIGHT, WIDTH, canvas, formula_labels, label, styled
 from vegglue.figures.typography import short, symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
@@ -101,7 +101,8 @@ def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequenc
     _name_densities(axes, grid, prior, posterior)
     for place, reference in enumerate(references):
         _mark(axes, parameter, reference, peak * (1.10 + 0.13 * place))
-    axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), xlabel=parameter.title, yticks=[])
+    axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), yticks=[])
+    formula_labels(axes, parameter.title)
     axes.spines["left"].set_visible(False)
     if parameter.logarithmic:
         _powers(axes, "x")
@@ -175,7 +176,7 @@ def draw_joint(
             {"ha": "left", "xytext": (7, 5)} if place % 2 == 0 else {"ha": "right", "xytext": (-7, -11)}
         )
         label(axes, *at, name, **side)
-    axes.set(xlabel=across.title, ylabel=upward.title)
+    formula_labels(axes, across.title, upward.title)
     axes.set_xlim(*_window(across, heavy, [value for _, value, _, _ in marks]))
     axes.set_ylim(*_window(upward, heavy, [value for _, _, value, _ in marks]))
     for parameter, which in ((across, "x"), (upward, "y")):
@@ -200,7 +201,8 @@ def draw_cylinder(inferred: Array, weights: Array, cylinder: Array, low: float, 
         axes.plot(grid, height, color=COLOUR[line], linewidth=1.4)
         at = int(np.argmax(height))
         label(axes, grid[at], height[at], name, line, ha=side, xytext=(8 if side == "left" else -8, -8))
-    axes.set(xlim=(low, high), xlabel=f"{symbol_math(symbol)} of the dense patches [–]", yticks=[])
+    axes.set(xlim=(low, high), yticks=[])
+    formula_labels(axes, f"{symbol_math(symbol)} of the dense patches [–]")
     axes.set_ylim(0, axes.get_ylim()[1] * 1.05)
     axes.spines["left"].set_visible(False)
     _powers(axes, "x")

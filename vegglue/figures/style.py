@@ -55,6 +55,8 @@ def _settings() -> dict[str, Any]:
     return {
         "font.family": face,
         "font.size": 9,
+        # A name, title or section may hold any sign: it is no formula. Those that are say so, see `formula_labels`.
+        "text.parse_math": False,
         "mathtext.fontset": "custom",
         "mathtext.rm": face[0],
         "mathtext.it": f"{face[0]}:italic",
@@ -122,6 +124,13 @@ def label(axes: Axes, x: float, y: float, text: str, colour: str = "ink", **keyw
     } | keywords
     text_ = axes.annotate(text, (x, y), **settings)
     text_.set_path_effects([withStroke(linewidth=2.2, foreground=COLOUR["paper"])])
+
+
+def formula_labels(axes: Axes, across: str = "", upward: str = "") -> None:
+    """Labels of the axes that hold mathtext, of `symbol_math` and `unit_math`; all other text is drawn as it is."""
+    for text, write in ((across, axes.set_xlabel), (upward, axes.set_ylabel)):
+        if text:
+            write(text, parse_math=True)
 
 
 def save(figure: Figure, path: Path, dots_per_inch: float = 200) -> None:

@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from vegglue.arrays import Array
-from vegglue.figures.style import COLOUR, SMALL, WIDTH, canvas, label, styled
-from vegglue.figures.typography import fixed, unit_math
+from vegglue.figures.style import COLOUR, SMALL, WIDTH, canvas, formula_labels, label, styled
+from vegglue.figures.typography import fixed, no_formula, unit_math
 from vegglue.measurements.kinds import KINDS, Kind
 from vegglue.screening.score_test import ALIKE, alike_groups
 
@@ -147,12 +147,12 @@ def draw_fingerprint(trace: Array, station: pd.DataFrame, unit: str) -> Figure:
     parts = [part for kind in KINDS.values() for part in _parts_of(kind, table[table["kind"] == kind.name])]
     figure, grid = _panels(len(parts))
     lines = dict(zip(dict.fromkeys(table["experiment"]), LINE_STYLES * len(table), strict=False))
-    per = "" if unit in ("-", "") else f" per {unit}"
+    per = "" if unit in ("-", "") else f" per {no_formula(unit)}"
     for place, (axes, (part, title, kind)) in enumerate(zip(grid, parts, strict=False)):
         _paint_traces(axes, part, "y" if kind.velocity else "x", lines)
         axes.set_title(title, fontsize=8.5)
         if place % FINGERPRINT_COLUMNS == 0 or kind != parts[place - 1][2]:
-            axes.set_ylabel(f"change of {kind.column} [{unit_math(kind.unit)}{per}]")
+            formula_labels(axes, upward=f"change of {kind.column} [{unit_math(kind.unit)}{per}]")
         if kind.velocity:
             axes.set_ylim(*_range(table.loc[table["kind"] == kind.name, "change"]))
     handles = [

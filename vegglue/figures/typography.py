@@ -9,6 +9,8 @@ from dataclasses import dataclass
 NARROW = "\u202f"  # between a number and its unit, never broken
 FIRM = "\u00a0"  # a space where a line must not break
 MINUS = "\u2212"
+# Parts of a symbol that mathtext draws as they are.
+LETTER, LOWERED = re.compile(r"[^\W_]+"), re.compile(r"(?:[^\W_]|[\[\] .,:+-])*")
 POWER = re.compile(r"\^\(?(-?[\d/.]+)\)?|(?<=[a-z])(\d)")  # in a unit: ^(-1/3), ^2, or the 3 of m3/s
 
 
@@ -78,8 +80,10 @@ def symbol_html(symbol: str) -> str:
 
 
 def symbol_math(symbol: str) -> str:
-    """The same for matplotlib's mathtext."""
+    """The same for matplotlib's mathtext; a symbol with signs that mean something there is written as it is."""
     letter, _, lowered = symbol.partition("_")
+    if not (LETTER.fullmatch(letter) and LOWERED.fullmatch(lowered)):
+        return no_formula(symbol)
     return f"${letter}_{{{lowered}}}$" if lowered else f"${letter}$"
 
 
@@ -92,7 +96,12 @@ def unit_html(unit: str) -> str:
 
 def unit_math(unit: str) -> str:
     """The same for matplotlib's mathtext, with a dash for what has no unit."""
-    return POWER.sub(lambda power: f"$^{{{_digits(power)}}}$", unit) if unit != "-" else "–"
+    return POWER.sub(lambda power: f"$^{{{_digits(power)}}}$", no_formula(unit)) if unit != "-" else "–"
+
+
+def no_formula(text: str) -> str:
+    """Text as it is within mathtext."""
+    return text.replace("$", r"\$")
 
 
 def _digits(power: re.Match[str]) -> str:

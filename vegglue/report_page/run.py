@@ -82,8 +82,8 @@ def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Pict
 
 
 def file_name(words: str) -> str:
-    """Words as the name of a file: experiments and sections are named by their user."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", words)
+    """Words as the name of a file, of a length that every disk takes: a user names experiments and sections."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", words)[:120]
 
 
 def stamp(case: Case) -> str:
