@@ -1,35 +1,17 @@
 """A folder of a field team becomes a case, or is refused in a sentence."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from field_folders import field_folder
 from reach import said_to, vegglue
 
 from vegglue.case.config import load_case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
-
-SITE: dict[str, Any] = {
-    "channel": {"length_m": 40.0, "bottom_width_m": 3.0, "bank_slope_v_per_h": 0.6667, "bed_slope": 0.001},
-    "patches": [{"x": [16, 20], "y": [0, 1.5], "stems_per_m2": 20}, {"x": [26, 30], "y": [-1.5, 0]}],
-    "canopy_height_guess_m": 0.6,
-    "experiments": {"low": {"discharge_m3_s": 1.2, "downstream_level_m": 0.7}},
-    "holdout": {"high": {"discharge_m3_s": 2.0, "downstream_level_m": 0.9}},
-}
-
-
-def field_folder(folder: Path, **changes: Any) -> Path:
-    """What a field team would hand over."""
-    folder.mkdir()
-    (folder / "site.json").write_text(json.dumps(SITE | changes), encoding="utf-8")
-    (folder / "velocities.csv").write_text("experiment,section,x,y,u,u_se\nlow,A,12,0.5,0.45,0.01\n", encoding="utf-8")
-    (folder / "levels.csv").write_text("experiment,x,y,level,level_se\nlow,10,0,0.74,0.002\n", encoding="utf-8")
-    (folder / "holdout.csv").write_text("experiment,section,x,y,u\nhigh,A,12,0.5,0.6\n", encoding="utf-8")
-    return folder
 
 
 @pytest.mark.slow

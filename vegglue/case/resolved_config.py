@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
@@ -27,7 +26,7 @@ def resolved_yaml(case: Case) -> str:
 
 def as_yaml(tree: Tree) -> str:
     """Keys and values as the text of a config."""
-    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+    return yaml_of(tree)
 
 
 def case_hash(case: Case) -> str:

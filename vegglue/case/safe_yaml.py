@@ -20,6 +20,11 @@ BROKEN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\
 ANOTHER_WAY = ("int", "float", "timestamp", "value")
 
 
+def yaml_of(tree: Any) -> str:
+    """The YAML text of keys and values, which `safe_yaml` reads as the same; in quotes what looks like a number."""
+    return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+
+
 def safe_yaml(text: str) -> Any:
     """The keys and values of a YAML text. Errors: yaml.YAMLError, with the place and a sentence."""
     return yaml.load(text, Loader=_Loader)
@@ -114,3 +119,10 @@ for _kind, _pattern in (("int", WHOLE), ("float", BROKEN)):
     _Loader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_kind}", re.compile(rf"(?:{_pattern.pattern})$"), list("-+.0123456789")
     )
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes what either version of YAML would not read as text."""
+
+
+_Dumper.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(rf"(?:{BROKEN.pattern})$"), list("-+.0123456789"))

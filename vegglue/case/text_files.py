@@ -46,7 +46,10 @@ def unprintable(text: str) -> str | None:
 
 
 def write_text(path: Path, text: str, advice: str) -> None:
-    """Write a file, and the folders above it, whole or not at all. Errors: StorageError, which ends with the advice."""
+    """Write a file, and the folders above it, whole or not at all.
+
+    Errors: StorageError, which ends with the advice; InputError for a sign that no file in UTF-8 can hold.
+    """
     new = path.with_name(path.name + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -54,6 +57,9 @@ def write_text(path: Path, text: str, advice: str) -> None:
         os.replace(new, path)
     except OSError as error:
         raise StorageError(f"{path}: cannot be written ({error.strerror}); {advice}.") from None
+    except UnicodeEncodeError as error:  # of the name of a folder, which need not be text
+        sign = error.object[error.start]
+        raise InputError(f"{str(path)!a}: cannot hold the sign {sign!a} of a name; rename what has it.") from None
 
 
 def case_name(words: str, otherwise: str = "case") -> str:

@@ -5,12 +5,10 @@ the axis), patches (x, y, stems_per_m2), canopy_height_guess_m, eddy_viscosity_m
 downstream_level_m). What is not said there is left at the defaults below.
 """
 
-import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
@@ -25,11 +23,14 @@ from vegglue.importers.config_parts import (
     observed,
     validated,
 )
+from vegglue.importers.site_file import Channel, MeasuredFlow, PlantedPatch, read_site
 from vegglue.measurements.kinds import KINDS
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
 CELLS_ACROSS, LENGTHENED = 16, 8.0 / 3.0
+# A shorter channel than wide still has an even number of cells along it, as many as the schema wants.
+FEWEST_COLUMNS = 4
 # Dry bank kept above the highest water level [m].
 FREEBOARD = 0.35
 # Relative error of a canopy height estimated by eye.
@@ -41,14 +42,12 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
 
     Errors: InputError when site.json or every file of measurements is missing or says too little.
     """
-    site = _read_site(folder / "site.json")
-    channel, experiments = site["channel"], site["experiments"]
-    patches = site.get("patches", [])
+    site = read_site(folder / "site.json")
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
-        "grid": _grid(channel, experiments),
-        "bed": [{"trapezoid": _trapezoid(channel)}],
+        "grid": _grid(site.channel, site.experiments),
+        "bed": [{"trapezoid": _trapezoid(site.channel)}],
         "friction": {
             "classes": {"bed": MANNING_BED, "bank": {"law": "keulegan", "k_s": "k_s"}},
             "default": "bed",
@@ -56,19 +55,18 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         },
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
-        "eddy_viscosity": float(site.get("eddy_viscosity_m2_s", 0.01)),
-        "experiments": {name: _experiment(given) for name, given in experiments.items()},
+        "eddy_viscosity": site.eddy_viscosity_m2_s,
+        "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
         "parameters": dict(PARAMETERS),
         "observations": _observations(folder, target),
         **FIRST_LOOK,
     }
-    if site.get("holdout") and (folder / "holdout.csv").is_file():
-        held_out = {name: _experiment(given) for name, given in site["holdout"].items()}
+    if site.holdout and (folder / "holdout.csv").is_file():
+        held_out = {name: _experiment(given) for name, given in site.holdout.items()}
         tree |= validated(held_out, [observed("velocity", _named(folder / "holdout.csv", target))])
-    if patches:
-        tree["plants"] = _plants(patches)
-        guess = float(site.get("canopy_height_guess_m", 0.8))
-        tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(guess)}
+    if site.patches:
+        tree["plants"] = _plants(site.patches)
+        tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
     return tree
 
 
@@ -86,71 +84,44 @@ def _canopy(guess: float) -> Tree:
     )  # fmt: skip
 
 
-def _read_site(path: Path) -> Tree:
-    try:
-        site = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; a folder to import has one.") from None
-    except ValueError as error:
-        raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
-    _need(path, site, "", "channel", "experiments")
-    _need(path, site["channel"], "channel.", "length_m", "bottom_width_m", "bank_slope_v_per_h", "bed_slope")
-    if not site["experiments"]:
-        raise InputError(
-            f"{shown_path(path)}: `experiments` expected one or more, got none; add those that were measured."
-        )
-    for name, given in site["experiments"].items():
-        _need(path, given, f"experiments.{name}.", "discharge_m3_s", "downstream_level_m")
-    return dict(site)
-
-
-def _need(path: Path, tree: Any, within: str, *keys: str) -> None:
-    for key in keys:
-        if not isinstance(tree, Mapping) or key not in tree:
-            raise InputError(f"{shown_path(path)}: `{within}{key}` is missing; add it.")
-        value = tree[key]
-        if within and not (isinstance(value, int | float) and math.isfinite(value)):
-            raise InputError(f"{shown_path(path)}: `{within}{key}` expected a number, got {value!r}; correct it.")
-
-
-def _trapezoid(channel: Mapping[str, Any]) -> Tree:
+def _trapezoid(channel: Channel) -> Tree:
     return {
         "axis": 0.0,
-        "bottom_width": float(channel["bottom_width_m"]),
-        "bank_slope": round(float(channel["bank_slope_v_per_h"]), 6),
-        "bed_slope": float(channel["bed_slope"]),
+        "bottom_width": channel.bottom_width_m,
+        "bank_slope": round(channel.bank_slope_v_per_h, 6),
+        "bed_slope": channel.bed_slope,
         "level": 0.0,
     }
 
 
-def _grid(channel: Mapping[str, Any], experiments: Mapping[str, Any]) -> Tree:
+def _grid(channel: Channel, experiments: Mapping[str, MeasuredFlow]) -> Tree:
     """Cells that fit the floor, as wide as the water can get."""
-    length, width = float(channel["length_m"]), float(channel["bottom_width_m"])
-    fall = float(channel["bed_slope"]) * length
-    highest = max(float(given["downstream_level_m"]) for given in experiments.values())
+    length, width = channel.length_m, channel.bottom_width_m
+    fall = channel.bed_slope * length
+    highest = max(given.downstream_level_m for given in experiments.values())
     # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
-    beside = math.ceil(depth / float(channel["bank_slope_v_per_h"]) / dy / 2) * 2
-    columns = even(length / (dy * LENGTHENED))
+    beside = math.ceil(depth / channel.bank_slope_v_per_h / dy / 2) * 2
+    columns = max(even(length / (dy * LENGTHENED)), FEWEST_COLUMNS)
     half = round(0.5 * width + beside * dy, 6)
     return {"x": [0.0, length], "y": [-half, half], "cell": [length / columns, dy]}
 
 
-def _experiment(given: Mapping[str, Any]) -> Tree:
-    return {"discharge": float(given["discharge_m3_s"]), "level": float(given["downstream_level_m"])}
+def _experiment(given: MeasuredFlow) -> Tree:
+    return {"discharge": given.discharge_m3_s, "level": given.downstream_level_m}
 
 
-def _plants(patches: list[Mapping[str, Any]]) -> Tree:
-    densest = max(float(patch.get("stems_per_m2", 1.0)) for patch in patches)
+def _plants(patches: Sequence[PlantedPatch]) -> Tree:
+    densest = max(patch.stems_per_m2 for patch in patches)
     stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
     rows = [
         {
             "name": f"p{number}",
             "stand": "plants",
-            "x": [float(x) for x in patch["x"]],
-            "y": [float(y) for y in patch["y"]],
-            "stems": float(patch.get("stems_per_m2", 1.0)),
+            "x": list(patch.x),
+            "y": list(patch.y),
+            "stems": patch.stems_per_m2,
         }
         for number, patch in enumerate(patches, 1)
     ]

@@ -1,0 +1,98 @@
+"""site.json by anybody: read, or refused in one sentence, whatever stands in it."""
+
+import copy
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from field_folders import SITE, field_folder
+
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import as_yaml
+from vegglue.case.safe_yaml import safe_yaml
+from vegglue.errors import InputError
+from vegglue.importers.site_file import read_site
+from vegglue.workflow.import_folder import import_folder
+
+ODD = (
+    None, True, "", "3", "much", [], {}, [[]], 0, -1, 1e-300, 1e300, 10**400, float("nan"), float("inf"), "\ud800",
+    "a\0b", [1, 2, 3], [2, 1], {"x": 1},
+)  # fmt: skip
+
+
+def places(tree: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    yield above
+    for key in tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ():
+        yield from places(tree[key], (*above, key))
+
+
+def put(tree: Any, place: tuple[Any, ...], value: Any) -> Any:
+    if not place:
+        return value
+    tree = copy.deepcopy(tree)
+    inner = tree
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    return tree
+
+
+def refusal(folder: Path, target: Path) -> str:
+    """Why a folder is refused; nothing when it is read."""
+    try:
+        import_folder(folder, target)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("place", list(places(SITE)), ids=str)
+def test_whatever_stands_in_it_is_read_or_refused(tmp_path: Path, place: tuple[Any, ...]) -> None:
+    folder = field_folder(tmp_path / "site")
+    for value in ODD:
+        (folder / "site.json").write_text(json.dumps(put(SITE, place, value)), encoding="utf-8")
+        said = refusal(folder, tmp_path / "site.yaml")
+        assert len(said.splitlines()) <= 1
+        assert len(said) < 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[" * 100_000, "site.json: keys stand within keys too often"),
+        ("[1, 2", "is not valid JSON"),
+        ("[]", "`site.json` expected"),
+        ("9" * 5000, "is not valid JSON"),
+        (json.dumps(put(SITE, ("channel", "bed_slope"), 3)), "`channel.bed_slope` expected less than 1, got 3"),
+        (
+            json.dumps(put(SITE, ("patches", 0, "x"), [4, 2])),
+            "`patches[0].x` expected two numbers, the lower one first",
+        ),
+        (json.dumps(put(SITE, ("patches", 1), {"x": [1, 2]})), "`patches[1].y` is missing; add it."),
+        (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "a name without the sign '\\x00'"),
+    ],
+    ids=lambda text: text[:20],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "site.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_site(path)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["1e5", "010", "1:30", "yes", "null", "2024-05-01", "1.", ".5", "~", "a: b", "#", "- x"]
+)
+def test_an_experiment_keeps_its_name(tmp_path: Path, name: str) -> None:
+    assert safe_yaml(as_yaml({name: {"a": name}})) == {name: {"a": name}}
+    folder = field_folder(tmp_path / "site", experiments={name: SITE["experiments"]["low"]})
+    assert list(import_folder(folder, tmp_path / "site.yaml").experiments) == [name]
+    assert list(load_case(tmp_path / "site.yaml").experiments) == [name]
+
+
+def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
+    folder = field_folder(tmp_path / "site", channel=SITE["channel"] | {"length_m": 0.5}, patches=[])
+    assert import_folder(folder, tmp_path / "site.yaml").grid.cell[0] == 0.125
