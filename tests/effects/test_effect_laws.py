@@ -21,7 +21,7 @@ def filled(kind, given, shape):
 
 
 def geometry(**given):
-    return ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25} | given, (5, 5, 1)))
+    return ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25, "stretch": 1.0} | given, (5, 5, 1)))
 
 
 def cells(u=0.0, v=0.0, on=None, **given):
@@ -234,7 +234,7 @@ def test_less_than_nothing_is_nothing_at_a_place():
 def test_water_that_enters_at_a_place_is_all_the_water():
     """Over a grid that holds the spot, q dx dy sums up to Q."""
     line = 0.05 * np.arange(-100, 101)
-    wide = ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05}, (201, 201, 1)))
+    wide = ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05, "stretch": 1.0}, (201, 201, 1)))
     wide = replace(wide, x=line[:, None, None], y=line[None, :, None])
     spot = {"x": np.array([0.3]), "y": np.array([-0.2]), "length": np.array([1.1]), "width": np.array([0.4])}
     entering = library()["unlisted_inflow"].act(wide, discharge=np.array([0.7]), **spot)["inflow"]

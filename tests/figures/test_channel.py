@@ -21,7 +21,7 @@ def test_the_channel_shows_patches_stations_and_boundaries_where_they_are(name: 
     site, observations = build_site(case), read_observations(case)
     figure = draw_channel(case, site, observations)
     whole, reach, across = figure.axes
-    table, corners = observations.table, [corners_of(patch) for patch in case.plants.patches]
+    table, corners = observations.table, [corners_of(case, patch) for patch in case.plants.patches]
     for marker, rows in (("o", table[table["used"]]), ("x", table[~table["used"]])):
         assert sorted(points(reach, marker)) == sorted(zip(rows["x"], rows["y"], strict=True))
     assert np.array_equal(whole.images[0].get_array(), site.friction_class.T)

@@ -221,7 +221,7 @@ def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
     save_diagnosis_figure(a_diagnosis(), case, tmp_path / "diagnosis.png")
     height, width, _ = imread(tmp_path / "diagnosis.png").shape
     assert (width, height) == (14 * 130, round(8.6 * 130))
-    outlines = [corners_of(patch) for patch in case.plants.patches]
+    outlines = [corners_of(case, patch) for patch in case.plants.patches]
     drawn = draw_diagnosis(a_diagnosis(), [Outline("", corners) for corners in outlines]).axes[-1].patches
     patches = [patch for patch in drawn if isinstance(patch, Polygon)]
     assert [patch.get_xy()[:4].tolist() for patch in patches] == [corners.tolist() for corners in outlines]

@@ -1,4 +1,4 @@
-"""Tangents against differences of solved states, adjoints against tangents."""
+"""Tangents against differences of solved states, adjoints against tangents; on a straight grid and in a bend."""
 
 from dataclasses import replace
 
@@ -11,57 +11,55 @@ from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
 from vegglue.flow.problem import ALONG
 from vegglue.flow.sensor import read_sensors, reading_weights
+from vegglue.flow.stretch import Bend
 from vegglue.site.grid import Grid
 from vegglue.solver.jacobian import factors
 from vegglue.solver.newton import newton
 from vegglue.solver.tangent import adjoints, jacobian_times, tangents
 
 STEP = 1e-5
+STRAIGHT, LEFT = river(), river(bend=Bend(np.full(60, 0.06), np.full(61, 0.06), -4.5, 0.375))
 
 
-def with_manning(factor):
-    problem = river()
+def with_manning(problem, factor):
     coefficient = problem.friction.coefficient.copy()
     coefficient[0] *= factor
     return changed(problem, coefficient=coefficient)
 
 
-def with_phi(factor):
-    problem = river()
+def with_phi(problem, factor):
     return replace(problem, plants=replace(problem.plants, phi=problem.plants.phi * factor))
 
 
-def with_discharge(factor):
-    problem = river()
+def with_discharge(problem, factor):
     inflows = tuple(replace(one, discharge=one.discharge * factor) for one in problem.boundaries.inflows)
     return changed(problem, inflows=inflows)
 
 
-def with_level(factor):
-    problem = river()
+def with_level(problem, factor):
     return changed(problem, outlet_level=problem.boundaries.outlet_level * factor)
 
 
 CAUSES = (with_manning, with_phi, with_discharge, with_level)
 
 
-@pytest.fixture(scope="module")
-def solved():
-    problem = river()
+@pytest.fixture(scope="module", params=[STRAIGHT, LEFT], ids=["straight", "bend"])
+def solved(request):
+    problem = request.param
     state = newton(problem, backwater(problem), 1e-10).state
     return problem, state, factors(problem, state)
 
 
-def difference(cause, of):
-    return (of(cause(1.0 + STEP)) - of(cause(1.0 - STEP))) / (2.0 * STEP)
+def difference(problem, cause, of):
+    return (of(cause(problem, 1.0 + STEP)) - of(cause(problem, 1.0 - STEP))) / (2.0 * STEP)
 
 
 @pytest.mark.parametrize("cause", CAUSES)
 def test_tangent_equals_difference_of_solved_states(solved, cause):
     """Relative to the largest answer in the water: 1e-4 asked for."""
     problem, state, shared = solved
-    tangent = tangents(problem, state, shared, difference(cause, lambda changed: residual(changed, state)))
-    solved_again = difference(cause, lambda changed: newton(changed, state, 1e-11, time_step=1e4).state)
+    tangent = tangents(problem, state, shared, difference(problem, cause, lambda changed: residual(changed, state)))
+    solved_again = difference(problem, cause, lambda changed: newton(changed, state, 1e-11, time_step=1e4).state)
     deep = (state[:, 0, :, 0] - problem.bed) > 0.3
     told, found = tangent[:, ALONG, :, 0][deep], solved_again[:, ALONG, :, 0][deep]
     error = np.abs(told - found).max() / np.abs(found).max()
@@ -70,7 +68,9 @@ def test_tangent_equals_difference_of_solved_states(solved, cause):
 
 def test_refinement_meets_the_equation(solved):
     problem, state, shared = solved
-    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    causes = np.concatenate(
+        [difference(problem, cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3
+    )
     left = causes + jacobian_times(problem, state, tangents(problem, state, shared, causes))
     assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-5 * np.abs(causes).max(axis=(0, 1, 2))).all()
 
@@ -78,8 +78,10 @@ def test_refinement_meets_the_equation(solved):
 def test_refinement_meets_the_equation_with_factors_of_a_state_nearby(solved):
     """Cells at the waterline are wet in one state and dry in the other: repetition alone runs away there."""
     problem, state, _ = solved
-    shared = factors(problem, newton(with_level(0.95), state, 1e-8).state)
-    causes = np.concatenate([difference(cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3)
+    shared = factors(problem, newton(with_level(problem, 0.95), state, 1e-8).state)
+    causes = np.concatenate(
+        [difference(problem, cause, lambda changed: residual(changed, state)) for cause in CAUSES], axis=3
+    )
     left = causes + jacobian_times(problem, state, tangents(problem, state, shared, causes))
     assert (np.abs(left).max(axis=(0, 1, 2)) < 1e-4 * np.abs(causes).max(axis=(0, 1, 2))).all()
 
@@ -104,6 +106,6 @@ def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):
     weights[40, ALONG, 8:16] = 0.125
     adjoint = adjoints(shared, weights)
     for cause in CAUSES:
-        rates = difference(cause, lambda changed: residual(changed, state))
+        rates = difference(problem, cause, lambda changed: residual(changed, state))
         told = float((weights * tangents(problem, state, shared, rates)).sum())
         assert -float((adjoint * rates).sum()) == pytest.approx(told, rel=5e-3)

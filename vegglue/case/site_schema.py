@@ -1,5 +1,7 @@
 """The part of the schema that describes a site: grid, bed, friction, plants, inflows and outlet."""
 
+import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -9,10 +11,51 @@ from vegglue.case.parts import Interval, Number, Part, Polygon, Positive, Value,
 from vegglue.case.size_limits import LARGEST_FACTORS, MOST_CELLS, factor_bytes
 
 
+class Stretch(Part):
+    length: Positive | None = Field(default=None, description="length of a straight part [m]")
+    radius: Positive | None = Field(default=None, description="radius of an arc [m]")
+    angle: Number | None = Field(default=None, description="turn of an arc, positive to the left [degrees]")
+
+    @model_validator(mode="after")
+    def _straight_or_arc(self) -> Self:
+        exactly(self, "an arc" if self.length is None else "a straight part", STRETCHES)
+        if self.angle == 0.0:
+            raise ValueError("an `angle` that is not 0; a straight part has a `length`")
+        return self
+
+    @property
+    def run(self) -> float:
+        """Length along it [m]: given, or radius times angle."""
+        return (self.radius or 0.0) * math.radians(abs(self.angle or 0.0)) if self.length is None else self.length
+
+
+STRETCHES = {"a straight part": ("length",), "an arc": ("radius", "angle")}
+
+
+class CentrelineShape(Part):
+    points: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=2)] | None = Field(
+        default=None, description="x, y on the map, upstream first, a smooth curve passes through them [m]"
+    )
+    parts: Annotated[tuple[Stretch, ...], Field(min_length=1)] | None = Field(
+        default=None, description="straight parts and arcs, upstream first"
+    )
+    start: tuple[Number, Number] = Field(default=(0.0, 0.0), description="x, y where `parts` begin [m]")
+    heading: Number = Field(default=0.0, description="where `parts` head first, from x towards y [degrees]")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.points is None) == (self.parts is None):
+            raise ValueError("either `points` or `parts`")
+        if self.points is not None and any(one == other for one, other in pairwise(self.points)):
+            raise ValueError("`points` that differ from the one before")
+        return self
+
+
 class GridExtent(Part):
     x: Interval = Field(description="from upstream to downstream [m]")
     y: Interval = Field(description="across [m]")
     cell: tuple[Positive, Positive] = Field(description="size of a cell along x and y [m]")
+    centreline: CentrelineShape | None = Field(default=None, description="line that x runs along and y across")
 
     @model_validator(mode="after")
     def _whole_cells(self) -> Self:

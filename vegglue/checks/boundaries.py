@@ -11,12 +11,17 @@ from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
 from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.grid import curvature_of
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells
 
+# Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
+LEAST_TURN = 0.02
+
 
 def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
-    """Inflows and outlets without cells or without water, and water on edges that act as walls."""
+    """Inflows and outlets without cells or without water, water on edges that act as walls, ends in a bend."""
+    yield from _ends_in_a_bend(site)
     for name, experiment in case.experiments.items():
         depth = expected_depth(case, site, experiment)
         open_ = centres_within(case.outlet.range, site.grid.y)
@@ -41,6 +46,17 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
                 yield f"Inflow {inflow} holds no cell centre: no water can enter."
             elif side.side == "west" and not (edge[cells] > 0).any():
                 yield f"Inflow {inflow} lies above the water of experiment {name}."
+
+
+def _ends_in_a_bend(site: Site) -> Iterator[str]:
+    """A grid that begins or ends where its centreline turns: u is even there, and the level at the outlet too."""
+    curvature = curvature_of(site.grid)
+    for end, turning in (("begins", curvature[0]), ("ends", curvature[-1])):
+        if abs(turning) * site.grid.y.size * site.grid.dy > LEAST_TURN:
+            yield (
+                f"The grid {end} in a bend with a radius of {1.0 / abs(turning):.3g} m, where water that enters evenly "
+                f"or leaves at one level has to find its shape first: let the grid run on straight for about its width."
+            )
 
 
 def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> float:

@@ -20,7 +20,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
     """Patches that the grid holds poorly: area of their cells against their own [m2], overlaps, unused stands."""
     cell = site.grid.dx * site.grid.dy
     for index, patch in enumerate(case.plants.patches):
-        meant = area_of(corners_of(patch))
+        meant = area_of(corners_of(case, patch))
         alone = cells_of_patch(patch, site.grid)
         covered, hidden = alone.sum() * cell, int((alone & (site.patch != index)).sum())
         if not alone.any():

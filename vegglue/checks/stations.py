@@ -37,9 +37,8 @@ def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[s
     table = observations.table[velocity_rows(observations.table)]
     limit = ON_THE_EDGE * min(case.grid.cell)
     for patch in case.plants.patches:
-        near = [
-            distance_to_outline(corners_of(patch), x, y) < limit for x, y in zip(table["x"], table["y"], strict=True)
-        ]
+        outline = corners_of(case, patch)
+        near = [distance_to_outline(outline, x, y) < limit for x, y in zip(table["x"], table["y"], strict=True)]
         for section, rows in table[np.array(near, dtype=bool)].groupby("section"):
             at = _listed([f"{y:g}" for y in sorted(set(rows["y"]))])
             yield (

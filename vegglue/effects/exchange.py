@@ -33,7 +33,8 @@ def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
 def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
     """nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)."""
     strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
-    return {"viscosity": coefficient**2 * cells.geometry.dx * cells.geometry.dy * np.sqrt(strain)}
+    seen = cells.geometry
+    return {"viscosity": coefficient**2 * seen.dx * seen.dy * seen.stretch * np.sqrt(strain)}
 
 
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:

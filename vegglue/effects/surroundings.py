@@ -1,6 +1,6 @@
 """What an effect gets to see at its stage: the channel, the flow at cell centres, plants, boundaries, readings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,8 @@ class ChannelGeometry:
     that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: 1 where plants stand
     in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite; edge: distance
     across from the nearest side of a patch, positive outside it and negative inside, infinite in columns without one;
-    wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite.
+    wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite; on a grid
+    along a centreline, stretch: length of a cell over dx [-], and turning: curvature of the line along its row [1/m].
     """
 
     x: Array
@@ -34,6 +35,8 @@ class ChannelGeometry:
     edge: Array
     wake: Array
     patch: Array  # index of the patch, -1 without
+    stretch: Array = field(default_factory=lambda: np.ones((1, 1, 1)))  # of a straight grid
+    turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))  # empty on a straight grid
 
 
 @dataclass(frozen=True)
@@ -65,8 +68,8 @@ class Cells:
 
     @property
     def u_x(self) -> Array:
-        """du/dx (nx, ny, m) [1/s]."""
-        return along(self.u, self.geometry.dx)
+        """du/dx (nx, ny, m) [1/s]; (du/dx - kappa v) / J where x follows a centreline of curvature kappa."""
+        return self._along(self.u, -self.v)
 
     @property
     def u_y(self) -> Array:
@@ -77,13 +80,20 @@ class Cells:
 
     @property
     def v_x(self) -> Array:
-        """dv/dx (nx, ny, m) [1/s]."""
-        return along(self.v, self.geometry.dx)
+        """dv/dx (nx, ny, m) [1/s]; (dv/dx + kappa u) / J where x follows a centreline of curvature kappa."""
+        return self._along(self.v, self.u)
 
     @property
     def v_y(self) -> Array:
         """dv/dy (nx, ny, m) [1/s]."""
         return across(self.v, self.geometry.dy)
+
+    def _along(self, values: Array, turned: Array) -> Array:
+        """Slope along x of a component of the velocity, and what the turn of x itself makes of the other."""
+        slope = along(values, self.geometry.dx)
+        if not self.geometry.turning.size:
+            return slope
+        return slope / self.geometry.stretch + self.geometry.turning * turned
 
 
 @dataclass(frozen=True)

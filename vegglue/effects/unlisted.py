@@ -29,7 +29,7 @@ def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict
 def unlisted_inflow(geometry: ChannelGeometry, discharge: Array, **place: Array) -> dict[str, Array]:
     """q -> q + Q spot / (pi l w) [m/s], without momentum."""
     area = np.pi * place["length"] * place["width"]
-    return {"inflow": discharge * spot(geometry, **place) / area}
+    return {"inflow": discharge * spot(geometry, **place) / (area * geometry.stretch)}
 
 
 def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[str, Array]:

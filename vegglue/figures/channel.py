@@ -44,7 +44,7 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: classes, boundaries and stations (not to scale)")
     reach.set(xlim=(low, high), xlabel="x [m], flow to the right", title="The reach between the dotted lines")
     for patch in case.plants.patches:
-        x, y = corners_of(patch).mean(axis=0)
+        x, y = corners_of(case, patch).mean(axis=0)
         label(reach, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
     reach.legend(
         handles=_legend(case, site, observations),
@@ -59,7 +59,8 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
 
 
 def _reach_of_interest(case: Case, observations: Observations) -> tuple[float, float]:
-    x = [corner for patch in case.plants.patches for corner in corners_of(patch)[:, 0]] + list(observations.table["x"])
+    corners = [corner for patch in case.plants.patches for corner in corners_of(case, patch)[:, 0]]
+    x = corners + list(observations.table["x"])
     if not x:
         return case.grid.x
     return max(case.grid.x[0], min(x) - REACH_OF_INTEREST_MARGIN), min(
@@ -105,8 +106,9 @@ def _draw_patches(axes: Axes, case: Case, site: Site) -> None:
     axes.plot(site.grid.x[i], site.grid.y[j], ",", color=COLOUR["stems"])
     for patch in case.plants.patches:
         strength = 0.3 + 0.6 * patch.stems / densest
-        axes.add_patch(Polygon(corners_of(patch), facecolor=COLOUR["plants"], alpha=strength, edgecolor="none"))
-        axes.add_patch(Polygon(corners_of(patch), fill=False, edgecolor=COLOUR["stems"], linewidth=0.8))
+        corners = corners_of(case, patch)
+        axes.add_patch(Polygon(corners, facecolor=COLOUR["plants"], alpha=strength, edgecolor="none"))
+        axes.add_patch(Polygon(corners, fill=False, edgecolor=COLOUR["stems"], linewidth=0.8))
 
 
 def _draw_stations(axes: Axes, observations: Observations) -> None:

@@ -50,6 +50,7 @@ def residual_of(
         boundaries.outlet_level,
         problem.dx,
         problem.dy,
+        problem.bend,
     )
     _join(problem, out, state[:, ALONG], depth)
     for row, rate in wall_rates(problem, depth):
@@ -60,14 +61,14 @@ def residual_of(
         out[:, LEVEL] -= boundaries.lateral_inflow
         out[:, ALONG] += np.maximum(boundaries.lateral_inflow, 0.0) / depth * state[:, ALONG]
     if closed.momentum:
-        push_momentum(out, closed.momentum, depth, problem.film, problem.dx, problem.dy)
+        push_momentum(out, closed.momentum, depth, problem)
     return out
 
 
-def push_momentum(out: Array, momentum: dict[str, Array], depth: Array, film: float, dx: float, dy: float) -> None:
+def push_momentum(out: Array, momentum: dict[str, Array], depth: Array, problem: Problem) -> None:
     """Take forces and the divergence of momentum fluxes from a residual (nx, 3, ny, m), see kernels.push."""
     x, y, xx, xy, yy = (momentum.get(name, EMPTY) for name in ("x", "y", "xx", "xy", "yy"))
-    kernels.push(out, depth, x, y, xx, xy, yy, film, dx, dy)
+    kernels.push(out, depth, x, y, xx, xy, yy, problem.film, problem.dx, problem.dy, problem.bend)
 
 
 def faces(problem: Problem, state: Array) -> Faces:
@@ -112,9 +113,20 @@ def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
 
 def _inflow_flux(problem: Problem, inflow: InflowSegment, depth: Array) -> Array:
     """q [m2/s] in each cell of an inflow, of their depths (cell, m)."""
-    width = problem.dy if inflow.side == "west" else problem.dx
     weight = (depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread
-    return np.asarray(inflow.discharge * weight / (weight.sum(axis=0) * width))
+    if inflow.side == "west":
+        return np.asarray(inflow.discharge * weight / (weight.sum(axis=0) * problem.dy))
+    weighted = weight * _stretch_of(problem, inflow, 0.0)
+    return np.asarray(inflow.discharge * weight / (weighted.sum(axis=0) * problem.dx))
+
+
+def _stretch_of(problem: Problem, inflow: InflowSegment, rows: float) -> Array:
+    """J (cell, 1) [-] of the cells a side inflow enters by, so many rows off that side."""
+    if problem.bend is None:
+        return np.ones((1, 1))
+    from_south = rows if inflow.side == "south" else problem.shape[1] - rows
+    y = problem.bend.south + from_south * problem.dy
+    return np.asarray(1.0 - y * problem.bend.at_cells[inflow.start : inflow.stop, None])
 
 
 def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
@@ -126,8 +138,10 @@ def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
             continue
         row, part = 0 if inflow.side == "south" else -1, slice(inflow.start, inflow.stop)
         entering, brought = np.zeros((2, problem.shape[0] + 1, problem.members))
-        entering[:-1][part] = _inflow_flux(problem, inflow, depth[part, row])
-        brought[:-1][part] = entering[:-1][part] ** 2 / depth[part, row] * inflow.along
+        flux = _inflow_flux(problem, inflow, depth[part, row])
+        lift = _stretch_of(problem, inflow, 0.0) / _stretch_of(problem, inflow, 0.5)
+        entering[:-1][part] = flux * lift
+        brought[:-1][part] = flux**2 / depth[part, row] * inflow.along * lift
         h = np.concatenate([depth[:, row], depth[-1:, row]])
         both = problem.dy * (h[:-1] + h[1:])
         missing = (entering[:-1] + entering[1:]) * u[:, row] - (brought[:-1] + brought[1:])

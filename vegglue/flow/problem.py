@@ -3,9 +3,17 @@
     dh/dt + d(hu)/dx + d(hv)/dy = 0
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
 
-with k = g / (C^2 h) [1/m] from the friction laws where all of a cell is wet. A state of m members is one array (nx, 3,
-ny, m): level at cell centres, v on the south face of each cell (row 0 unused: walls and side inflows set it), u on the
-east face of each cell.
+with k = g / (C^2 h) [1/m] from the friction laws where all of a cell is wet. On a grid along a centreline of curvature
+kappa, x along it and y across, J = 1 - y kappa (Smith and McLean 1984, doi:10.1029/WR020i009p01301), they are
+
+    dh/dt + [d(hu)/dx + d(J hv)/dy] / J = 0
+    du/dt + (u/J) du/dx + v du/dy - (kappa/J) u v + (g/J) dz_s/dx + k |U| u = [dT_xx/dx / J + d(J^2 T_xy)/dy / J^2] / h
+    dv/dt + (u/J) dv/dx + v dv/dy + (kappa/J) u^2 + g dz_s/dy + k |U| v
+                                            = [dT_xy/dx / J + d(J T_yy)/dy / J + (kappa/J) T_xx] / h
+    T_xx = 2 h nu (du/dx - kappa v) / J,  T_xy = h nu [du/dy + (dv/dx + kappa u) / J],  T_yy = 2 h nu dv/dy
+
+A state of m members is one array (nx, 3, ny, m): level at cell centres, v on the south face of each cell (row 0 unused:
+walls and side inflows set it), u on the east face of each cell.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,6 +26,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.surroundings import ChannelGeometry
+from vegglue.flow.stretch import Bend
 from vegglue.site.channel_geometry import rows_of
 
 LEVEL, ACROSS, ALONG = 0, 1, 2
@@ -108,7 +117,8 @@ class Problem:
 
     film: a tenth of it stays on dry land [m]; smallest_shear_depth: whether shear acts over the smallest depth of the
     cells around a point, not the mean; bed_rise (nx, ny, m) or empty: by how much members' beds lie higher [m];
-    geometry: what effects see of the channel, none without effects; walls: friction of the sides of the grid.
+    geometry: what effects see of the channel, none without effects; walls: friction of the sides of the grid; bend: the
+    curvature of a grid along a centreline, none of a straight one.
     """
 
     dx: float
@@ -124,6 +134,7 @@ class Problem:
     effects: tuple[ActiveEffect, ...] = ()
     geometry: ChannelGeometry | None = None
     walls: SideWalls = SMOOTH_WALLS
+    bend: Bend | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -147,6 +158,14 @@ class Problem:
     def wetting(self) -> tuple[Array, Array, Array, float]:
         """What depths are made of, in the order in which the compiled loops take it."""
         return self.bed, self.bed_rise, self.bed_half_range, self.film
+
+
+def stretch_of_cells(problem: Problem) -> Array:
+    """J (nx, ny, 1) [-], the length of each cell over dx; (1, 1, 1) on a straight grid."""
+    if problem.bend is None:
+        return np.ones((1, 1, 1))
+    y = problem.bend.south + (np.arange(problem.shape[1]) + 0.5) * problem.dy
+    return np.asarray((1.0 - problem.bend.at_cells[:, None] * y)[..., None])
 
 
 def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
@@ -187,6 +206,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         bed_rise=cut(problem.bed_rise),
         walls=_walls_between(problem.walls, south == 0, north == problem.shape[1]),
         geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
+        bend=None if problem.bend is None else problem.bend._replace(south=problem.bend.south + south * problem.dy),
     )
 
 

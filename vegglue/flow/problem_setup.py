@@ -21,9 +21,11 @@ from vegglue.flow.problem import (
     SideWalls,
     VegetatedCells,
 )
+from vegglue.flow.stretch import Bend
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.resistance.wall_laws import wall_coefficient
 from vegglue.site.channel_geometry import channel_geometry, expected_depth, patches_present
+from vegglue.site.grid import Grid, curvature_of
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
@@ -42,8 +44,8 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
     added = _added_to_site(effects, geometry) if geometry else {}
-    if "inflow" in added:
-        added["inflow"] = _into_water(added["inflow"], share_under_water(case, site, setting))
+    if geometry and "inflow" in added:
+        added["inflow"] = _into_water(added["inflow"], share_under_water(case, site, setting), geometry.stretch)
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     return Problem(
         dx=site.grid.dx,
@@ -59,7 +61,17 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         effects=effects,
         geometry=geometry,
         walls=_walls(case, site, theta, members),
+        bend=bend_of(site.grid),
     )
+
+
+def bend_of(grid: Grid) -> Bend | None:
+    """The curvature of a grid along a centreline, of its west-east faces the mean of both columns; None if straight."""
+    at_cells = curvature_of(grid)
+    if not at_cells.any():
+        return None
+    beside = np.concatenate([at_cells[:1], at_cells, at_cells[-1:]])
+    return Bend(at_cells, 0.5 * (beside[1:] + beside[:-1]), float(grid.y[0] - 0.5 * grid.dy), grid.dy)
 
 
 def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFriction:
@@ -117,7 +129,7 @@ def _entering(lateral: Array, added: Mapping[str, Array], geometry: ChannelGeome
     if not lateral.any():
         return entering
     floor = 1.0 - geometry.bank
-    spread = floor * lateral / (floor.sum() * geometry.dx * geometry.dy)
+    spread = floor * lateral / ((floor * geometry.stretch).sum() * geometry.dx * geometry.dy)
     return np.ascontiguousarray(spread + entering if entering.size else spread)
 
 
@@ -162,11 +174,11 @@ def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
     return np.clip(expected_depth(case, site, setting) / WHERE_WATER_ENTERS, 0.0, 1.0)
 
 
-def _into_water(entering: Array, under_water: Array) -> Array:
+def _into_water(entering: Array, under_water: Array, stretch: Array) -> Array:
     """What would enter over land enters in the water beside it, (nx, ny, m) [m/s]: each member's sum stays."""
     wet = entering * under_water[..., None]
-    left = wet.sum(axis=(0, 1))
-    return np.asarray(wet * (entering.sum(axis=(0, 1)) / np.where(left == 0.0, 1.0, left)))
+    left = (wet * stretch).sum(axis=(0, 1))
+    return np.asarray(wet * ((entering * stretch).sum(axis=(0, 1)) / np.where(left == 0.0, 1.0, left)))
 
 
 def _added_to_site(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry) -> dict[str, Array]:

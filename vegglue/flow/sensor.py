@@ -12,7 +12,7 @@ from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import Faces, faces
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import Problem, stretch_of_cells
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
 from vegglue.measurements.kinds import Kind, kind_of
 from vegglue.resistance.physical_constants import FILM_ON_LAND
@@ -145,7 +145,8 @@ def _entered(problem: Problem) -> Array:
     nx = problem.shape[0]
     entered = np.zeros((nx + 1, problem.members))
     if problem.boundaries.lateral_inflow.size:
-        entered[1:] += problem.boundaries.lateral_inflow.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
+        entering = problem.boundaries.lateral_inflow * stretch_of_cells(problem)
+        entered[1:] += entering.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
     for inflow in problem.boundaries.inflows:
         if inflow.side == "west":
             entered += inflow.discharge

@@ -28,7 +28,7 @@ from vegglue.measurements.vertical_profile import (
     sampling_error,
 )
 from vegglue.site.bed import bed_levels
-from vegglue.site.grid import Grid
+from vegglue.site.grid import Grid, centreline_in
 from vegglue.site.zones import cells_of_patch
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
@@ -111,7 +111,7 @@ def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
 
 
 def _local_bed(case: Case, x: float, y: Array) -> Array:
-    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP))[0]
+    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP, centreline_in(case)))[0]
 
 
 def _cross_section(case: Case, observation: Observation, x: float) -> CrossSection:
@@ -123,9 +123,11 @@ def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> N
     """Whether the verticals at y stand in plants of the experiment, at least EDGE inside their patch."""
     present = case.experiments[str(observation.experiment)].plants
     patches = [patch for patch in case.plants.patches if present is True or (present and patch.name in present)]
-    result = np.zeros(len(y), dtype=bool)
+    result, line = np.zeros(len(y), dtype=bool), centreline_in(case)
     for patch in patches:
-        left, right = (cells_of_patch(patch, Grid(np.array([x]), y + side, 1.0, 1.0))[0] for side in (-EDGE, EDGE))
+        left, right = (
+            cells_of_patch(patch, Grid(np.array([x]), y + side, 1.0, 1.0, line))[0] for side in (-EDGE, EDGE)
+        )
         result |= left & right
     return result
 

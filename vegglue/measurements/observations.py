@@ -15,6 +15,8 @@ from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_r
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
+from vegglue.site.centreline import along_and_across
+from vegglue.site.grid import centreline_in
 
 STATION_COLUMNS = (
     "experiment",
@@ -178,7 +180,16 @@ def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataF
         depth=np.nan,
         device="",
     )
-    return stations[list(STATION_COLUMNS)]
+    return _onto_the_grid(case, stations[list(STATION_COLUMNS)]) if kind.at_point else stations[list(STATION_COLUMNS)]
+
+
+def _onto_the_grid(case: Case, stations: pd.DataFrame) -> pd.DataFrame:
+    """Stations of the map in the coordinates of the grid; as they are where the grid follows no centreline."""
+    line = centreline_in(case)
+    if line is None:
+        return stations
+    x, y = along_and_across(line, stations["x"].to_numpy(float), stations["y"].to_numpy(float))
+    return stations.assign(x=x, y=y)
 
 
 def _chosen(path: Path, rows: pd.DataFrame, name: str, text: str | None) -> pd.DataFrame:

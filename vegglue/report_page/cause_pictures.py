@@ -28,7 +28,7 @@ from vegglue.site.polygons import corners_of
 
 def outlines(case: Case) -> list[Outline]:
     """Patches as they are drawn."""
-    return [Outline(patch.name, corners_of(patch)) for patch in case.plants.patches]
+    return [Outline(patch.name, corners_of(case, patch)) for patch in case.plants.patches]
 
 
 def plan_marks(diagnosis: Diagnosis, patches: Sequence[Outline]) -> PlanMarks:

@@ -40,7 +40,7 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
 def _outlines(run: Run, experiment: str) -> list[Outline]:
     present = np.unique(run.site.patch[planted_cells(run, experiment)])
     patches = [run.case.plants.patches[index] for index in present]
-    return [Outline(patch.name, corners_of(patch)) for patch in patches]
+    return [Outline(patch.name, corners_of(run.case, patch)) for patch in patches]
 
 
 def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str:

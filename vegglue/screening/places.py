@@ -19,6 +19,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.flow.local_changes import Term
 from vegglue.flow.problem_setup import share_under_water
+from vegglue.site.grid import cell_stretch
 
 # Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
 # and a stretch of bank, as in open-m, after which the longest was added. Smaller ones tell places apart more closely,
@@ -110,5 +111,6 @@ def _area_under_water(model: Model, over: Bumps) -> Array:
     cell = model.site.grid.dx * model.site.grid.dy
     area = np.ones((len(model.station), over.x.size, over.y.size))
     for experiment, rows in model.rows.items():
-        area[rows] = np.maximum(cell * (over.along @ _under_water(model, experiment) @ over.across.T), 0.1 * cell)
+        water = _under_water(model, experiment) * cell_stretch(model.site.grid)
+        area[rows] = np.maximum(cell * (over.along @ water @ over.across.T), 0.1 * cell)
     return area

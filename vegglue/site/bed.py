@@ -6,7 +6,7 @@ from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer, Trapezoid
 from vegglue.errors import InputError
-from vegglue.site.grid import Grid
+from vegglue.site.grid import Grid, places_on_map
 from vegglue.site.terrain import levels_at, read_raster, survey_levels
 
 
@@ -32,9 +32,9 @@ def _layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     if layer.trapezoid is not None:
         return _trapezoid(layer.trapezoid, grid, upstream)
     if layer.raster is not None:
-        return levels_at(read_raster(layer.raster), grid.x, grid.y)
+        return levels_at(read_raster(layer.raster), *places_on_map(grid))
     if layer.points is not None:
-        return survey_levels(layer.points, grid.x, grid.y)
+        return survey_levels(layer.points, *places_on_map(grid))
     return np.full((grid.x.size, grid.y.size), np.nan)
 
 

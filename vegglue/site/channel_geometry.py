@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
 from vegglue.effects.surroundings import ChannelGeometry
+from vegglue.site.grid import Grid, cell_stretch, curvature_of
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import beyond
 
@@ -49,6 +50,7 @@ def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
     axis, half_width = _extent(floor, grid.y, grid.dy)
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
+    bent = {} if grid.centreline is None else _bent(grid)
     return ChannelGeometry(
         x=grid.x[:, None, None],
         y=grid.y[None, :, None],
@@ -65,7 +67,14 @@ def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
         edge=edge[..., None],
         wake=wake[..., None],
         patch=patch[..., None],
+        **bent,
     )
+
+
+def _bent(grid: Grid) -> dict[str, Array]:
+    """Stretch and turning of a grid along a centreline."""
+    stretch = cell_stretch(grid)[..., None]
+    return {"stretch": stretch, "turning": curvature_of(grid)[:, None, None] / stretch}
 
 
 def rows_of(geometry: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
@@ -79,6 +88,8 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
         name: getattr(geometry, name)[columns, rows]
         for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
     }
+    if geometry.turning.size:
+        cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
     along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
     return ChannelGeometry(y=geometry.y[:, rows], dx=geometry.dx, dy=geometry.dy, **along, **cut)
 

@@ -4,16 +4,33 @@ import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.case.parts import Polygon
+from vegglue.case.schema import Case
 from vegglue.case.site_schema import Patch
-from vegglue.site.grid import Grid
+from vegglue.site.centreline import along_and_across
+from vegglue.site.grid import Grid, centreline_in, places_on_map
+
+# Pieces of each side of a polygon along a bend: chosen, not measured; drawings need no more.
+SIDE_PIECES = 16
 
 
-def corners_of(patch: Patch) -> Array:
-    """Corners (x, y) of a patch in order around it, (corners, 2) [m]."""
+def corners_of(case: Case, patch: Patch) -> Array:
+    """Corners (x, y) of a patch in order around it in the coordinates of the grid, (corners, 2) [m].
+
+    A polygon is given on the map: along a centreline its sides bend, so that they are cut into short ones.
+    """
+    line = centreline_in(case)
+    if patch.polygon is not None and line is not None:
+        return np.stack(along_and_across(line, *_in_pieces(np.array(patch.polygon)).T), axis=1)
     if patch.polygon is not None:
         return np.array(patch.polygon)
     (west, east), (south, north) = patch.x or (0.0, 0.0), patch.y or (0.0, 0.0)
     return np.array([[west, south], [east, south], [east, north], [west, north]])
+
+
+def _in_pieces(corners: Array) -> Array:
+    """The sides of a polygon as SIDE_PIECES short ones each."""
+    share = np.arange(SIDE_PIECES)[None, :, None] / SIDE_PIECES
+    return ((1.0 - share) * corners[:, None] + share * np.roll(corners, -1, axis=0)[:, None]).reshape(-1, 2)
 
 
 def distance_to_outline(outline: Array, x: float, y: float) -> float:
@@ -28,14 +45,16 @@ def distance_to_outline(outline: Array, x: float, y: float) -> float:
 
 
 def in_polygon(corners: Polygon, grid: Grid) -> Mask:
-    """Cells (nx, ny) whose centre lies within the polygon: a ray from it crosses the outline an odd number of times."""
+    """Cells (nx, ny) whose centre lies within the polygon on the map: a ray from it crosses the outline an odd number
+    of times.
+    """
     inside = np.full((grid.x.size, grid.y.size), False)
-    y = grid.y[None, :]
+    x, y = places_on_map(grid)
     for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
         if y0 == y1:
             continue
         crossing = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
-        inside ^= ((y0 <= y) != (y1 <= y)) & (grid.x[:, None] < crossing)
+        inside ^= ((y0 <= y) != (y1 <= y)) & (x < crossing)
     return inside
 
 

@@ -49,17 +49,18 @@ def read_raster(path: Path) -> Raster:
 
 
 def levels_at(raster: Raster, x: Array, y: Array) -> Array:
-    """Levels (nx, ny) [m] at x (nx,) and y (ny,): bilinear between the centres of the raster.
+    """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): bilinear between the centres of the raster.
 
     Constant in its outer half cell; NaN outside and next to missing data.
     """
     i, weight_x = _between(raster.x, x)
     j, weight_y = _between(raster.y, y)
-    level, share = np.zeros((x.size, y.size)), np.zeros((x.size, y.size))
+    shape = np.broadcast_shapes(x.shape, y.shape)
+    level, share = np.zeros(shape), np.zeros(shape)
     for di, wx in ((0, 1.0 - weight_x), (1, weight_x)):
         for dj, wy in ((0, 1.0 - weight_y), (1, weight_y)):
-            weight = wx[:, None] * wy[None, :]
-            corner = raster.values[np.ix_(np.minimum(i + di, raster.x.size - 1), np.minimum(j + dj, raster.y.size - 1))]
+            weight = wx * wy
+            corner = raster.values[np.minimum(i + di, raster.x.size - 1), np.minimum(j + dj, raster.y.size - 1)]
             known = ~np.isnan(corner)
             level += np.where(known, weight * np.where(known, corner, 0.0), 0.0)
             share += np.where(known, weight, 0.0)
@@ -67,14 +68,15 @@ def levels_at(raster: Raster, x: Array, y: Array) -> Array:
 
 
 def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
-    """Values (nx, ny) of the raster cells in which x (nx,) and y (ny,) lie; NaN outside."""
+    """Values of the raster cells in which x (nx, 1) and y (1, ny), or both (nx, ny), lie; NaN outside."""
     i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
     j = np.clip(np.rint((y - raster.y[0]) / raster.size).astype(int), 0, raster.y.size - 1)
-    return np.where(_covered(raster, x, y), raster.values[np.ix_(i, j)], np.nan)
+    return np.where(_covered(raster, x, y), raster.values[i, j], np.nan)
 
 
 def survey_levels(path: Path, x: Array, y: Array) -> Array:
-    """Levels (nx, ny) [m], linear on the Delaunay triangles of surveyed points x, y, z; NaN outside their hull.
+    """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): linear on the Delaunay triangles of surveyed points x,
+    y, z; NaN outside their hull.
 
     Errors: InputError when the file cannot be read, or all points lie on one line.
     """
@@ -88,7 +90,7 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
         raise InputError(
             f"{path}: expected at least three points that are not on one line, got {len(points)}: add more."
         ) from None
-    return np.asarray(surface(*np.meshgrid(x, y, indexing="ij")), dtype=np.float64)
+    return np.asarray(surface(*np.broadcast_arrays(x, y)), dtype=np.float64)
 
 
 def read_points(path: Path) -> Array:
@@ -203,4 +205,4 @@ def _covered(raster: Raster, x: Array, y: Array) -> NDArray[np.bool_]:
     half = 0.5 * raster.size
     along = (x >= raster.x[0] - half) & (x <= raster.x[-1] + half)
     across = (y >= raster.y[0] - half) & (y <= raster.y[-1] + half)
-    return along[:, None] & across[None, :]
+    return along & across

@@ -11,7 +11,7 @@ from vegglue.case.parts import Interval
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Inflow, Patch, Zone
 from vegglue.errors import InputError, shown_path
-from vegglue.site.grid import Grid
+from vegglue.site.grid import Grid, cell_stretch, places_on_map
 from vegglue.site.polygons import in_polygon
 from vegglue.site.terrain import nearest_at, read_raster
 
@@ -26,7 +26,7 @@ def cells_of_patch(patch: Patch, grid: Grid) -> Mask:
 def slope(bed: Array, grid: Grid) -> Array:
     """|grad z_b| by central differences, shape (nx, ny) [-]."""
     along, across = np.gradient(bed, grid.dx, grid.dy)
-    return np.hypot(along, across)
+    return np.hypot(along / cell_stretch(grid), across)
 
 
 def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
@@ -47,7 +47,7 @@ def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
 
 
 def _class_numbers(path: Path, values: Mapping[int, str], grid: Grid) -> Array:
-    number = nearest_at(read_raster(path), grid.x, grid.y)
+    number = nearest_at(read_raster(path), *places_on_map(grid))
     strange = number[~np.isnan(number) & ~np.isin(number, list(values))]
     if strange.size:
         known = ", ".join(map(str, values))

@@ -14,7 +14,7 @@ from vegglue.arrays import Array
 from vegglue.flow.closures import Closures, closures, wall_rates
 from vegglue.flow.equations import Faces, faces, residual, storage
 from vegglue.flow.kernels import REST_SPEED
-from vegglue.flow.problem import LEVEL, Problem
+from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
 from vegglue.solver import sweeps
 from vegglue.solver.newton import newton
 
@@ -37,9 +37,15 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
     along, across = _damping(problem, now, closures(problem, state, now.cell))
     change, outlet = -residual(problem, state), problem.boundaries.outlet
-    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, problem.dx)
+    length = _shortest(problem)
+    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
     sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
+
+
+def _shortest(problem: Problem) -> float:
+    """Length of the shortest cells [m]: in a bend the sweeps must not take waves to be slower than they are."""
+    return problem.dx * float(stretch_of_cells(problem).min())
 
 
 @dataclass(frozen=True)
@@ -93,10 +99,11 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
 def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Array]:
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    cell = 2.0 * closed.rate * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / problem.dx + np.abs(v) / problem.dy
+    shortest = _shortest(problem)
+    cell = 2.0 * closed.rate * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / shortest + np.abs(v) / problem.dy
     # Shear acts on a thin cell over the depth of its deeper corners.
     sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
-    cell += 4.0 * closed.viscosity * (1.0 / problem.dx**2 + sheared / problem.dy**2)
+    cell += 4.0 * closed.viscosity * (1.0 / shortest**2 + sheared / problem.dy**2)
     along, across = cell.copy(), cell.copy()
     along[:-1] = np.maximum(cell[:-1], cell[1:])
     for row, rate in wall_rates(problem, now.cell):

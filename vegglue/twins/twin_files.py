@@ -3,13 +3,16 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError
-from vegglue.measurements.kinds import KINDS, Kind
+from vegglue.measurements.kinds import KINDS, Kind, kind_of
+from vegglue.site.centreline import on_map
+from vegglue.site.grid import centreline_in
 
 SEAL = "answer.sealed"
 
@@ -17,7 +20,7 @@ SEAL = "answer.sealed"
 def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Path:
     """Write all files and return the config. Errors: StorageError when the folder cannot be written."""
     name = case_name(folder.resolve().name, "twin")
-    used = station[station["used"].to_numpy(bool)]
+    used = _on_the_map(case, station[station["used"].to_numpy(bool)])
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
         "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
@@ -31,6 +34,15 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Pa
     for file, text in (texts | {f"{name}.yaml": note + as_yaml(tree), SEAL: seal}).items():
         write_text(folder / file, text, "give another folder by --to")
     return folder / f"{name}.yaml"
+
+
+def _on_the_map(case: Case, station: pd.DataFrame) -> pd.DataFrame:
+    """Points of the grid on the map, as files of stations have them; as they are without a centreline."""
+    line, at_point = centreline_in(case), [kind_of(name).at_point for name in station["kind"]]
+    if line is None:
+        return station
+    x, y = on_map(line, station["x"].to_numpy(float), station["y"].to_numpy(float))
+    return station.assign(x=station["x"].where(~np.array(at_point), x), y=station["y"].where(~np.array(at_point), y))
 
 
 def _stations(used: pd.DataFrame, kind: Kind) -> str:
