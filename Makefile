@@ -26,19 +26,23 @@ setup: $(READY)  # the environment, in .venv
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --editable '.[test]'
 	touch $@
 
 demo: $(READY)  # the loop on a site with a hidden effect, then the paper's cases, to finished reports
-	mkdir -p runs/demo/measured && cp -R data/open_cases/open-b/. runs/demo/measured/willows
-	$(VEGGLUE) import runs/demo/measured/willows --to runs/demo/willows.yaml
+	@echo "1 of 3: round the loop, on a channel with willows in which something is hidden"
+	@mkdir -p runs/demo/measured && cp -R data/open_cases/open-b/. runs/demo/measured/willows
+	$(VEGGLUE) import runs/demo/measured/willows --to runs/demo/willows.yaml --quiet
 	$(VEGGLUE) run runs/demo/willows.yaml --members $(DEMO_MEMBERS) --jobs $(JOBS) --runs runs/demo
+	@$(VEGGLUE) overview runs/demo/willows.yaml --runs runs/demo --quiet
+	@echo "2 of 3: the cases of the paper, D3a with all members, the others with $(DEMO_MEMBERS)"
 	@for case in d3a d3a_refined d0 d3b; do \
 	  case $$case in d3a*) few= ;; *) few="--members $(DEMO_MEMBERS)" ;; esac; \
 	  $(VEGGLUE) simulate configs/$$case.yaml $$few --jobs $(JOBS) --runs runs/demo && \
 	  $(VEGGLUE) infer configs/$$case.yaml $$few --runs runs/demo && \
 	  $(VEGGLUE) report configs/$$case.yaml $$few --runs runs/demo || exit $$?; \
 	done
+	@echo "3 of 3: everything on one page"
 	$(VEGGLUE) overview $(DEMO_CONFIGS) --runs runs/demo
 
 paper: report  # the paper's cases with all 5,000 members

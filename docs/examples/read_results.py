@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Read the results of a run
 #
-# It needs a run with a posterior, such as the example of the README: `vegglue simulate brook.yaml` and
+# It needs a run with a posterior, such as the example of docs/own_case.md: `vegglue simulate brook.yaml` and
 # `vegglue infer brook.yaml`. Start it in the folder that holds `runs/`.
 
 # %%

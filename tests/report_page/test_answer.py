@@ -36,7 +36,7 @@ def plain(words: str) -> str:
     ("found", "said"),
     [
         (NOTHING, "Nothing is missing from this model that these data could show."),
-        (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies)"),
+        (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.30 m2/s"),
         (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
          "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),

@@ -37,7 +37,7 @@ def import_command(
         f"{len(case.parameters)} parameters with wide priors."
     )
     if not quiet:
-        print(f"Next: vegglue run {target}")
+        print(f"Next: vegglue check {target}, then vegglue run {target}")
 
 
 def diagnose_command(

@@ -49,10 +49,10 @@ def show_ladder(found: Comparison) -> None:
     """The error ladder as a table, what it leaves out, and which parameters differ between experiments."""
     rungs, note = found.rungs, exclusion_in_words(found.left_out)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    others = _other_kinds(rungs)
+    others, validated = _other_kinds(rungs), any(np.isfinite(one.validation) for one in rungs)
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "held out (section)", "fell by", "held out (exp.)", "log score", "in 50 %", "in 95 %",
-                "validation")  # fmt: skip
+                *(["validation"] if validated else []))  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "model" else "right")
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
@@ -62,7 +62,8 @@ def show_ladder(found: Comparison) -> None:
             one.name, str(len(one.values)), f"{seen.rmse[STREAMWISE]:.4f}", f"{seen.rmse[WATER_LEVEL]:.4f}",
             *(f"{seen.rmse[kind.name]:.4f}" for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
             f"{held_out_rmse(one):.4f}", gain, f"{held_out_rmse(one, 'experiments'):.4f}",
-            f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}", f"{one.validation:.4f}",
+            f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}",
+            *([f"{one.validation:.4f}"] if validated else []),
         )  # fmt: skip
     console().print(table)
     if rungs:

@@ -46,11 +46,13 @@ def draw_error_rows(rows: Mapping[str, Sequence[float]], floor: float, unit: str
 
 
 def _floor(scale: Scale, floor: float, foot: float) -> list[str]:
-    """A line where errors of measuring alone lie, named below the axis."""
+    """A line where errors of measuring alone lie, named below the axis, and broken where the words of rows stand."""
     if not np.isfinite(floor):
         return []
     at = float(scale(floor))
-    line = svg_element("path", d=f"M{at:.1f},22V{foot + 26:g}", stroke=COLOUR["ink"], stroke_dasharray="3 3")
+    rows = round(foot / ROW_HEIGHT)
+    beside_words = "".join(f"M{at:.1f},{ROW_HEIGHT * row + 24:g}v26" for row in range(rows))
+    line = svg_element("path", d=f"{beside_words}M{at:.1f},{foot:g}v26", stroke=COLOUR["ink"], stroke_dasharray="3 3")
     words = f"errors of measuring alone: {short(floor, 2)}"
     right = at > 0.5 * ROWS_WIDTH
     return [line, svg_words(at - 5 if right else at + 5, foot + 40, words, text_anchor="end" if right else "start")]

@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR
 from vegglue.figures.svg_text import (
+    FEWEST_TICKS,
     Scale,
     axis_below,
     linear_scale,
@@ -18,7 +19,6 @@ from vegglue.figures.svg_text import (
     svg_words,
     tick_labels,
 )
-from vegglue.figures.typography import short
 
 # The picture [px], legible on a telephone of 360 px; the height of a row, of its words in it, and of the foot.
 INTERVALS_WIDTH, INTERVALS_LETTERS, ROW, WORDS, FOOT = 460.0, 13.0, 40.0, 18.0, 28.0
@@ -50,7 +50,7 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
 
     foot = ROW * len(rows) + 6.0
     ticks = _powers(low, high) if logarithmic else round_ticks(low, high, 6)
-    labels = [short(tick, 2) for tick in ticks] if logarithmic else tick_labels(ticks)
+    labels = [f"{tick:.4g}" for tick in ticks] if logarithmic else tick_labels(ticks)
     parts = axis_below(scale, ticks, labels, foot, INTERVALS_WIDTH, "")
     for number, (words, row) in enumerate(rows.items()):
         parts += _row(scale, words, row, ROW * number + WORDS)
@@ -58,11 +58,12 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
 
 
 def _powers(low: float, high: float) -> list[float]:
-    """1, 2 and 5 times powers of ten from 10^low to 10^high, or powers alone where those are many."""
+    """Powers of ten from 10^low to 10^high, with 2 and 5 times them where they are few; else round numbers."""
     factors = (1.0, 2.0, 5.0) if high - low < 2.0 else (1.0,)
     powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
     values = [factor * 10.0**power for power in powers for factor in factors]
-    return [value for value in values if low <= np.log10(value) <= high]
+    inside = [value for value in values if low <= np.log10(value) <= high]
+    return inside if len(inside) >= FEWEST_TICKS else round_ticks(10.0**low, 10.0**high, 5)
 
 
 def _row(scale: Scale, words: str, row: DrawnInterval, height: float) -> list[str]:

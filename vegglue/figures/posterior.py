@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, HEIGHT, WIDTH, canvas, formula_labels, label, styled
-from vegglue.figures.typography import short, symbol_math, unit_math
+from vegglue.figures.svg_text import FEWEST_TICKS, round_ticks
+from vegglue.figures.typography import symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
 # Points of a drawn density: its curve looks smooth at the width of a column.
@@ -146,9 +147,12 @@ def _powers(axes: Axes, which: str) -> None:
     ticks = np.add.outer(np.arange(np.floor(low), high + 1), np.log10(np.arange(1, 10)))
     inside = (ticks >= low - 1e-9) & (ticks <= high + 1e-9)
     steps = [0] if inside[:, 0].sum() >= 3 else [0, 2] if inside[:, [0, 2]].sum() >= 3 else [0, 1, 4]
-    axis.set_ticks(ticks[:, steps][inside[:, steps]])
+    named = ticks[:, steps][inside[:, steps]]
+    if named.size < FEWEST_TICKS:
+        named = np.log10(round_ticks(10.0**low, 10.0**high, 5))
+    axis.set_ticks(named)
     axis.set_ticks(ticks[inside], minor=True)
-    axis.set_major_formatter(FuncFormatter(lambda power, _: short(10.0**power, 1)))
+    axis.set_major_formatter(FuncFormatter(lambda power, _: f"{10.0**power:.3g}"))
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -17,6 +17,8 @@ from vegglue.figures.typography import decimals, fixed
 Scale = Callable[[Any], Array]  # values to places [px]
 # A number this near to the left edge [px] begins there instead of standing amid its stroke.
 CLOSE_TO_THE_EDGE = 10.0
+# Fewer numbers on an axis tell no scale.
+FEWEST_TICKS = 2
 FACE = "system-ui, 'Liberation Sans', Helvetica, Arial, sans-serif"
 
 

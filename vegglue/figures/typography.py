@@ -74,8 +74,10 @@ def percent(share: float) -> str:
 
 
 def symbol_html(symbol: str) -> str:
-    """n_b as n with a lowered b, the letter slanted."""
+    """n_b as n with a lowered b, the letter slanted; a name of words as it is."""
     letter, _, lowered = symbol.partition("_")
+    if len(letter) > 1 and lowered:
+        return f"<code>{html.escape(symbol)}</code>"
     return f"<var>{html.escape(letter)}</var>" + (f"<sub>{html.escape(lowered)}</sub>" if lowered else "")
 
 

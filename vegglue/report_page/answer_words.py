@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from vegglue.figures.typography import NARROW, count, fixed, percent, short, unit_html
+from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.posterior_words import UNBELIEVED
 from vegglue.report_page.run import Run
-from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis import AmplitudeEstimate, Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import OpenQuestion
@@ -75,7 +75,17 @@ def _effect_in_words(found: Diagnosis, name: str, rivals: bool) -> str:
     short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
     doubt = f"most likely ({percent(found.chances[name])}) " if rivals else ""
     explained = f", {more}" if more else ""
-    return f"{doubt}<b>{short_title[:1].lower()}{short_title[1:]}</b> (<code>{html.escape(name)}</code>{explained})"
+    size = f", {_amplitude_in_words(suspect.amplitude)}"
+    return (
+        f"{doubt}<b>{short_title[:1].lower()}{short_title[1:]}</b> (<code>{html.escape(name)}</code>{explained}{size})"
+    )
+
+
+def _amplitude_in_words(amplitude: AmplitudeEstimate) -> str:
+    """'size −0.67, 95 % in −0.79 to −0.54' (HTML)."""
+    unit = unit_html(amplitude.unit)
+    value = f"size {short(amplitude.value, 2)}"
+    return f"{value}{f'{NARROW}{unit}' if unit else ''}, 95{NARROW}% in {interval(*amplitude.interval95)}"
 
 
 def of_which_model(run: Run) -> str:

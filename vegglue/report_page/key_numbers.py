@@ -16,6 +16,8 @@ from vegglue.solver.status import FAILED
 
 # Largest |Q/Q_in - 1| [-] of a sound member: a hundredth of what a flow meter can tell.
 MASS_LIMIT = 1e-4
+# Standard deviation of log10 [-] above which a value is told as a power of ten: below, both sides of it are alike.
+WIDE = 0.05
 # Parameters among the key numbers: with sigma and the members, six numbers fit the first screen.
 PARAMETERS_SHOWN = 4
 
@@ -71,7 +73,9 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     error = measurement_error(posterior, kind)
     against = f"measurement error {with_unit(error, kind)}" if np.isfinite(error) else "measurement error unknown"
     sigma = KeyNumber(
-        f"residual <var>σ</var> ({kind_of(kind).words})", with_unit(posterior.fit.sigma[kind], kind), against
+        f"error <var>σ</var> of the likelihood ({kind_of(kind).words})",
+        with_unit(posterior.fit.sigma[kind], kind),
+        against,
     )
     effective = f"{posterior.weighting.effective_size:,.0f}"
     size = KeyNumber("effective members", effective, f"of {posterior.sample.members:,}")
@@ -111,10 +115,10 @@ def as_power(posterior: Posterior, name: str) -> bool:
 
 
 def estimate(posterior: Posterior, name: str) -> str:
-    """Median ± standard deviation, as a power of ten where as_power says so (HTML, with unit)."""
+    """Median ± standard deviation (HTML, with unit); as a power of ten where as_power says so and it is WIDE."""
     unit = unit_html(posterior.sample.unit[name])
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
-    if as_power(posterior, name):
+    if as_power(posterior, name) and posterior.marginals.log10_sd[name] > WIDE:
         power = plus_minus(posterior.marginals.log10_median[name], posterior.marginals.log10_sd[name])
         return f"10<sup>{power}</sup>{unit}"
     return plus_minus(posterior.marginals.median[name], posterior.marginals.sd[name]) + unit

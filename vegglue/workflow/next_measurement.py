@@ -64,16 +64,16 @@ def next_measurement(
 ) -> list[Question]:
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
-    between: names of effects, else those that the diagnosis could not tell apart, else the strongest of those it could
-    not test, each by itself at a plausible size; only questions nobody chose are kept, in questions.json. Errors:
-    InputError for a name that is not in the diagnosis.
+    between: names of effects, else those that the diagnosis could not tell apart, step by step; where it found nothing,
+    the strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept,
+    in questions.json. Errors: InputError for a name that is not in the diagnosis.
     """
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     by_name = {one.name: one for one in found.suspects}
     unknown = [name for name in between if name not in by_name]
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
-    asked = _questions(case, found, list(between) or (list(found.steps[-1].rivals) if found.steps else []))
+    asked = _asked(case, found, between) if between else _questions(case, found)
     questions: list[Question] = []
     if asked:
         with at_most(jobs):
@@ -99,15 +99,22 @@ def open_question(question: Question) -> OpenQuestion:
     )
 
 
-def _questions(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
-    """In words, and the rivals of each."""
+def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
+    """What the diagnosis leaves open, in words, and the rivals of each question."""
+    if found.steps:
+        return [one for step in found.steps if len(step.rivals) > 1 for one in _asked(case, found, step.rivals)]
+    # What calibration hides best, of all that would leave a trace without it.
+    hidden = [one for one in found.suspects if not one.detectability.testable]
+    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
+    return [question for one in strongest for question in _asked(case, found, [one.name])]
+
+
+def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
+    """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
     if len(names) > 1:
         return [(" from ".join(names), rivals_of(case, found, names))]
-    hidden = [one for one in found.suspects if not one.detectability.testable and not found.steps]
-    # What calibration hides best, of all that would leave a trace without it.
-    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
-    single = [one for one in found.suspects if list(names) == [one.name]] or strongest
-    return [(_what_hides(one), rivals_of(case, found, [one.name], plausible=True)) for one in single]
+    single = next(one for one in found.suspects if one.name == names[0])
+    return [(_what_hides(single), rivals_of(case, found, names, plausible=True))]
 
 
 def _what_hides(suspect: Suspect) -> str:

@@ -54,10 +54,11 @@ def loop_results_of(case: Case, runs: Path | str = "runs", above: str = "../") -
     ladder = ladder_that_fits(runs / case.name, wanted)
     first, first_hash = (case.name, wanted) if ladder is None else (ladder.steps[0].name, ladder.steps[0].config_hash)
     steps = () if ladder is None else ladder.steps
+    own = questions_that_fit(runs / case.name, wanted)
     made = [one.name for one in steps if (runs / one.name / "posterior.h5").exists()]
     return LoopResults(
         behind=diagnosis_that_fits(runs / first / "diagnosis.h5", first_hash),
         ladder=ladder,
-        questions=questions_that_fit(runs / first, first_hash),
+        questions=own if own is not None else questions_that_fit(runs / first, first_hash),
         pages={name: f"{above}{name}/report.html" for name in made},
     )

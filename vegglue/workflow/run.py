@@ -33,9 +33,9 @@ def run(
     watch: Watch = silent,
     show: Show = _unseen,
 ) -> StepwiseExtension:
-    """Diagnose, add what is missing, watch the error fall, say what to measure next; then ensemble, posterior and
-    report of the case and of its last child. What is up to date is not made again. members: size of the ensembles
-    instead of the case's.
+    """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then ensemble,
+    posterior and report of the case and of its last child. What is up to date is not made again. members: size of the
+    ensembles instead of the case's.
 
     show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
     Posterior, the Path of a page, or a sentence.
@@ -43,13 +43,16 @@ def run(
     show(case, diagnose(case, runs=runs, jobs=jobs, watch=watch))
     extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch)
     show(case, extension)
-    show(case, next_measurement(case, runs=runs, jobs=jobs, watch=watch))
     last = extension.cases[-1]
+    if last.source != case.source:
+        show(last, diagnose(last, runs=runs, jobs=jobs, watch=watch))
+    both = {one.source: one for one in (case, last)}.values()
+    for each in both:
+        show(each, next_measurement(each, runs=runs, jobs=jobs, watch=watch))
     picture = draw_ladder_of(extension.comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
     from vegglue.workflow.report import report
 
-    both = {one.source: one for one in (case, last)}.values()
     # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
     for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show)]:
         show(each, report(each, runs=runs, members=members, watch=watch))
