@@ -63,6 +63,7 @@ def vortex_errors(rows: int) -> tuple[float, float]:
     )
 
 
+@pytest.mark.slow
 def test_a_bend_of_90_degrees_holds_a_free_vortex() -> None:
     """u from 0.70 to 0.92 m/s. First order at the walls, where values upwind are held, and small."""
     errors = np.array([vortex_errors(rows) for rows in (6, 12, 24)])
