@@ -9,6 +9,7 @@ import pytest
 
 from vegglue.case.resolved_config import dumped
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import GridExtent
 from vegglue.engine.interface import Model, linearise, predict
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
@@ -33,6 +34,7 @@ PRIORS = {
     "n_w": {"distribution": "loguniform", "low": 0.005, "high": 0.03, "unit": "s m^(-1/3)"},
 }
 BED = {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"}
+ROUND = {"parts": [{"length": 2.0}, {"radius": 2.0, "angle": 90.0}]}
 Z = np.array([0.1, 0.2])
 
 
@@ -64,6 +66,16 @@ def test_walls_stand_where_no_water_enters() -> None:
     assert np.flatnonzero(walls.south == 0.0).tolist() == [8, 9]
     assert walls.north.all()
     assert walls.rate == pytest.approx(9.81 * np.array([0.01, 0.02]) ** 2 / 0.075 ** (1.0 / 3.0) / 0.075)
+
+
+def test_walls_of_a_bend_are_longer_outside() -> None:
+    """Radius 2 m to the left: the wall at y = 0 is as long as the line, the cell beside it (2 - 0.0375) / 2 of that."""
+    bent = flume().model_copy(update={"grid": GridExtent.model_validate(TREE["grid"] | {"centreline": ROUND})})
+    walls = build_problem(bent, build_site(bent), "one", {"n_b": np.full(1, 0.02), "n_w": np.full(1, 0.02)}).walls
+    assert walls.south[12] == pytest.approx(2.0 / 1.9625)
+    assert walls.north[12] == pytest.approx(1.1 / 1.1375)
+    assert walls.south[9] == 0.0
+    assert walls.south[0] == 1.0
 
 
 def test_a_case_that_names_no_walls_has_none_and_is_written_as_before() -> None:

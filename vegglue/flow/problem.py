@@ -68,8 +68,9 @@ class VegetatedCells:
 
 @dataclass(frozen=True)
 class SideWalls:
-    """Rough vertical walls along the south and the north side of the grid: 1 beside each cell where one stands, else 0
-    (nx,), and c_w / dy of each member, see `wall_laws`, (m,) [1/m]; all empty without such walls.
+    """Rough vertical walls along the south and the north side of the grid: length of the wall over that of the cell
+    beside it, 1 on a straight grid, 0 where none stands, (nx,) [-], and c_w / dy of each member, see `wall_laws`, (m,)
+    [1/m]; all empty without such walls.
     """
 
     south: Array

@@ -25,7 +25,7 @@ from vegglue.flow.stretch import Bend
 from vegglue.resistance import bed_laws, plant_laws
 from vegglue.resistance.wall_laws import wall_coefficient
 from vegglue.site.channel_geometry import channel_geometry, expected_depth, patches_present
-from vegglue.site.grid import Grid, curvature_of
+from vegglue.site.grid import Grid, cell_stretch, curvature_of
 from vegglue.site.gridded_site import Site
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
@@ -87,7 +87,7 @@ def _bed_friction(case: Case, site: Site, theta: Theta, members: int) -> BedFric
 
 def _walls(case: Case, site: Site, theta: Theta, members: int) -> SideWalls:
     """Rough walls along both sides, none where water enters through them."""
-    walls, sides = case.friction.walls, {side: np.ones(site.grid.x.size) for side in ("south", "north")}
+    walls, sides = case.friction.walls, _lengths_of_sides(site.grid)
     if walls is None:
         return SMOOTH_WALLS
     for inflow in case.inflows.values():
@@ -96,6 +96,16 @@ def _walls(case: Case, site: Site, theta: Theta, members: int) -> SideWalls:
     law, floor = bed_laws.BED_LAWS.index(walls.law), case.numerics.bank_argument_minimum
     drag = wall_coefficient(law, value_of(walls.coefficient, theta, members), site.grid.dy, floor)
     return SideWalls(**sides, rate=drag / site.grid.dy)
+
+
+def _lengths_of_sides(grid: Grid) -> dict[str, Array]:
+    """Length of each cell on the south and north side of the grid over that in its middle, (nx,) [-]; 1 if straight."""
+    curvature, middle = curvature_of(grid), cell_stretch(grid)
+    y = {"south": grid.y[0] - 0.5 * grid.dy, "north": grid.y[-1] + 0.5 * grid.dy}
+    return {
+        "south": (1.0 - curvature * y["south"]) / middle[:, 0],
+        "north": (1.0 - curvature * y["north"]) / middle[:, -1],
+    }
 
 
 def _boundaries(case: Case, site: Site, values: BoundaryValues, entering: Array) -> Boundaries:
