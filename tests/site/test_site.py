@@ -7,8 +7,11 @@ import pytest
 import yaml
 
 from vegglue.case.config import load_case
+from vegglue.case.resolved_config import dumped
 from vegglue.errors import InputError
-from vegglue.site.gridded_site import build_site
+from vegglue.flow.problem_setup import build_problem
+from vegglue.site.channel_geometry import channel_geometry
+from vegglue.site.gridded_site import build_site, in_experiment
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CHANNEL = {"axis": 0.0, "bottom_width": 3.0, "top_width": 7.0, "bank_slope": 0.5, "bed_slope": 0.01, "level": 2.0}
@@ -187,3 +190,20 @@ def test_patches_take_the_cells_whose_centre_they_hold(tmp_path):
     expected[4:8, 0:2] = 1
     expected[6:8, 2:6] = 1
     assert np.array_equal(built.patch, expected)
+
+
+def test_an_experiment_may_have_a_bed_of_its_own(tmp_path):
+    """Layers over those of the case, in that experiment only; banks and what effects see of the channel follow."""
+    deeper = [{"trapezoid": CHANNEL | {"axis": 3.0, "level": 1.5, "bottom_width": 5.0, "top_width": 5.5}}]
+    experiments = {"one": {"discharge": 1, "level": 3}, "after": {"discharge": 1, "level": 3, "bed": deeper}}
+    built = site(tmp_path, experiments=experiments, friction=zones({"class": "bank", "steeper_than": 0.2}))
+    case = load_case(tmp_path / "small.yaml")
+    before, after = in_experiment(built, "one"), in_experiment(built, "after")
+    assert before is built
+    assert (before.bed - after.bed)[:, 2:4] == pytest.approx(0.5)
+    assert before.friction_class.sum() > after.friction_class.sum()
+    for name, now in (("one", before), ("after", after)):
+        assert np.array_equal(build_problem(case, built, name, {}).bed, now.bed)
+        assert np.array_equal(channel_geometry(case, built, name).bed[..., 0], now.bed)
+    assert site(tmp_path, experiments={"one": experiments["one"]}).own == {}
+    assert "bed" not in dumped(load_case(tmp_path / "small.yaml"))["experiments"]["one"]

@@ -16,6 +16,9 @@ class Experiment(Part):
     level: Value = Field(description="water level at the outlet, in the datum of the bed [m]")
     plants: bool | tuple[str, ...] = Field(default=True, description="true, false, or the names of the patches present")
     stands: dict[str, StandOverride] = Field(default_factory=dict, description="what differs in this experiment")
+    bed: Annotated[tuple[BedLayer, ...], Field(min_length=1)] | None = Field(
+        default=None, description="layers over the bed of the case, in this experiment only"
+    )
 
 
 class Parameter(Part):

@@ -12,7 +12,7 @@ from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
 from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.grid import curvature_of
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import centres_within, inflow_cells
 
 # Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
@@ -23,14 +23,15 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
     """Inflows and outlets without cells or without water, water on edges that act as walls, ends in a bend."""
     yield from _ends_in_a_bend(site)
     for name, experiment in case.experiments.items():
-        depth = expected_depth(case, site, experiment)
+        now = in_experiment(site, name)
+        depth = expected_depth(case, now, experiment)
         open_ = centres_within(case.outlet.range, site.grid.y)
         level = middle_value(case, experiment.level)
         wet = np.maximum(depth[-1, open_], 0.0)
         if not open_.any():
             yield "The outlet holds no cell centre: no water can leave."
         elif not (wet > 0).any():
-            lowest = site.bed[-1, open_].min()
+            lowest = now.bed[-1, open_].min()
             yield f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {lowest:.3g} m."
         elif (froude := _froude(case, experiment, wet, site.grid.dy)) > 0.7:
             yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."

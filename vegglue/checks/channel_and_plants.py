@@ -11,7 +11,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.polygons import area_of, corners_of
 from vegglue.site.zones import cells_of_patch
 
@@ -44,7 +44,7 @@ def remarks_on_friction_classes(case: Case, site: Site) -> Iterator[str]:
 def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     """Canopies above the water, dry stands, and heights [m] that differ from those measured."""
     for name, experiment in case.experiments.items():
-        depth = expected_depth(case, site, experiment)
+        depth = expected_depth(case, in_experiment(site, name), experiment)
         for stand in sorted({case.plants.patches[index].stand for index in patches_present(case, name)}):
             cells = np.isin(site.patch, [i for i, patch in enumerate(case.plants.patches) if patch.stand == stand])
             if not cells.any():
@@ -87,8 +87,9 @@ def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
             continue
         roughest = _largest(case, friction_class.k_s)
         for experiment_name, experiment in case.experiments.items():
-            depth = expected_depth(case, site, experiment)
-            wet = depth[(site.friction_class == index) & (site.patch < 0) & (depth > 0)]
+            now = in_experiment(site, experiment_name)
+            depth = expected_depth(case, now, experiment)
+            wet = depth[(now.friction_class == index) & (site.patch < 0) & (depth > 0)]
             share = float(np.mean(12.0 * wet / roughest < floor)) if wet.size else 0.0
             if share > 0:
                 yield (

@@ -10,7 +10,7 @@ from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.polygons import corners_of, distance_to_outline
 
 # Nearer to a patch edge than this share of a cell [-], a station is on it.
@@ -27,7 +27,9 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
         if not kind_of(row["kind"]).at_point:
             continue
         i, j = np.abs(site.grid.x - row["x"]).argmin(), np.abs(site.grid.y - row["y"]).argmin()
-        depth = float(expected_depth(case, site, case.experiments[row["experiment"]])[i, j])
+        depth = float(
+            expected_depth(case, in_experiment(site, row["experiment"]), case.experiments[row["experiment"]])[i, j]
+        )
         if not row["depth"] > 0 and depth <= 0:
             yield f"The {station_in_words(row)} is outside the wet channel, about {-depth:.2g} m above the water."
 

@@ -15,7 +15,7 @@ from vegglue.case.schema import Case
 from vegglue.figures.style import COLOUR, SMALL, canvas, label, save, styled
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.polygons import corners_of
 
 CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
@@ -90,8 +90,8 @@ def _draw_classes(axes: Axes, site: Site) -> None:
 
 
 def _draw_waterlines(axes: Axes, case: Case, site: Site) -> None:
-    for experiment in case.experiments.values():
-        depth = expected_depth(case, site, experiment)
+    for name, experiment in case.experiments.items():
+        depth = expected_depth(case, in_experiment(site, name), experiment)
         if depth.min() < 0 < depth.max():
             axes.contour(site.grid.x, site.grid.y, depth.T, [0.0], colors=COLOUR["model"], linewidths=0.8)
 
@@ -156,9 +156,14 @@ def _draw_section(axes: Axes, case: Case, site: Site, x: float) -> None:
     axes.plot(site.grid.y, bed, color=COLOUR["ink"], linewidth=1.2)
     axes.plot(site.grid.y, bed, ".", markersize=3, color=COLOUR["ink"])
     for name, experiment in case.experiments.items():
-        depth = expected_depth(case, site, experiment)[i]
-        level = bed + depth
-        axes.fill_between(site.grid.y, bed, level, where=depth > 0, interpolate=True, color=COLOUR["water"], zorder=0)
+        now = in_experiment(site, name)
+        depth = expected_depth(case, now, experiment)[i]
+        level = now.bed[i] + depth
+        if now is not site:
+            axes.plot(site.grid.y, now.bed[i], color=COLOUR["ink"], linewidth=0.6, linestyle="--")
+        axes.fill_between(
+            site.grid.y, now.bed[i], level, where=depth > 0, interpolate=True, color=COLOUR["water"], zorder=0
+        )
         axes.plot(site.grid.y, np.where(depth > 0, level, np.nan), color=COLOUR["model"], linewidth=1.0)
         if (depth > 0).any():
             label(axes, site.grid.y[depth > 0][0], level[0], name, "model")

@@ -26,7 +26,7 @@ from vegglue.resistance import bed_laws, plant_laws
 from vegglue.resistance.wall_laws import wall_coefficient
 from vegglue.site.channel_geometry import channel_geometry, expected_depth, patches_present
 from vegglue.site.grid import Grid, cell_stretch, curvature_of
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
 # Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
@@ -39,6 +39,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     Errors: InputError when an inflow or the outlet holds no cell centre.
     """
     refuse_ranges_without_cells(case, site.grid)
+    site = in_experiment(site, experiment)
     members = len(next(iter(theta.values()))) if theta else 1
     setting = case.experiments[experiment]
     effects = active_effects(case, experiment, theta, members)

@@ -106,12 +106,13 @@ def _across(case: Case) -> Array:
 
 def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
     """Bed level at x and each y in the datum of the file, in which the lowest bed of the section is `floor`."""
-    lowest = _local_bed(case, x, _across(case)).min()
-    return _local_bed(case, x, y) - lowest + float(observation.floor or 0.0)
+    name = str(observation.experiment)
+    lowest = _local_bed(case, name, x, _across(case)).min()
+    return _local_bed(case, name, x, y) - lowest + float(observation.floor or 0.0)
 
 
-def _local_bed(case: Case, x: float, y: Array) -> Array:
-    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP, centreline_in(case)))[0]
+def _local_bed(case: Case, experiment: str, x: float, y: Array) -> Array:
+    return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP, centreline_in(case)), experiment)[0]
 
 
 def _cross_section(case: Case, observation: Observation, x: float) -> CrossSection:

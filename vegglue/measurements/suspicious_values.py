@@ -14,7 +14,7 @@ from vegglue.case.schema import Case
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of
 from vegglue.measurements.plausible_flow import PlausibleFlow, plausible_flow
 from vegglue.measurements.suspicion_in_words import outlet_in_words, suspicions_in_words
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 
 # Factor [-] between what was measured in a section and Q / A up to which nothing is said. The sections of 16 campaigns
 # and of a surveyed confluence lie within 0.5 and 1.1; no unit in use but feet is nearer than 10.
@@ -55,7 +55,7 @@ def absurd_values(case: Case, site: Site, station: pd.DataFrame) -> list[str]:
     used = station[station["used"].astype(bool)]
     sentences, judged = [], []
     for name, rows in used.groupby("experiment", sort=False):
-        flow = plausible_flow(case, site, case.experiments[str(name)])
+        flow = plausible_flow(case, in_experiment(site, str(name)), case.experiments[str(name)])
         if flow.depth > DEEPEST_CHANNEL * flow.width:
             sentences.append(outlet_in_words(str(name), flow))
             continue

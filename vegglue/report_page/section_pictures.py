@@ -17,6 +17,7 @@ from vegglue.figures.typography import as_given, count, short
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.run import Run, file_name, planted_cells, published_svg, stamp
+from vegglue.site.gridded_site import in_experiment
 
 # What makes two rows of two tables one station.
 STATION_KEY = ["experiment", "kind", "section", "x", "y"]
@@ -146,7 +147,7 @@ def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> Sectio
 def _ground_at(run: Run, experiment: str, x: float) -> PanelGround:
     grid = run.site.grid
     column = int(np.argmin(np.abs(grid.x - x)))
-    return PanelGround(grid.y, run.site.bed[column], planted_cells(run, experiment)[column])
+    return PanelGround(grid.y, in_experiment(run.site, experiment).bed[column], planted_cells(run, experiment)[column])
 
 
 def panel_words(panel: SectionPanel) -> str:

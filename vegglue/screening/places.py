@@ -20,6 +20,7 @@ from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.flow.local_changes import Term
 from vegglue.flow.problem_setup import share_under_water
 from vegglue.site.grid import cell_stretch
+from vegglue.site.gridded_site import in_experiment
 
 # Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
 # and a stretch of bank, as in open-m, after which the longest was added. Smaller ones tell places apart more closely,
@@ -103,7 +104,8 @@ def _places_of_term(model: Model, responses: CellResponses, term: Term, half_wid
 
 
 def _under_water(model: Model, experiment: str) -> Any:
-    return share_under_water(model.case, model.site, model.case.experiments[experiment])
+    site = in_experiment(model.site, experiment)
+    return share_under_water(model.case, site, model.case.experiments[experiment])
 
 
 def _area_under_water(model: Model, over: Bumps) -> Array:

@@ -10,13 +10,15 @@ from vegglue.site.grid import Grid, places_on_map
 from vegglue.site.terrain import levels_at, read_raster, survey_levels
 
 
-def bed_levels(case: Case, grid: Grid) -> Array:
-    """Bed level z_b of the case (nx, ny) [m] at the centres of any grid; of each cell the last layer that has data.
+def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
+    """Bed level z_b (nx, ny) [m] at the centres of any grid, of each cell the last layer that has data: those of the
+    case, then those of an experiment that is named and has its own.
 
     Errors: InputError where no layer has data, or a file cannot be read.
     """
     bed = np.full((grid.x.size, grid.y.size), np.nan)
-    for layer in case.bed:
+    own = case.experiments[experiment].bed if experiment in case.experiments else None
+    for layer in (*case.bed, *(own or ())):
         level = _layer_levels(layer, grid, case.grid.x[0])
         bed = np.where(np.isnan(level), bed, level)
     if np.isnan(bed).any():

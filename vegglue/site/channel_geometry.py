@@ -10,7 +10,7 @@ from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.site.grid import Grid, cell_stretch, curvature_of
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import beyond
 
 # Slope across the channel [-] above which a cell is bank: one in five, steeper than a floor, flatter than a built bank.
@@ -21,7 +21,7 @@ GEOMETRIES_KEPT = 8
 
 def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
     """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
-    return _geometry(site, patches_present(case, experiment))
+    return _geometry(in_experiment(site, experiment), patches_present(case, experiment))
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:

@@ -1,6 +1,7 @@
 """The site on its grid: bed level, friction class and plants of each cell, read off at cell centres."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from vegglue.site.zones import cells_of_patch, friction_classes
 @dataclass(frozen=True, eq=False)
 class Site:
     """A site on its grid. bed: level of the bed (nx, ny) [m]; friction_class: index into class_names (nx, ny); patch:
-    index into the patches of the case (nx, ny), -1 without plants.
+    index into the patches of the case (nx, ny), -1 without plants; own: the site in experiments with another bed.
 
     Compared by identity, so that what is computed of a site can be cached.
     """
@@ -25,6 +26,12 @@ class Site:
     friction_class: NDArray[np.int64]
     class_names: tuple[str, ...]
     patch: NDArray[np.int64]
+    own: Mapping[str, "Site"] = field(default_factory=dict)
+
+
+def in_experiment(site: Site, experiment: str) -> Site:
+    """The site as it was in an experiment: with the bed of its own if it has one."""
+    return site.own.get(experiment, site)
 
 
 def build_site(case: Case) -> Site:
@@ -33,8 +40,14 @@ def build_site(case: Case) -> Site:
     Errors: InputError when a cell has no bed level or a file cannot be read.
     """
     grid = build_grid(case)
-    bed = bed_levels(case, grid)
-    patch = np.full(bed.shape, -1, dtype=np.int64)
+    patch = np.full((grid.x.size, grid.y.size), -1, dtype=np.int64)
     for index, area in enumerate(case.plants.patches):
         patch[cells_of_patch(area, grid)] = index
+    own = {name: _with_bed(case, grid, patch, name) for name, one in case.experiments.items() if one.bed is not None}
+    return replace(_with_bed(case, grid, patch), own=own)
+
+
+def _with_bed(case: Case, grid: Grid, patch: NDArray[np.int64], experiment: str = "") -> Site:
+    """The site with the bed of the case or of an experiment, and the friction classes that follow from its slopes."""
+    bed = bed_levels(case, grid, experiment)
     return Site(grid, bed, friction_classes(case, grid, bed), tuple(case.friction.classes), patch)
