@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -142,6 +143,18 @@ def test_results_stream_back_and_stand_in_order(two: Workers) -> None:
 def test_what_a_task_raises_is_raised_here(two: Workers) -> None:
     with on_cluster(two.address), pytest.raises(ZeroDivisionError):
         side_by_side(divmod, [(1, 1), (1, 0)])
+
+
+@pytest.mark.slow
+def test_what_is_left_alone_half_way_is_taken_back(two: Workers) -> None:
+    def begun() -> None:
+        for _ in as_finished(time.sleep, [(0.05,)] * 50, 1):
+            raise KeyError
+
+    with pytest.raises(KeyError), on_cluster(two.address):
+        begun()
+    with on_cluster(two.address):
+        assert side_by_side(abs, [(-1,)]) == [1]
 
 
 @pytest.mark.slow

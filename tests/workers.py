@@ -1,6 +1,7 @@
 """A Dask scheduler and workers in processes of their own on this machine, on ports the system chooses."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -11,7 +12,10 @@ from pathlib import Path
 
 from reach import ENVIRONMENT, ROOT
 
-HERE = ENVIRONMENT | {"PYTHONPATH": str(ROOT), "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s"}
+HERE = ENVIRONMENT | {
+    "PYTHONPATH": os.pathsep.join([str(ROOT), ENVIRONMENT.get("PYTHONPATH", "")]),
+    "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s",
+}
 LONGEST_START = 60.0
 WORKER = "from distributed.cli.dask_worker import main; main()"
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"

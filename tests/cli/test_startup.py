@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from reach import ENVIRONMENT, ROOT, write_reach
 
-HEAVY = {"h5py", "jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "scipy"}
+HEAVY = {"dask", "distributed", "h5py", "jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "scipy"}
 # Runs a command in a fresh interpreter, then tells which modules are there on the last line of standard error.
 TELLING = """
 import json, sys
