@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import scale
 import startup
 from joblib import Parallel, delayed
 
@@ -58,6 +59,7 @@ def main() -> None:
     whole(on_grid(case, (300.0, 471.0), (0.5, 0.375)))
     sizes(case)
     cores(case)
+    scale.spread()
 
 
 def marching(case) -> float:  # type: ignore[no-untyped-def]
