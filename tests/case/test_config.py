@@ -99,6 +99,29 @@ def test_the_shipped_cases_differ_in_canopy_height_only_where_the_paper_does():
 
 REFUSED = [
     (
+        "low: 0.01, high: 0.15",
+        "low: 0.01, high: 0.01000000000001",
+        "a range wider than the last digits; write a number",
+    ),
+    ("low: 0.01, high: 0.15", "low: 1e-300, high: 1.7e308", "expected numbers between 1e-30 and 1e+30, got"),
+    (
+        "uniform, low: 0.01, high: 0.15",
+        "normal, mean: 0.05, sd: 1e-15",
+        "an `sd` wider than the last digits of the mean",
+    ),
+    ("uniform, low: 0.01, high: 0.15", "normal, mean: 0.05, sd: 1e-300", "expected numbers between 1e-30 and 1e+30"),
+    (
+        "uniform, low: 0.01, high: 0.15",
+        "normal, mean: 0.05, sd: 0.001, low: 5, high: 6",
+        "bounds within 7 `sd` of the mean",
+    ),
+    (
+        "uniform, low: 0.01, high: 0.15",
+        "normal, mean: 1, sd: 1e20, low: 0.02, high: 0.1",
+        "write a uniform prior instead",
+    ),
+    ("uniform, low: 0.01, high: 0.15", "lognormal, median: 0.05, log_sd: 1e+10", "a `log_sd` between 1e-09 and 20"),
+    (
         "[1.0, 0.5]",
         "[1e-5, 1e-3]",
         "`grid` (regular grid of the model) expected at most 1,000,000 cells, where these make 3",

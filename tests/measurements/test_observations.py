@@ -240,3 +240,20 @@ def test_more_stations_than_a_covariance_can_hold_are_refused(monkeypatch):
     monkeypatch.setattr(observations, "MOST_STATIONS", 20)
     with pytest.raises(InputError, match=r"d3a\.yaml: expected at most 20 stations, got 21: average"):
         read_observations(CASES["d3a"])
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        ("A,402,5,0.5,1e-300", r"row 2: expected a u_se of 0 \(unknown\), or 1e-09 to 1e\+09"),
+        ("A,402,5,0.5,1e300", r"row 2: expected a u_se of 0 \(unknown\), or 1e-09 to 1e\+09"),
+        ("A,402,5,1e160,0.1", r"row 2: expected u up to 1e\+09"),
+        ("A,1e300,5,0.5,0.1", r"row 2: expected x up to 1e\+09"),
+    ],
+)
+def test_numbers_beyond_all_that_is_measured_are_refused(tmp_path, row, sentence):
+    case = with_file(tmp_path, f"section,x,y,u,u_se\n{row}\n", "velocity")
+    experiment = next(iter(case.experiments))
+    case = changed(case, experiment=experiment)
+    with pytest.raises(InputError, match=sentence):
+        read_observations(case)

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
+from vegglue.case.prior_width import unusable
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.in_short import in_short, so_many
@@ -42,6 +43,10 @@ class Parameter(Part):
             raise ValueError("a `low` below `high`")
         if self.distribution == "loguniform" and self.low is not None and self.low <= 0:
             raise ValueError("a `low` above 0 for a loguniform prior")
+        keys_of_numbers = ("low", "high", "mean", "sd", "median", "log_sd")
+        wanted = unusable(self.distribution, {key: getattr(self, key) for key in keys_of_numbers})
+        if wanted is not None:
+            raise ValueError(wanted)
         return self
 
 
@@ -72,7 +77,9 @@ class Observation(Part):
     offset: Offset = Field(default_factory=Offset, description="added to the coordinates of the file [m]")
     floor: Number | None = Field(default=None, description="adv: level of the channel floor in z of the file [m]")
     surface: Number | None = Field(default=None, description="adv: measured water level in z of the file [m]")
-    standard_error: Positive | None = Field(default=None, description="of all values, if the file has no such column")
+    standard_error: Annotated[Number, Field(ge=1e-9, le=1e9)] | None = Field(
+        default=None, description="of all values, if the file has no such column"
+    )
     synthetic: bool = Field(default=False, description="true: computed, not measured; reports and figures then say so")
 
     @model_validator(mode="after")

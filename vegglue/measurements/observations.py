@@ -31,6 +31,9 @@ STATION_COLUMNS = (
     "depth",
     "device",
 )
+# Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
+# the squares of such numbers leave no digits of the others.
+SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9
 Key = tuple[str, str]  # names of experiment and section
 
 
@@ -170,6 +173,13 @@ def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataF
     refuse_repeated(path, rows, ("experiment", "section", *place))
     error = rows.get(kind.error_column, pd.Series(observation.standard_error or 0.0, index=rows.index))
     refuse_rows(path, error < 0.0, f"expected {kind.error_column} of at least 0; mend it or leave the column out")
+    odd = (error != 0.0) & ~error.between(SMALLEST_STATED_ERROR, LARGEST_READING)
+    refuse_rows(
+        path, odd, f"expected a {kind.error_column} of 0 (unknown), or {SMALLEST_STATED_ERROR:g} to {LARGEST_READING:g}"
+    )
+    for column in (*place, kind.column):
+        far = rows[column].abs() > LARGEST_READING
+        refuse_rows(path, far, f"expected {column} up to {LARGEST_READING:g}; mend it or take the row out")
     stations = rows.rename(columns={kind.column: "value"}).assign(
         kind=kind.name,
         x=rows["x"] + observation.offset.x,
