@@ -191,7 +191,8 @@ def inline(svg: str, name: str, alt: str) -> str:
         body = body.replace(colour, f"var(--{key})")
     spoken = html.escape(alt, quote=True)
     body = re.sub(r"\n\s*", "\n", body)
-    return re.sub(r'<svg[^>]*?(viewBox="[^"]+")[^>]*>', rf'<svg role="img" aria-label="{spoken}" \1>', body, count=1)
+    opening = re.compile(r'<svg[^>]*?(viewBox="[^"]+")[^>]*>')
+    return opening.sub(lambda found: f'<svg role="img" aria-label="{spoken}" {found[1]}>', body, count=1)
 
 
 def palette_css() -> tuple[str, str]:
