@@ -13,6 +13,7 @@ from vegglue.checks.channel_and_plants import (
 )
 from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
 from vegglue.checks.stations import remarks_on_absurd_values, remarks_on_patch_edges, remarks_on_stations
+from vegglue.checks.steep_flow import remarks_on_steep_flow
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
 
@@ -27,6 +28,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_friction_classes(case, site),
         remarks_on_idle_parameters(case, site),
         remarks_on_boundaries(case, site),
+        remarks_on_steep_flow(case, site),
         remarks_on_canopies(case, site, observations),
         remarks_on_bank_law(case, site),
         remarks_on_stations(case, site, observations),
