@@ -5,6 +5,7 @@ JOBS ?= -1
 DEMO_MEMBERS ?= 64
 # What the demo's one page shows, the best thing first.
 DEMO_CONFIGS := runs/demo/willows.yaml $(addprefix configs/,d3a_refined.yaml d3a.yaml d0.yaml d3b.yaml)
+MINUTES ?= 60
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -17,7 +18,7 @@ SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo paper test check bench blind confluence clean simulate infer report setup
+.PHONY: help demo paper test check bench blind confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -76,6 +77,9 @@ blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopp
 
 confluence: $(READY)  # the numbers of docs/confluence.md, from the published set in the folder DATA
 	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)
+
+fuzz: $(READY)  # files from strangers, bred towards lines not yet reached, for MINUTES
+	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES)
 
 clean:  # remove the environment and all runs
 	rm -rf $(VENV) build dist *.egg-info runs/*/

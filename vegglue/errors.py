@@ -1,15 +1,29 @@
 """Errors a user can mend: one sentence each, shown without a traceback."""
 
 import os
+import re
 from pathlib import Path
+
+# Signs that end a line or steer a terminal; files of strangers may hold them, and sentences quote files.
+_STEERING = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def _in_one_line(sentence: str) -> str:
+    return _STEERING.sub(lambda sign: ascii(sign[0])[1:-1], sentence)
 
 
 class InputError(ValueError):
     """Something handed in is wrong: says where, what was expected, what came, and what to do."""
 
+    def __str__(self) -> str:
+        return _in_one_line(super().__str__())
+
 
 class StorageError(OSError):
     """A result could not be written or read: says which file, why, and what is still safe."""
+
+    def __str__(self) -> str:
+        return _in_one_line(super().__str__())
 
 
 def shown_path(path: Path) -> str:
