@@ -12,7 +12,7 @@ from vegglue.case.schema import Case
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
-    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction"), True
+    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
 ) | {"simulate": {"field_budget"}, "observations": {"__all__": {"synthetic"}}}
 # Goes up whenever the same case gets other numbers, so that results of before no longer fit it.
 EQUATIONS = 3

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from vegglue.case.frame import Frame
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
 from vegglue.case.prior_width import unusable
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
@@ -75,18 +76,38 @@ class Observation(Part):
         default=None, description="adv: depth average by `paper`, linear between points, or `profile`, of a fit"
     )
     offset: Offset = Field(default_factory=Offset, description="added to the coordinates of the file [m]")
-    floor: Number | None = Field(default=None, description="adv: level of the channel floor in z of the file [m]")
-    surface: Number | None = Field(default=None, description="adv: measured water level in z of the file [m]")
+    floor: Number | None = Field(
+        default=None, description="adv: z of the file at the lowest bed; else that of the bed [m]"
+    )
+    surface: Number | None = Field(
+        default=None, description="adv: z of the file at the water; else from levels measured [m]"
+    )
     standard_error: Annotated[Number, Field(ge=1e-9, le=1e9)] | None = Field(
         default=None, description="of all values, if the file has no such column"
+    )
+    across: Literal[True] | None = Field(
+        default=None, description="adv: true makes velocities across of column `v`, averaged like those along"
     )
     synthetic: bool = Field(default=False, description="true: computed, not measured; reports and figures then say so")
 
     @model_validator(mode="after")
     def _keys_of_the_kind(self) -> Self:
-        adv = ("experiment", "section", "case", "average", "floor", "surface")
+        adv = ("experiment", "section", "case", "average")
         exactly(self, self.kind, {self.kind: (), "adv": adv}, ("experiment", "section"))
+        of_adv = [key for key in ("floor", "surface", "across") if getattr(self, key) is not None]
+        if of_adv and self.kind != "adv":
+            raise ValueError(f"no key `{of_adv[0]}` together with {self.kind}")
         return self
+
+
+class ImportedFile(Part):
+    """A file of measurements that `import` brought into the form of a case: kept so that it can be done again."""
+
+    name: str = Field(description="name of the file in the folder that was imported")
+    sha256: str = Field(description="of its content")
+    taken: str = Field(description="what was taken from it, in words")
+    columns: dict[str, str] = Field(default_factory=dict, description="heading of each quantity")
+    units: dict[str, str] = Field(default_factory=dict, description="unit of each quantity in the file")
 
 
 class Survey(Part):
@@ -194,6 +215,8 @@ class Case(Part):
     effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
+    frame: Frame | None = Field(default=None, description="where the grid lies on the map")
+    imported: tuple[ImportedFile, ...] | None = Field(default=None, description="files that `import` made it from")
     survey: Survey | None = Field(default=None, description="plant survey")
     numerics: Numerics = Field(default_factory=Numerics, description="choices of the solver")
     simulate: Simulate = Field(default_factory=Simulate, description="size and seed of the ensemble")

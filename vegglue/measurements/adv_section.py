@@ -7,10 +7,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
+from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.measurements.section_discharge import (
     GRID_STEP,
     CrossSection,
@@ -50,14 +52,14 @@ class Section:
     canopy_height: CanopyHeight | None
 
 
-def read_section(case: Case, observation: Observation) -> Section:
+def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> Section:
     """What one observation of `kind: adv` says about its section: points, verticals, discharge, canopy height.
 
-    Errors: InputError, naming file and row, for what cannot be used as given.
+    gauges: stations of measured levels. Errors: InputError, naming file and row, for what cannot be used as given.
     """
     points = _read_points(observation)
-    section = _cross_section(case, observation, points["x"].iloc[0])
-    points = _without_dead_probes(_with_errors(_placed(case, observation, points)), section)
+    section = _cross_section(case, observation, points["x"].iloc[0], gauges)
+    points = _without_dead_probes(_with_errors(_placed(case, observation, points, section.surface)), section)
     profiles = pd.DataFrame([_profile(group) for _, group in points.groupby("y")])
     good = profiles[profiles["used"]]
     error = neighbour_error(good["y"].to_numpy(), good["fitted"].to_numpy())
@@ -104,20 +106,59 @@ def _across(case: Case) -> Array:
     return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
 
 
+def across_averages(points: pd.DataFrame) -> pd.DataFrame:
+    """Depth average of v in each vertical and its standard error, columns value and standard_error [m/s].
+
+    Linear between points, zero at the bed, constant above the highest: no law says how secondary flow is spread.
+    points: rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
+    """
+    found = []
+    for _, group in points.groupby("y"):
+        wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"])]
+        column = _column(wet.assign(u=wet["v"])) if len(wet) else None
+        found.append(linear_average(column) if column is not None else (np.nan, np.nan))
+    return pd.DataFrame(found, columns=["value", "standard_error"])
+
+
 def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
-    """Bed level at x and each y in the datum of the file, in which the lowest bed of the section is `floor`."""
-    name = str(observation.experiment)
-    lowest = _local_bed(case, name, x, _across(case)).min()
-    return _local_bed(case, name, x, y) - lowest + float(observation.floor or 0.0)
+    """Bed level at x and each y in the datum of the file: in it the lowest bed of the section is `floor`, if given."""
+    return _in_the_file(case, observation, x, _local_bed(case, str(observation.experiment), x, y))
+
+
+def _in_the_file(case: Case, observation: Observation, x: float, level: Array) -> Array:
+    """A level of the model at x in z of the file [m]: the same without a `floor`."""
+    if observation.floor is None:
+        return level
+    return level - _local_bed(case, str(observation.experiment), x, _across(case)).min() + observation.floor
+
+
+def _surface(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> float:
+    """Water level at x in z of the file [m]: as given, else between the gauges of the experiment, else as expected."""
+    if observation.surface is not None:
+        return observation.surface
+    own = gauges[(gauges["experiment"] == observation.experiment) & (gauges["kind"] == WATER_LEVEL)]
+    if len(own):
+        along = own.groupby("x")["value"].mean()
+        level = float(np.interp(x, along.index.to_numpy(float), along.to_numpy(float)))
+    else:
+        level = _expected_level(case, str(observation.experiment), x)
+    return float(_in_the_file(case, observation, x, np.array(level)))
+
+
+def _expected_level(case: Case, experiment: str, x: float) -> float:
+    """z = z_out + max(z_floor(x) - z_floor(L), 0) [m]: parallel to the floor, as in channel_geometry.expected_depth."""
+    ends = (x, case.grid.x[1] - 0.5 * case.grid.cell[0])
+    here, outlet = (_local_bed(case, experiment, at, _across(case)).min() for at in ends)
+    return middle_value(case, case.experiments[experiment].level) + max(float(here - outlet), 0.0)
 
 
 def _local_bed(case: Case, experiment: str, x: float, y: Array) -> Array:
     return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP, centreline_in(case)), experiment)[0]
 
 
-def _cross_section(case: Case, observation: Observation, x: float) -> CrossSection:
+def _cross_section(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> CrossSection:
     y = _across(case)
-    return CrossSection(y, _bed(case, observation, x, y), float(observation.surface or 0.0))
+    return CrossSection(y, _bed(case, observation, x, y), _surface(case, observation, x, gauges))
 
 
 def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> NDArray[np.bool_]:
@@ -133,9 +174,9 @@ def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> N
     return result
 
 
-def _placed(case: Case, observation: Observation, points: pd.DataFrame) -> pd.DataFrame:
+def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface: float) -> pd.DataFrame:
     """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water."""
-    x, y, surface = points["x"].iloc[0], points["y"].to_numpy(), float(observation.surface or 0.0)
+    x, y = points["x"].iloc[0], points["y"].to_numpy()
     bed = _bed(case, observation, x, y)
     reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
     if (reason != "").all():

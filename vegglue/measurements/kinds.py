@@ -53,15 +53,15 @@ class Kind:
         return self.instrument == "probe"
 
 
-# Names of the two kinds whose errors are told in m/s and in m: velocities along x, and levels.
-STREAMWISE, WATER_LEVEL = "velocity", "level"
+# Names of the kinds that are asked for by name: velocities along x and along y, and levels.
+STREAMWISE, TRANSVERSE, WATER_LEVEL = "velocity", "velocity_across", "level"
 # Usual errors: 0.015 m/s for the mean of a vertical of ADV points, in any direction; 3 mm for a gauge read by eye;
 # 0.1 m3/s, 5 % of 2 m3/s, for a gauging by verticals.
 KINDS = {
     kind.name: kind
     for kind in (
         Kind(STREAMWISE, "velocity", "m/s", "u", "velocities.csv", "probe", True, 0.015),
-        Kind("velocity_across", "velocity across", "m/s", "v", "velocities_across.csv", "probe", True, 0.015),
+        Kind(TRANSVERSE, "velocity across", "m/s", "v", "velocities_across.csv", "probe", True, 0.015),
         Kind("speed", "speed", "m/s", "speed", "speeds.csv", "probe", True, 0.015),
         Kind(WATER_LEVEL, "level", "m", "level", "levels.csv", "gauge", False, 0.003),
         Kind("discharge", "discharge", "m3/s", "discharge", "discharges.csv", "section", False, 0.1),

@@ -10,9 +10,9 @@ from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
 from vegglue.case.size_limits import MOST_STATIONS
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.adv_section import Section, average_of, read_section
+from vegglue.measurements.adv_section import Section, across_averages, average_of, read_section
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
-from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
+from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
 from vegglue.site.centreline import along_and_across
@@ -73,6 +73,9 @@ def read_observations(case: Case) -> Observations:
     """
     sections: dict[Key, Section] = {}
     stations = []
+    gauges = _joined(
+        [_read_stations(case, one, kind_of(WATER_LEVEL)) for one in case.observations if one.kind == WATER_LEVEL]
+    )
     for observation in case.observations:
         if observation.kind == "adv":
             key = (str(observation.experiment), str(observation.section))
@@ -81,8 +84,10 @@ def read_observations(case: Case) -> Observations:
                     f"{shown_path(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
                     f"observations of it; take one out of the case."
                 )
-            sections[key] = read_section(case, observation)
+            sections[key] = read_section(case, observation, gauges)
             stations.append(_averaged(sections[key], observation))
+            if observation.across:
+                stations.append(_averaged_across(sections[key], observation))
         else:
             stations.append(_read_stations(case, observation, _kind_in(case, observation)))
     if (number := sum(map(len, stations))) > MOST_STATIONS:
@@ -139,6 +144,19 @@ def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
     if observation.standard_error is not None:
         error = pd.Series(observation.standard_error, index=profiles.index)
     return profiles.assign(kind=STREAMWISE, value=value, standard_error=error)[list(STATION_COLUMNS)]
+
+
+def _averaged_across(section: Section, observation: Observation) -> pd.DataFrame:
+    """Stations of velocity across from the points of the same verticals. Errors: InputError without a column v."""
+    if "v" not in section.points:
+        raise InputError(
+            f"{shown_path(observation.file)}, row 1: expected a column v for `across`, got none; add it, or take "
+            "`across` out of the observation."
+        )
+    averages = across_averages(section.points)
+    profiles = section.profiles.reset_index(drop=True).assign(kind=TRANSVERSE, value=averages["value"])
+    error = averages["standard_error"] if observation.standard_error is None else observation.standard_error
+    return profiles.assign(standard_error=error)[list(STATION_COLUMNS)]
 
 
 def _kind_in(case: Case, observation: Observation) -> Kind:

@@ -1,0 +1,60 @@
+"""Where a section says no floor and no surface, the bed of the case and the level measured or expected there hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reach import write_reach
+
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
+
+# Of the brook: a floor that falls by 0.001, and 0.95 m at the outlet, 30 m down.
+FLOOR_THERE, EXPECTED_THERE = -0.008, 0.95 + (0.0295 - 0.008)
+ADV = "{kind: adv, file: adv.csv, experiment: June, section: A, case: A, average: profile%s}"
+LEVELS = "  - {kind: level, file: levels.csv, experiment: June}\n"
+
+
+def section_at_8(folder: Path, more: str = "", levels: bool = False, header: str = "x,y,z,u,v") -> Case:
+    """The brook with ADV points at x = 8 m, z in the datum of the bed; v is a tenth of u."""
+    rows = [f"case,device,{header}"]
+    for y in (-1.0, -0.5, 0.0, 0.5, 1.0):
+        for z in (0.05, 0.2, 0.4, 0.6, 0.8):
+            u = 0.1 * np.log((z - FLOOR_THERE) / 0.002)
+            rows.append(f"A,ADV,8,{y},{z},{u:.6f}" + (f",{0.1 * u:.6f}" if "v" in header else ""))
+    (folder / "adv.csv").write_text("\n".join(rows), encoding="utf-8")
+    (folder / "levels.csv").write_text("x,y,level\n4,0,1.00\n12,0,0.98\n", encoding="utf-8")
+    line = "{kind: velocity, file: velocities.csv, experiment: June}"
+    config = write_reach(folder, (f"  - {line}\n", f"  - {ADV % more}\n" + (LEVELS if levels else "")))
+    return load_case(config)
+
+
+def test_the_bed_and_the_expected_level_hold(tmp_path: Path) -> None:
+    points = read_observations(section_at_8(tmp_path)).points
+    assert np.allclose(points["bed"], FLOOR_THERE)
+    assert np.allclose(points["depth"], EXPECTED_THERE - FLOOR_THERE, atol=1e-9)
+
+
+def test_measured_levels_hold_before_expected_ones(tmp_path: Path) -> None:
+    points = read_observations(section_at_8(tmp_path, levels=True)).points
+    assert np.allclose(points["depth"], 0.99 - FLOOR_THERE)
+
+
+def test_a_level_that_is_given_holds_before_all(tmp_path: Path) -> None:
+    points = read_observations(section_at_8(tmp_path, ", surface: 0.9", levels=True)).points
+    assert np.allclose(points["depth"], 0.9 - FLOOR_THERE)
+
+
+def test_velocities_across_are_averaged_like_those_along(tmp_path: Path) -> None:
+    table = read_observations(section_at_8(tmp_path, ", across: true")).table
+    along, across = (table[table["kind"] == kind] for kind in ("velocity", "velocity_across"))
+    assert len(along) == len(across) == 5
+    assert np.allclose(across["value"], 0.1 * along["value"], rtol=0.03), "linear below, a law of the wall above"
+    assert (across["standard_error"] > 0.0).all()
+
+
+def test_without_a_column_there_is_nothing_across(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected a column v for `across`"):
+        read_observations(section_at_8(tmp_path, ", across: true", header="x,y,z,u"))
