@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vegglue.case.config import load_case
+from vegglue.case.config import load_case, read_tree
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.errors import InputError
 
@@ -386,3 +386,9 @@ def test_several_inflows_each_need_their_discharge():
     assert "(one value, or one for each inflow [m3/s]) expected" in sentence(write(text))
     both = load_case(write(text.replace("discharge: 2.66", "discharge: {upstream: 2, side: 0.5}")))
     assert both.experiments["low"].discharge == {"upstream": 2.0, "side": 0.5}
+
+
+def test_a_word_that_begins_like_a_number_is_a_word(tmp_path):
+    path = tmp_path / "words.yaml"
+    path.write_text("sum: 9e6da5\nsmall: 1e-7\n", encoding="utf-8")
+    assert read_tree(path) == {"sum": "9e6da5", "small": 1e-7}

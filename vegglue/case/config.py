@@ -56,7 +56,7 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
         raise InputError(f"{shown_path(above[-1])}: `extends` goes round in a circle, {circle}: take one of them out.")
     if len(above) == LONGEST_CHAIN:
         raise InputError(f"{shown_path(path)}: `extends` names more than {LONGEST_CHAIN} files in a row: join some.")
-    tree = _read(path, above)
+    tree = read_tree(path, above)
     base = tree.pop("extends", None)
     layer = (path, _with_full_paths(tree, path.parent))
     if base is None:
@@ -66,7 +66,8 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
     return [layer, *_layers(path.parent / base, (*above, path))]
 
 
-def _read(path: Path, above: tuple[Path, ...]) -> Tree:
+def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
+    """Keys and values of a YAML file; above: the files whose `extends` led to it. Errors: InputError."""
     named = f"it is named by `extends` in {shown_path(above[-1])}, check the path" if above else "check the path"
     text = read_text(path, LARGEST_CONFIG, named)
     try:

@@ -14,7 +14,9 @@ from vegglue.errors import InputError, shown_path
 
 
 def import_command(
-    folder: Annotated[Path, typer.Argument(help="Folder with site.json, velocities.csv, levels.csv; or a known set.")],
+    folder: Annotated[
+        Path, typer.Argument(help="Folder with site.json or site.yaml and what was measured; or a known set.")
+    ],
     to: Annotated[
         Path | None, typer.Option(help="Config to write; configs/<folder>.yaml or <folder>.yaml if not given.")
     ] = None,
@@ -23,15 +25,20 @@ def import_command(
 ) -> None:
     """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
 
+    Tables may have any separator, units and names of columns: one line says what was taken from each.
+
     The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
     """
     case = vegglue.import_folder(folder, to)
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
+    imported = [one.model_dump() for one in case.imported or ()]
     if as_object:
         names = {"experiments": list(case.experiments), "patches": patches, "parameters": list(case.parameters)}
-        print_object({"config": target, "case": case.name, **names})
+        print_object({"config": target, "case": case.name, **names, "imported": imported})
         return
+    for one in case.imported or ():
+        print(f"{one.name}: {one.taken}.")
     print(
         f"{target}: {len(case.experiments)} experiment(s), {len(patches)} patches, "
         f"{len(case.parameters)} parameters with wide priors."

@@ -1,15 +1,16 @@
-"""A field team's folder -> a case: site.json and a file of each kind of observation, wide priors, sensible defaults.
+"""A field team's folder -> a case: a site file and its measurements, wide priors, sensible defaults.
 
-site.json says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at x = 0, y = 0 on
-the axis), patches (x, y, stems_per_m2), canopy_height_guess_m, eddy_viscosity_m2_s, and experiments (discharge_m3_s,
-downstream_level_m). What is not said there is left at the defaults below.
+site.json or site.yaml says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at
+x = 0, y = 0 on the axis) or bed (a survey; see surveyed_bed.py), patches (x, y, stems_per_m2, or a file of polygons),
+canopy_height_guess_m, eddy_viscosity_m2_s, experiments (discharge_m3_s, downstream_level_m), and, where needed, frame
+(site_file.py) and files (file_words.py). What is not said there is left at the defaults below.
 """
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
@@ -23,8 +24,10 @@ from vegglue.importers.config_parts import (
     observed,
     validated,
 )
-from vegglue.importers.site_file import Channel, MeasuredFlow, PlantedPatch, read_site
-from vegglue.measurements.kinds import KINDS
+from vegglue.importers.measured_files import MeasuredFiles, measured_files, named_from
+from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.site_file import Channel, FieldSite, MeasuredFlow, PlantedPatch, read_site, site_file
+from vegglue.importers.surveyed_bed import surveyed_bed
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
@@ -40,12 +43,44 @@ BY_EYE = 0.12
 def case_from_folder(folder: Path, target: Path) -> Tree:
     """The config, as keys and values, of the measurements in a folder; files are named relative to `target`.
 
-    Errors: InputError when site.json or every file of measurements is missing or says too little.
+    Errors: InputError when the site file or every file of measurements is missing or says too little.
     """
-    site = read_site(folder / "site.json")
+    site = read_site(site_file(folder))
+    frame = site.frame.frame if site.frame is not None else None
+    patches = _patches(folder, site.patches, frame)
+    used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
+    measured = measured_files(folder, target, site, frame, used)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
+        **_ground(folder, target, site, frame, measured),
+        "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
+        "outlet": {},
+        "eddy_viscosity": site.eddy_viscosity_m2_s,
+        "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
+        "parameters": dict(PARAMETERS),
+        "observations": measured.observations,
+        **FIRST_LOOK,
+    }
+    if site.bed is not None:
+        tree["parameters"].pop("k_s")
+    if site.holdout and (folder / "holdout.csv").is_file():
+        held_out = {name: _experiment(given) for name, given in site.holdout.items()}
+        tree |= validated(held_out, [observed("velocity", named_from(folder / "holdout.csv", target))])
+    if patches:
+        tree["plants"] = _plants(patches)
+        tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
+    kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
+    return tree | kept | ({"imported": measured.imported} if measured.imported else {})
+
+
+def _ground(folder: Path, target: Path, site: FieldSite, frame: Frame | None, measured: MeasuredFiles) -> Tree:
+    """Grid, bed and friction: of a survey, or of a straight channel by its numbers."""
+    if site.bed is not None or site.channel is None:
+        ground = surveyed_bed(folder, target, site, frame)
+        measured.imported.extend(ground.imported)
+        return ground.tree
+    return {
         "grid": _grid(site.channel, site.experiments),
         "bed": [{"trapezoid": _trapezoid(site.channel)}],
         "friction": {
@@ -53,21 +88,23 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
             "default": "bed",
             "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
         },
-        "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
-        "outlet": {},
-        "eddy_viscosity": site.eddy_viscosity_m2_s,
-        "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
-        "parameters": dict(PARAMETERS),
-        "observations": _observations(folder, target),
-        **FIRST_LOOK,
     }
-    if site.holdout and (folder / "holdout.csv").is_file():
-        held_out = {name: _experiment(given) for name, given in site.holdout.items()}
-        tree |= validated(held_out, [observed("velocity", _named(folder / "holdout.csv", target))])
-    if site.patches:
-        tree["plants"] = _plants(site.patches)
-        tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
-    return tree
+
+
+def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -> list[PlantedPatch]:
+    """The patches of a site file, and those of the files of polygons that it names."""
+    found: list[PlantedPatch] = []
+    for one in given:
+        if one.file is None:
+            found.append(one)
+            continue
+        if not (folder / one.file).is_file():
+            raise InputError(f"{shown_path(folder)}: `patches` names {one.file}, which is not there; correct it.")
+        for polygon in read_polygons(folder / one.file, frame):
+            density = polygon.density if polygon.density is not None else one.stems_per_m2
+            corners = tuple(polygon.corners)
+            found.append(PlantedPatch(name=polygon.name, polygon=corners, stems_per_m2=density))
+    return found
 
 
 PARAMETERS: Tree = {
@@ -115,29 +152,20 @@ def _experiment(given: MeasuredFlow) -> Tree:
 def _plants(patches: Sequence[PlantedPatch]) -> Tree:
     densest = max(patch.stems_per_m2 for patch in patches)
     stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
+    names = [case_name(patch.name or f"p{number}", f"p{number}") for number, patch in enumerate(patches, 1)]
     rows = [
         {
-            "name": f"p{number}",
+            "name": name if names.count(name) == 1 else f"{name}-{number}",
             "stand": "plants",
-            "x": list(patch.x),
-            "y": list(patch.y),
+            **_shape(patch),
             "stems": patch.stems_per_m2,
         }
-        for number, patch in enumerate(patches, 1)
+        for number, (name, patch) in enumerate(zip(names, patches, strict=True), 1)
     ]
     return {"stands": {"plants": stand}, "patches": rows}
 
 
-def _observations(folder: Path, target: Path) -> list[Tree]:
-    found = []
-    for kind in KINDS.values():
-        if (folder / kind.file).is_file():
-            found.append(observed(kind.name, _named(folder / kind.file, target)))
-    if not found:
-        files = ", ".join(kind.file for kind in KINDS.values())
-        raise InputError(f"{shown_path(folder)}: expected one of {files}, got none; put what was measured there.")
-    return found
-
-
-def _named(file: Path, target: Path) -> str:
-    return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
+def _shape(patch: PlantedPatch) -> Tree:
+    if patch.polygon is not None:
+        return {"polygon": [list(corner) for corner in patch.polygon]}
+    return {"x": list(patch.x or ()), "y": list(patch.y or ())}

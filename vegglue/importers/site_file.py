@@ -1,16 +1,21 @@
-"""site.json of a field team, read and checked whole: what stands there, in which unit, and between which bounds."""
+"""The site file of a field team, read and checked whole: what stands there, in which unit, between which bounds."""
 
 import json
+import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from vegglue.case.config import read_tree
+from vegglue.case.frame import Frame
 from vegglue.case.messages import dotted
-from vegglue.case.parts import Interval, Number
+from vegglue.case.parts import Interval, Number, Polygon, Positive
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.unit_words import UNITS, in_si
 
 
 def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
@@ -23,6 +28,21 @@ def _printable(name: str) -> str:
     if (sign := unprintable(name)) is not None:
         raise ValueError(f"a name without the sign {sign!a}")
     return name
+
+
+def _with_unit(quantity: str) -> Callable[[Any], Any]:
+    """A text such as `42 l/s` as a number in SI; what is no text is left to the checks of numbers."""
+
+    def converted(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return in_si(value, quantity, "")
+        except InputError:
+            units = f" with a unit among {', '.join(UNITS[quantity])}" if any(map(str.isdigit, value)) else ""
+            raise ValueError(f"a number{units}") from None
+
+    return converted
 
 
 # Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
@@ -47,42 +67,137 @@ class Channel(_Said):
 
 
 class PlantedPatch(_Said):
-    """A rectangle of plants."""
+    """A rectangle of plants, or a polygon, in the channel; or a file of polygons."""
 
+    x: Interval | None = None
+    y: Interval | None = None
+    polygon: Polygon | None = None
+    file: PrintableName | None = None
+    name: PrintableName | None = None
+    stems_per_m2: Annotated[Number, Field(gt=0, le=1e7)] = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_shape(cls, given: Any) -> Any:
+        """Errors: ValidationError of a rectangle that lacks a side, unless it is another shape."""
+        if isinstance(given, dict) and not given.keys() & {"polygon", "file"}:
+            _Rectangle.model_validate(given)
+        return given
+
+
+class _Rectangle(_Said):
     x: Interval
     y: Interval
-    stems_per_m2: Annotated[Number, Field(gt=0, le=1e7)] = 1.0
 
 
 class MeasuredFlow(_Said):
-    """One experiment."""
+    """One experiment; its numbers may go by the names without a unit, and then hold one, such as 42 l/s."""
 
-    discharge_m3_s: Annotated[Number, Field(gt=0, le=1e6)]
-    downstream_level_m: Level
+    discharge_m3_s: Annotated[Number, BeforeValidator(_with_unit("discharge")), Field(gt=0, le=1e6)]
+    downstream_level_m: Annotated[Level, BeforeValidator(_with_unit("length"))]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_either_name(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        names = {"discharge": "discharge_m3_s", "level": "downstream_level_m"}
+        return {long: given[short] for short, long in names.items() if short in given} | given
+
+
+class FileOfSite(_Said):
+    """A file of the folder; what else stands there is told to its reader."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    file: PrintableName
+
+
+class SiteGrid(_Said):
+    """The grid of the model, where it is not made of the channel or the survey; SI."""
+
+    x: Interval
+    y: Interval
+    cell: tuple[Positive, Positive]
+
+
+class SiteFrame(_Said):
+    """Where the model lies on the map: its origin, and the angle of its x axis or a point further down that axis."""
+
+    origin: tuple[Number, Number]
+    angle: Annotated[Number, BeforeValidator(_with_unit("angle"))] | None = None
+    towards: tuple[Number, Number] | None = None
+    crs: PrintableName | None = None
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if (self.angle is None) == (self.towards is None):
+            raise ValueError("either `angle` or `towards: [east, north]`")
+        return self
+
+    @property
+    def frame(self) -> Frame:
+        """As a case keeps it."""
+        angle = self.angle
+        if self.towards is not None:
+            east, north = (end - begin for end, begin in zip(self.towards, self.origin, strict=True))
+            angle = round(math.degrees(math.atan2(north, east)), 6)
+        return Frame(origin=self.origin, angle=angle or 0.0, crs=self.crs)
+
+
+def _as_list(given: Any) -> Any:
+    """A single file of patches as a list of one."""
+    return [given] if isinstance(given, dict) else given
 
 
 class FieldSite(_Said):
-    """All that site.json says; SI."""
+    """All that a site file says; SI."""
 
-    channel: Channel
+    channel: Channel | None = None
+    bed: FileOfSite | None = None
+    grid: SiteGrid | None = None
+    frame: SiteFrame | None = None
+    classes: FileOfSite | None = None
+    files: dict[PrintableName, dict[str, Any] | None] = {}
     experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
     holdout: dict[PrintableName, MeasuredFlow] = {}
-    patches: tuple[PlantedPatch, ...] = ()
+    patches: Annotated[tuple[PlantedPatch, ...], BeforeValidator(_as_list)] = ()
     canopy_height_guess_m: Annotated[Number, Field(ge=0.01, le=100)] = 0.8
     eddy_viscosity_m2_s: Annotated[Number, Field(gt=0, le=1e3)] = 0.01
+
+    @model_validator(mode="before")
+    @classmethod
+    def _some_ground(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "bed" not in given:
+            _Ground.model_validate(given)
+        return given
+
+
+class _Ground(_Said):
+    channel: Channel
+
+
+def site_file(folder: Path) -> Path:
+    """The site file of a folder: site.yaml if it is there, else site.json, which need not be."""
+    return folder / "site.yaml" if (folder / "site.yaml").is_file() else folder / "site.json"
 
 
 def read_site(path: Path) -> FieldSite:
     """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
-    text = read_text(path, LARGEST_CONFIG, "a folder to import has one")
     try:
-        return FieldSite.model_validate(json.loads(text))
+        return FieldSite.model_validate(read_tree(path) if path.suffix == ".yaml" else _of_json(path))
+    except InputError:
+        raise
     except ValidationError as error:
         raise InputError(f"{shown_path(path)}: {_sentence(error)}") from None
     except RecursionError:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except ValueError as error:
         raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
+
+
+def _of_json(path: Path) -> Any:
+    return json.loads(read_text(path, LARGEST_CONFIG, "a folder to import has one"))
 
 
 def _sentence(error: ValidationError) -> str:

@@ -10,11 +10,12 @@ from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
+from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None) -> Case:
-    """Make a case of a folder of measurements: site.json, velocities.csv and levels.csv, or a published set.
+    """Make a case of a folder of measurements: site.json or site.yaml and tables, or a published set.
 
     to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
     makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. Errors: InputError for what is
@@ -22,6 +23,8 @@ def import_folder(folder: Path | str, to: Path | str | None = None) -> Case:
     """
     folder = Path(folder)
     target = _default_target(folder) if to is None else Path(to)
+    if (of_matlab := mat_folder(folder)) is not None and not holds_confluence(folder):
+        folder = tables_of_mat(of_matlab, target.with_name(f"{target.stem}-data") / "tables")
     if holds_confluence(folder):
         _write_config(target, folder, case_from_confluence(folder, target))
         _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target))

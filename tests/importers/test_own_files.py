@@ -1,0 +1,189 @@
+"""Files as people have them become a case: what is in them is found, converted, turned, and told in one line each."""
+
+from math import cos, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reach import said_to
+
+import vegglue
+from vegglue.case.frame import Frame
+from vegglue.errors import InputError
+from vegglue.importers.column_names import role_of
+from vegglue.importers.file_words import FileWords, file_words
+from vegglue.importers.loose_table import read_loosely
+from vegglue.importers.measured_rows import read_rows
+from vegglue.importers.unit_words import in_si, unit_named
+from vegglue.measurements.observations import read_observations
+
+CHANNEL = "channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
+JUNE = "experiments: {June: {discharge: 2000 l/s, level: 95 cm}}\n"
+FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)
+
+
+def folder_of(path: Path, site: str, **files: str) -> Path:
+    """A folder of measurements; names of files with __ for the point."""
+    path.mkdir()
+    (path / "site.yaml").write_text(site, encoding="utf-8")
+    for name, text in files.items():
+        (path / name.replace("__", ".")).write_text(text, encoding="utf-8")
+    return path
+
+
+def survey_on_the_map() -> str:
+    """Velocities of 0.4 m/s along and 0.02 across, as a logger of a German office writes them."""
+    turn = radians(FRAME.angle)
+    east, north = (0.4 * cos(turn) - 0.02 * sin(turn), 0.4 * sin(turn) + 0.02 * cos(turn))
+    lines = ["Mill brook, 3 June", "# probe 2", "Pt;Easting;Northing;Ve;Vn", "-;m;m;cm/s;cm/s"]
+    for number, (x, y) in enumerate([(8, -1), (8, 0), (20, -1), (20, 1)]):
+        place = FRAME.to_map(x, y)
+        fields = (*(f"{one:.3f}" for one in place), f"{100 * east:.3f}", f"{100 * north:.3f}")
+        lines.append(";".join([str(number), *(field.replace(".", ",") for field in fields)]))
+    return "\n".join([*lines, "9;683120,000;247480,000;-999;-999"])
+
+
+def test_a_table_on_the_map_in_other_units_becomes_stations(tmp_path: Path) -> None:
+    site = (
+        CHANNEL + JUNE + "frame: {origin: [683120, 247480], angle: 32}\nfiles: {adv__csv: {standard_error: 1 cm/s}}\n"
+    )
+    folder = folder_of(tmp_path / "Brook", site.replace("__", "."), adv__csv=survey_on_the_map())
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    table = read_observations(case).table
+    along = table[table["kind"] == "velocity"]
+    assert np.allclose(along[["x", "y"]], [(8, -1), (8, 0), (20, -1), (20, 1)], atol=0.002)
+    assert np.allclose(along["value"], 0.4, atol=1e-4)
+    assert np.allclose(table[table["kind"] == "velocity_across"]["value"], 0.02, atol=1e-4)
+    assert set(table["standard_error"]) == {0.01}
+    assert case.experiments["June"].discharge == {"upstream": 2.0}
+    assert case.experiments["June"].level == pytest.approx(0.95)
+    assert case.frame == FRAME
+    assert case.imported is not None
+    taken = case.imported[0].taken
+    for word in (
+        "semicolons",
+        "decimal comma",
+        "1 comment line",
+        "a row of units",
+        "1 mark for no value in Ve",
+        "Easting",
+    ):
+        assert word in taken
+    assert case.imported[0].units["east_velocity"] == "cm/s"
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("x,y,u\n1,2,0.5\n3,4,0.6\n", 2),
+        ("x;y;u\n1,5;2,5;0,5\n3,5;4,5;0,6\n", 2),
+        ("X [ft]\tY [ft]\tVelocity [ft/s]\n1\t2\t0.5\n3\t4\t0.6\n", 2),
+        ("% made by hand\n\nx y u\nm m m/s\n1 2 .5\n3 4 .6\n5 6 NaN\n", 3),
+        ('"x","y","u_m_s"\n"1","2","0.5"\n', 1),
+        ("x (m) | y (m) | u (mm/s)\n1 | 2 | 500\n3 | 4 | 600\n", 2),
+    ],
+)
+def test_separators_decimals_and_units_are_told(tmp_path: Path, text: str, rows: int) -> None:
+    path = tmp_path / "table.txt"
+    path.write_text(text, encoding="utf-8")
+    taken = read_rows(path, FileWords())
+    assert set(taken.numbers) == {"x", "y", "u"}
+    assert taken.size == rows
+    foot = 0.3048 if "ft" in text else 1.0
+    assert taken.numbers["u"][0] == pytest.approx(0.5 * foot)
+    assert taken.numbers["x"][0] == pytest.approx((1.5 if "1,5" in text else 1.0) * foot)
+
+
+def test_a_workbook_is_read_like_a_table(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Brook"], ["Station x", "y", "u"], ["m", "m", "cm/s"], [1, 2, 50], [3, 4, 60.5]):
+        book.active.append(row)
+    book.save(tmp_path / "book.xlsx")
+    taken = read_rows(tmp_path / "book.xlsx", FileWords(columns={"x": "Station x"}))
+    assert taken.numbers["u"].tolist() == [0.5, 0.605]
+    with pytest.raises(InputError, match="expected the sheet 'June', got Sheet"):
+        read_loosely(tmp_path / "book.xlsx", "June")
+
+
+def test_repeats_give_their_mean_and_its_error(tmp_path: Path) -> None:
+    rows = "".join(f"9,0.5,{u}\n" for u in (0.40, 0.42, 0.44))
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, runs__csv=f"x,y,vel\n{rows}12,0.5,0.41\n")
+    table = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+    assert table["value"].tolist() == pytest.approx([0.42, 0.41])
+    assert table["standard_error"].iloc[0] == pytest.approx(0.02 / 3**0.5, rel=1e-4)
+    assert np.isnan(table["standard_error"].iloc[1])
+
+
+def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
+    entry = "files: {a.csv: {columns: {u: V1, x: P}, units: {u: ft/s}, flip: [x], missing: [-1], section: A}}\n"
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + entry, a__csv="P,y,V1\n-4,0,-1.0\n-6,0,-2.0\n-8,0,-1\n")
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert case.imported[0].columns == {"x": "P", "y": "y", "u": "V1"}
+    assert case.imported[0].units["u"] == "ft/s"
+    table = read_observations(case).table
+    assert table[["x", "value", "section"]].to_numpy().tolist() == [[6.0, 0.6096, "A"]]
+
+
+@pytest.mark.parametrize(
+    ("site", "table", "said"),
+    [
+        ("files: {b.csv: {}}", "x,y,u\n1,2,3\n", "`files` names b.csv, which is not there"),
+        ("files: {a.csv: {colums: {}}}", "x,y,u\n1,2,3\n", "does not know `colums`: did you mean `columns`?"),
+        ("files: {a.csv: {columns: {u: V9}}}", "x,y,u\n1,2,3\n", "expected the column 'V9' for u, got x, y, u"),
+        ("files: {a.csv: {units: {u: furlong}}}", "x,y,u\n1,2,3\n", "expected a unit of velocity, got 'furlong'"),
+        ("", "x,y,u [m3]\n1,2,3\n", "is headed 'm3', which is no unit of velocity"),
+        ("", "a,b\n1,2\n", "expected columns that can be told by their names, got a, b"),
+        ("", "y,u\n1,2\n", "expected a column of x, got none"),
+        ("", "x,y,u\n1,2,3\n1,2,fast\n4,5,6\n", "row 3: expected a number in column u, got 'fast'"),
+        ("frame: {origin: [1, 2]}", "x,y,u\n1,2,3\n", "either `angle` or `towards: [east, north]`"),
+    ],
+)
+def test_what_cannot_be_taken_is_said_in_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    site: str,
+    table: str,
+    said: str,
+) -> None:
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + site + "\n", a__csv=table.replace(",", ";"))
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "brook.yaml")
+    assert code == 2
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_words_for_units_and_columns() -> None:
+    assert unit_named("cm s^-1", "velocity") == "cm/s"
+    assert unit_named("m³/s", "discharge") == "m3/s"
+    assert unit_named("cfs", "discharge") == "ft3/s"
+    assert unit_named("feet", "length") == "ft"
+    assert unit_named("m", "velocity") is None
+    assert in_si("42 l/s", "discharge", "Q") == pytest.approx(0.042)
+    assert role_of("U_depthavg_ms") == ("u", "m/s")
+    assert role_of("Water level [cm]") == ("level", "cm")
+    assert role_of("Mean Vel. (ft/s)") == ("u", "ft/s")
+    assert role_of("remark") is None
+    assert role_of("Water Surface Type") is None
+
+
+def test_a_frame_turns_there_and_back() -> None:
+    x, y = FRAME.to_model(*FRAME.to_map(12.5, -3.0))
+    assert (x, y) == pytest.approx((12.5, -3.0))
+    assert FRAME.to_map(0.0, 0.0) == FRAME.origin
+    north = Frame(origin=(0.0, 0.0), angle=90.0)
+    assert north.to_map(10.0, 0.0) == pytest.approx((0.0, 10.0))
+    assert north.turned_to_model(0.0, 1.0) == pytest.approx((1.0, 0.0))
+
+
+def test_directions_with_speeds_become_components(tmp_path: Path) -> None:
+    """A speed that heads east-north-east, 58 degrees from north, runs along a channel at 32 degrees from east."""
+    (tmp_path / "a.csv").write_text("easting;northing;speed;direction\n683130;247480;50;58\n", encoding="utf-8")
+    from vegglue.importers.measured_rows import in_the_channel
+
+    words = file_words({"units": {"speed": "cm/s"}}, "a")
+    taken = in_the_channel(read_rows(tmp_path / "a.csv", words), FRAME, words)
+    assert taken.numbers["u"][0] == pytest.approx(0.5)
+    assert taken.numbers["v"][0] == pytest.approx(0.0, abs=1e-9)

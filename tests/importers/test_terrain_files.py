@@ -1,0 +1,147 @@
+"""Beds and polygons from files, on the map or along the channel, arrive at their place with their levels."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vegglue
+from vegglue.arrays import Array
+from vegglue.case.frame import Frame
+from vegglue.errors import InputError
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.terrain_files import read_geotiff, read_terrain
+from vegglue.site.gridded_site import build_site
+
+FRAME = Frame(origin=(5000.0, 2000.0), angle=30.0)
+# Of the tags of a GeoTIFF: size of a pixel, where its first corner lies, and what stands for no level.
+SCALE, TIE, NOTHING = 33550, 33922, 42113
+
+
+def plane(x: Array, y: Array) -> Array:
+    """A bed that falls along the channel and rises to its left."""
+    return 3.0 - 0.01 * x + 0.05 * y
+
+
+def levels_on_the_map() -> tuple[Array, Array, Array]:
+    """East, north and level of a square of 100 m that holds a channel of 40 m by 10 m at 30 degrees."""
+    east, north = 4980.0 + np.arange(0.0, 100.0, 1.0), 1980.0 + np.arange(0.0, 100.0, 1.0)
+    level = plane(*FRAME.to_model(east[:, None], north[None, :]))
+    return east, north, level
+
+
+def write_geotiff(path: Path) -> None:
+    tifffile = pytest.importorskip("tifffile")
+    east, north, level = levels_on_the_map()
+    corner = (0.0, 0.0, 0.0, east[0] - 0.5, north[-1] + 0.5, 0.0)
+    values = level.T[::-1].astype(np.float64)
+    values[-1, -1] = -9999.0
+    tags = [(SCALE, "d", 3, (1.0, 1.0, 0.0), True), (TIE, "d", 6, corner, True), (NOTHING, "s", 0, "-9999", True)]
+    tifffile.imwrite(path, values, extratags=tags)
+
+
+def write_ascii(path: Path) -> None:
+    east, north, level = levels_on_the_map()
+    head = [f"ncols {east.size}", f"nrows {north.size}", f"xllcenter {east[0]}", f"yllcenter {north[0]}", "cellsize 1"]
+    path.write_text("\n".join([*head, *(" ".join(f"{one:.8f}" for one in row) for row in level.T[::-1])]), "utf-8")
+
+
+def write_xyz(path: Path) -> None:
+    """Scattered points without a heading, as a surveyor's total station gives them."""
+    x, y = np.random.default_rng(1).uniform((-2.0, -7.0), (42.0, 7.0), (900, 2)).T
+    rows = zip(*FRAME.to_map(x, y), plane(x, y), strict=True)
+    path.write_text("\n".join(" ".join(f"{one:.6f}" for one in row) for row in rows), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "words"),
+    [
+        ("bed.tif", write_geotiff, FileWords()),
+        ("bed.asc", write_ascii, FileWords()),
+        ("bed.xyz", write_xyz, FileWords(columns={"x": "1", "y": "2", "z": "3"})),
+    ],
+)
+def test_a_bed_on_the_map_is_read_along_the_channel(tmp_path: Path, name: str, write, words: FileWords) -> None:
+    write(tmp_path / name)
+    terrain = read_terrain(tmp_path / name, FRAME, words, sections=False)
+    x, y = np.array([1.0, 20.0, 39.0]), np.array([-4.0, 0.3, 4.0])
+    assert np.allclose(terrain.level(x, y), plane(x, y), atol=1e-6)
+    assert np.isnan(terrain.level(np.array([500.0]), np.array([0.0]))).all()
+
+
+def test_a_geotiff_knows_where_it_has_no_level(tmp_path: Path) -> None:
+    write_geotiff(tmp_path / "bed.tif")
+    raster = read_geotiff(tmp_path / "bed.tif")
+    assert np.isnan(raster.values).sum() == 1
+    assert np.isnan(raster.values[-1, 0]), "in the south-east"
+    (tmp_path / "none.tif").write_bytes(b"II*\x00 nothing of the kind")
+    with pytest.raises(InputError, match=r"none\.tif cannot be read as a GeoTIFF"):
+        read_geotiff(tmp_path / "none.tif")
+
+
+def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> None:
+    """A V whose lowest point moves from the left third to the right third: so it does half-way in between."""
+    rows = ["x,y,z"]
+    for x, lowest in ((0.0, 2.0), (20.0, -2.0)):
+        rows += [f"{x},{y},{z}" for y, z in ((-5, 1.0 - x / 100), (lowest, -x / 100), (5, 1.0 - x / 100))]
+    (tmp_path / "sections.csv").write_text("\n".join(rows), encoding="utf-8")
+    terrain = read_terrain(tmp_path / "sections.csv", None, FileWords(), sections=True)
+    assert terrain.level(np.array([0.0, 20.0]), np.array([2.0, -2.0])) == pytest.approx([0.0, -0.2])
+    assert terrain.level(np.array([10.0, 10.0]), np.array([-5.0, 5.0])) == pytest.approx([0.9, 0.9])
+    left, middle, right = terrain.level(np.full(3, 10.0), np.array([-2.0, 0.0, 2.0]))
+    assert left == pytest.approx(right, abs=1e-9)
+    assert middle < 0.5
+    assert np.isnan(terrain.level(np.array([10.0]), np.array([6.0]))).all()
+
+
+def patches_on_the_map(path: Path) -> None:
+    corners = [FRAME.to_map(*corner) for corner in ((12, 0), (16, 0), (16, 2), (12, 2), (12, 0))]
+    feature = {"type": "Feature", "properties": {"name": "Willows", "stems": 22}}
+    feature["geometry"] = {"type": "Polygon", "coordinates": [corners]}
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}), encoding="utf-8")
+
+
+def test_a_site_of_survey_and_polygons_becomes_a_case(tmp_path: Path) -> None:
+    folder = tmp_path / "Reach"
+    folder.mkdir()
+    write_geotiff(folder / "dtm.tif")
+    patches_on_the_map(folder / "patches.geojson")
+    (folder / "u.csv").write_text("x;y;u\n10;0;0.5\n", encoding="utf-8")
+    (folder / "site.yaml").write_text(
+        "frame: {origin: [5000, 2000], towards: [5008.6602540378, 2005]}\nbed: {file: dtm.tif}\n"
+        "grid: {x: [0, 40], y: [-5, 5], cell: [1.0, 0.5]}\npatches: {file: patches.geojson}\n"
+        "experiments: {June: {discharge: 8, level: 3.6}}\nfiles: {u.csv: {coordinates: channel}}\n",
+        encoding="utf-8",
+    )
+    case = vegglue.import_folder(folder, tmp_path / "reach.yaml")
+    site = build_site(case)
+    assert np.allclose(site.bed, plane(site.grid.x[:, None], site.grid.y[None, :]), atol=1e-3)
+    assert (site.patch >= 0).sum() == 4 * 4, "4 m by 2 m in cells of 1 m by 0.5 m"
+    assert case.plants.patches[0].stems == 22.0
+    assert case.frame is not None
+    assert case.frame.angle == pytest.approx(30.0)
+
+
+def test_polygons_of_a_shapefile_are_those_of_geojson(tmp_path: Path) -> None:
+    shapefile = pytest.importorskip("shapefile")
+    with shapefile.Writer(str(tmp_path / "patches.shp")) as writer:
+        writer.field("NAME", "C")
+        writer.field("STEMS", "N", decimal=1)
+        writer.poly([[list(FRAME.to_map(*corner)) for corner in ((12, 0), (12, 2), (16, 2), (16, 0), (12, 0))]])
+        writer.record("Willows", 22.0)
+    (found,) = read_polygons(tmp_path / "patches.shp", FRAME)
+    patches_on_the_map(tmp_path / "patches.geojson")
+    (same,) = read_polygons(tmp_path / "patches.geojson", FRAME)
+    assert (found.name, found.density) == (same.name, same.density) == ("Willows", 22.0)
+    assert np.allclose(sorted(found.corners), sorted(same.corners))
+
+
+def test_degrees_are_refused_where_the_frame_is_in_metres(tmp_path: Path) -> None:
+    text = json.dumps(
+        {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[8, 47], [8, 48], [9, 47]]]}}
+    )
+    (tmp_path / "a.geojson").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="got degrees; save it in the projected system"):
+        read_polygons(tmp_path / "a.geojson", FRAME)

@@ -1,0 +1,91 @@
+"""Exports of instruments, built to the description of each format: no measurement, and nobody's file."""
+
+import numpy as np
+
+FOOT = 0.3048
+
+
+def flowtracker(places: list[float], depths: list[float], velocities: list[float]) -> str:
+    """A FlowTracker .dis in English units: settings, then the table of stations, one point at 0.6 of the depth each."""
+    lines = [
+        "",
+        "File_Name                        TEST.dis",
+        "Start_Date_and_Time              2020/06/03 10:28:00",
+        "Sensor_Type                      FlowTracker_Handheld_ADV",
+        "Unit_System                      English Units",
+        "",
+        "St  Clock     Loc  Depth   IceD %Dep  MeasD Npts Spike     Vel   SNR Angle    Verr Bnd    Temp CorrFact MeanV",
+        "()     ()     (ft)   (ft)  (ft) (*D)   (ft)   ()    ()   (ft/s)  (dB) (deg)  (ft/s)  ()  (degC)    ()  (ft/s)",
+    ]  # fmt: skip
+    for number, (at, depth, u) in enumerate(zip(places, depths, velocities, strict=True)):
+        at, depth, u = at / FOOT, depth / FOOT, u / FOOT
+        lines.append(
+            f"{number:02d}  10:{28 + number}  {at:7.2f} {depth:6.2f}  0.000  0.6 {0.4 * depth:6.2f}  40   1 {u:7.3f}"
+            f"  11.9    2   0.020   0   14.50  1.00 {u:7.3f}"
+        )
+    return "\n".join(lines)
+
+
+def riversurveyor(places: list[float], depths: list[float], velocities: list[float]) -> str:
+    """A .dis of RiverSurveyor Stationary Live in English units: settings, then a table by tabs."""
+    lines = [
+        "Discharge Measurement Summary", "Date Measured:Wednesday, June 3, 2020", "", "System Information",
+        "System Type;RS-M9", "", "Units", "Distance; ft", "Velocity; ft/s", "Discharge; cfs", "", "Measurement Results",
+        "\t".join(("#", "Time", "Location", "Water Surface Type", "Temperature", "Depth", "Flow Angle", "Mean Velocity",
+                   "Area", "Station Q", "% Measured", "")),
+    ]  # fmt: skip
+    for number, (at, depth, u) in enumerate(zip(places, depths, velocities, strict=True), 1):
+        numbers = (
+            f"{at / FOOT:.2f}",
+            "Open Water",
+            "14.0",
+            f"{depth / FOOT:.2f}",
+            "-4.0",
+            f"{u / FOOT:.3f}",
+            "1",
+            "1",
+            "5",
+        )
+        lines.append("\t".join((str(number), "12:52:49 PM", *numbers, "")))
+    return "\n".join([*lines, "", "Comments; "])
+
+
+def winriver(east: np.ndarray, north: np.ndarray, depth: float, velocity: tuple[float, float], noise: float) -> str:
+    """Classic ASCII output of WinRiver II: a boat at (east, north) of its start, a power law in cells of 0.1 m."""
+    random, cells = np.random.default_rng(3), np.arange(0.3, 0.9 * depth, 0.1)
+    lines = ["Test transect", "made to the format", f"10 25 15 {cells.size} 1 100 1"]
+    for number, (x, y) in enumerate(zip(east, north, strict=True), 1):
+        lines += [
+            f"20 6 3 10 28 {number % 60} 0 {number} 1 0.5 -0.3 120.0 14.5",
+            f"-3.0 10.0 0.1 0.2 0 0 0 0 {depth} {depth} {depth} {depth}",
+            f"{np.hypot(x, y):.2f} {number * 1.0} {y:.3f} {x:.3f} {np.hypot(x, y):.3f}",
+            "30000 30000 -32768 -32768 0",
+            "1.0 0.2 0.1 0 0 0 0 0.3 1.2",
+            f"{cells.size} cm BT dB 0.43 0.139",
+        ]
+        for place in cells:
+            shape = 7.0 / 6.0 * ((depth - place) / depth) ** (1.0 / 6.0)
+            ve, vn = (100.0 * (shape * one + noise * random.standard_normal()) for one in velocity)
+            bad = number == 5 and place == cells[0]
+            row = "-32768 -32768 -32768 -32768" if bad else f"{np.hypot(ve, vn):.2f} 90.0 {ve:.2f} {vn:.2f}"
+            lines.append(f"{place:.2f} {row} 0.5 0.2 80 80 80 80 100 0.01")
+    return "\n".join(lines)
+
+
+def vectrino(mean: tuple[float, float, float], sd: float, samples: int, bad: int) -> str:
+    """Samples of a Vectrino: the first `bad` of them of low correlation and no sense."""
+    random = np.random.default_rng(5)
+    lines = []
+    for number in range(samples):
+        u, v, w = (one + sd * random.standard_normal() for one in mean)
+        if number < bad:
+            u = -3.0
+        correlation = 30 if number < bad else 95
+        lines.append(
+            f"{number / 25:.4f} {number} 0 {u:.4f} {v:.4f} {w:.4f} {w:.4f} 100 100 100 100 20 20 20 20 "
+            + " ".join([str(correlation)] * 4)
+        )
+    return "\n".join(lines)
+
+
+VECTRINO_HEADING = "[run.vno]\nNumber of measurements            1000\nSampling rate                         25 Hz\n"

@@ -1,0 +1,95 @@
+"""Names of columns, as people write them, and what stands in them: its role, its quantity, its unit."""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+
+from vegglue.importers.unit_words import unit_named
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a column may hold. quantity: that of its unit, '' for words; names: how it is usually headed."""
+
+    name: str
+    quantity: str
+    names: tuple[str, ...]
+
+
+# Told apart from one another by their whole name, so that none of these is ambiguous. East and north components are
+# roles of their own: they turn with the map.
+ROLES = {
+    role.name: role
+    for role in (
+        Role("x", "length", ("x", "easting", "east", "e", "x coordinate", "x coord", "rechtswert", "utm x", "utm e",
+                             "chainage", "distance downstream", "distance along", "streamwise distance")),
+        Role("y", "length", ("y", "northing", "north", "n", "y coordinate", "y coord", "hochwert", "utm y", "utm n",
+                             "offset", "distance across", "lateral distance", "cross stream distance")),
+        Role("z", "length", ("z", "elevation", "elev", "altitude", "hohe", "bed level", "z bed", "zb", "bed elevation",
+                             "alt", "rl")),
+        Role("u", "velocity", ("u", "vx", "ux", "u mean", "mean u", "umean", "velocity", "vel", "mean velocity",
+                               "mean vel", "meanv", "velocity x", "vel x", "x velocity", "streamwise velocity",
+                               "u velocity", "geschwindigkeit", "vitesse", "u depthavg", "u avg", "depth averaged u")),
+        Role("v", "velocity", ("v", "vy", "uy", "v mean", "mean v", "vmean", "velocity y", "vel y", "y velocity",
+                               "transverse velocity", "lateral velocity", "v velocity", "v depthavg", "v avg",
+                               "depth averaged v", "cross stream velocity")),
+        Role("east_velocity", "velocity", ("ve", "v e", "vel e", "u east", "east velocity", "velocity east",
+                                           "vel east", "veast", "eastward velocity", "mean vel e")),
+        Role("north_velocity", "velocity", ("vn", "v n", "vel n", "v north", "north velocity", "velocity north",
+                                            "vel north", "vnorth", "northward velocity", "mean vel n")),
+        Role("w", "velocity", ("w", "vz", "uz", "w mean", "mean w", "velocity z", "vel z", "vertical velocity")),
+        Role("speed", "velocity", ("speed", "magnitude", "velocity magnitude", "vmag", "vel mag", "magn",
+                                   "mean speed")),
+        Role("direction", "angle", ("direction", "dir", "flow direction", "velocity direction", "azimuth")),
+        Role("level", "length", ("level", "water level", "wse", "water surface", "water surface elevation", "stage",
+                                 "ws", "wl", "wasserstand", "wasserspiegel", "z ws", "waterlevel", "gauge height")),
+        Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q")),
+        Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
+                                  "standard error", "se", "verr")),
+        Role("v_se", "velocity", ("v se", "se v", "v error", "v uncertainty")),
+        Role("speed_se", "velocity", ("speed se", "speed uncertainty")),
+        Role("level_se", "length", ("level se", "se level", "level error", "level uncertainty")),
+        Role("discharge_se", "discharge", ("discharge se", "se discharge", "discharge uncertainty", "q se")),
+        Role("u_std", "velocity", ("u std", "std u", "u rms", "rms u", "u sd", "sd u", "std", "urms")),
+        Role("duration_s", "time", ("duration", "duration s", "sampling time", "record length", "averaging time")),
+        Role("tape", "length", ("loc", "location", "tape", "distance from bank", "distance", "dist")),
+        Role("depth", "length", ("depth", "h", "water depth", "tiefe", "wassertiefe")),
+        Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil")),
+        Role("experiment", "", ("experiment", "run", "test", "campaign", "versuch", "event")),
+        Role("device", "", ("device", "instrument", "probe", "sensor")),
+    )
+}  # fmt: skip
+_ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
+
+
+def role_of(heading: str) -> tuple[str, str | None] | None:
+    """The role of a column and the unit its heading states, `('u', 'cm/s')` for `U [cm/s]`; None for an unknown one."""
+    bare, unit = _apart(heading)
+    if (found := _ROLE_OF.get(_words(bare))) is not None:
+        quantity = ROLES[found].quantity
+        return found, unit_named(unit, quantity) if unit and quantity else None
+    for name, word in _suffixed(bare):
+        found = _ROLE_OF.get(_words(name))
+        if found is not None and ROLES[found].quantity and (said := unit_named(word, ROLES[found].quantity)):
+            return found, said
+    return None
+
+
+def _apart(heading: str) -> tuple[str, str]:
+    """The name and what stands in brackets or after a comma at its end."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", heading)
+    if found:
+        return found[1], found[2]
+    name, comma, unit = heading.rpartition(", ")
+    return (name, unit) if comma else (heading, "")
+
+
+def _suffixed(name: str) -> list[tuple[str, str]]:
+    """x_m as x in m, u_cm_s as u in cm/s: the unit as the last part of the name, or the last two."""
+    parts = re.split(r"[\s_]+", name.strip())
+    return [("_".join(parts[:-last]), "/".join(parts[-last:])) for last in (1, 2) if len(parts) > last]
+
+
+def _words(name: str) -> str:
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    return " ".join(re.findall(r"[a-z0-9]+", plain))

@@ -1,0 +1,102 @@
+"""What a site file says about one file of measurements: its columns, its units, and what stands in no column."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from vegglue.case.messages import nearest
+from vegglue.errors import InputError
+from vegglue.importers.column_names import ROLES
+from vegglue.importers.unit_words import in_si, si_factor
+
+
+@dataclass(frozen=True)
+class FileWords:
+    """columns: name of the column of each role; units: unit of each role; missing: numbers that mark no value;
+    experiment, section: of all rows; standard_error: of all values [SI]; coordinates, directions: whether places and
+    components of velocity are those of the map or of the channel, None for map where the site has a frame; flip:
+    coordinates that run the other way;
+    line: ends of the tape (first its zero), for tables along a tape; start: where a boat started; position: of a probe
+    whose record holds no place; sheet: of a workbook; floor, surface: z of the file at the lowest bed and at the water.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    missing: tuple[float, ...] = ()
+    experiment: str | None = None
+    section: str | None = None
+    standard_error: float | None = None
+    coordinates: Literal["map", "channel"] | None = None
+    directions: Literal["map", "channel"] | None = None
+    flip: tuple[str, ...] = ()
+    line: tuple[tuple[float, float], tuple[float, float]] | None = None
+    start: tuple[float, float] | None = None
+    position: tuple[float, float, float] | None = None
+    sheet: str | None = None
+    floor: float | None = None
+    surface: float | None = None
+
+
+def file_words(given: Any, where: str) -> FileWords:
+    """The words of one entry of `files`. Errors: InputError, which begins with `where`, for what makes no sense."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"{where} expected keys and values, such as `experiment: low`, got {given!r}.")
+    known = FileWords.__dataclass_fields__
+    for key in given:
+        if key not in known:
+            raise InputError(f"{where} does not know `{key}`: {nearest(str(key), known)}")
+    changes: dict[str, Any] = {key: str(given[key]) for key in ("experiment", "section", "sheet") if key in given}
+    for key in ("columns", "units"):
+        changes[key] = _by_role(given.get(key, {}), f"{where}.{key}")
+    for name, unit in changes["units"].items():
+        si_factor(unit, ROLES[name].quantity or "length", f"{where}.units.{name}")
+    for key in ("floor", "surface"):
+        if key in given:
+            changes[key] = in_si(given[key], "length", f"{where}.{key}")
+    if "standard_error" in given:
+        # Of a velocity or of a level: a bare number is in SI, and words of the two are told apart by themselves.
+        quantity = "velocity" if "/" in str(given["standard_error"]) else "length"
+        changes["standard_error"] = in_si(given["standard_error"], quantity, f"{where}.standard_error")
+    changes |= _places(given, where)
+    for key in {"coordinates", "directions"} & set(given):
+        changes[key] = _one_of(given[key], ("map", "channel"), f"{where}.{key}")
+    marks = given.get("missing", ())
+    changes["missing"] = tuple(float(mark) for mark in (marks if isinstance(marks, list | tuple) else [marks]))
+    flip = given.get("flip", ())
+    flip = flip if isinstance(flip, list | tuple) else [flip]
+    changes["flip"] = tuple(_one_of(axis, ("x", "y"), f"{where}.flip") for axis in flip)
+    return FileWords(**changes)
+
+
+def _by_role(given: Any, where: str) -> dict[str, str]:
+    if not isinstance(given, Mapping):
+        raise InputError(f"{where} expected entries such as `u: V_mean`, got {given!r}.")
+    for name in given:
+        if name not in ROLES:
+            raise InputError(f"{where} does not know `{name}`: {nearest(str(name), ROLES)}")
+    return {str(name): str(value) for name, value in given.items()}
+
+
+def _places(given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, count in (("start", 2), ("position", 3)):
+        if key in given:
+            found[key] = _numbers(given[key], count, f"{where}.{key}")
+    if "line" in given:
+        ends = given["line"]
+        if not isinstance(ends, list | tuple) or len(ends) != 2:
+            raise InputError(f"{where}.line expected two points [[x, y], [x, y]], got {ends!r}.")
+        found["line"] = tuple(_numbers(end, 2, f"{where}.line") for end in ends)
+    return found
+
+
+def _numbers(given: Any, count: int, where: str) -> tuple[float, ...]:
+    if isinstance(given, list | tuple) and len(given) == count:
+        return tuple(in_si(one, "length", where) for one in given)
+    raise InputError(f"{where} expected {count} numbers in m, got {given!r}.")
+
+
+def _one_of(word: Any, known: tuple[str, ...], where: str) -> Any:
+    if word not in known:
+        raise InputError(f"{where} expected one of {', '.join(known)}, got {word!r}.")
+    return word

@@ -1,0 +1,156 @@
+"""A table as people have it: any separator, a decimal comma, comments, a title, a row of units; text or XLSX."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.unit_words import is_unit
+from vegglue.in_short import so_many
+
+COMMENTS = ("#", "%", "//", "!", "$")
+# In the order of trust: a comma may also be decimal, and a space stand in a name.
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
+MISSING_WORDS = ("", "-", "--", "nan", "na", "n/a", "null", "none", "nodata", "#n/a", "inf", "-inf")
+# Lines from the end of a file by which its separator is told: titles stand at its head.
+LOOKED_AT = 200
+Line = tuple[int, list[str]]  # number in the file, from 1, and fields
+
+
+@dataclass(frozen=True)
+class LooseTable:
+    """Headings (columns,), units (columns,) with '' where none is stated, and rows of texts with their number in the
+    file. decimal_comma: whether numbers have one; form: how it was read, in words.
+    """
+
+    headings: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[Line, ...]
+    decimal_comma: bool
+    form: str
+
+    def number(self, text: str) -> float | None:
+        """A field as a number; None where it says that there is none. Errors: ValueError for any other text."""
+        if text.strip().lower() in MISSING_WORDS:
+            return None
+        plain = text.strip().replace(",", ".") if self.decimal_comma else text.strip()
+        return float(re.sub("[dD]", "e", plain))
+
+
+def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
+    """The table of numbers in a file. sheet: that of a workbook, its first one if not given.
+
+    Errors: InputError when the file cannot be read or holds no table of numbers with two columns or more.
+    """
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        return _table(path, _sheet(path, sheet), "workbook", decimal_comma=False)
+    lines, comments = _without_comments(readable_text(path))
+    separator = _separator([text for _, text in lines])
+    fields = [(number, _fields(text, separator)) for number, text in lines]
+    comma = separator != "," and _has_decimal_comma(fields)
+    words = [
+        SEPARATORS[separator],
+        "decimal comma" if comma else "",
+        so_many(comments, "comment line") if comments else "",
+    ]
+    return _table(path, fields, ", ".join(word for word in words if word), comma)
+
+
+def readable_text(path: Path) -> str:
+    """The text of a file: UTF-8, UTF-16 with its mark, or what Windows in the west writes. Errors: InputError."""
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16", errors="replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace")
+
+
+def is_number(text: str) -> bool:
+    """Whether a field is a number, with a decimal point or comma."""
+    return NUMBER.fullmatch(text.strip()) is not None
+
+
+def _without_comments(text: str) -> tuple[list[tuple[int, str]], int]:
+    there = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t;,")]
+    kept = [(number, line) for number, line in there if not line.lstrip().startswith(COMMENTS)]
+    return kept, len(there) - len(kept)
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """That which cuts most lines into equally many fields, two or more."""
+    found, best = " ", 0.0
+    for separator in SEPARATORS:
+        counts = Counter(len(_fields(line, separator)) for line in lines[-LOOKED_AT:])
+        fields, lines_with = counts.most_common(1)[0] if counts else (0, 0)
+        share = lines_with / sum(counts.values()) if fields > 1 else 0.0
+        if share > best + 0.2:
+            found, best = separator, share
+    return found
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    while len(fields) > 1 and not fields[-1].strip():
+        fields.pop()  # lines may end in separators
+    return [field.strip() for field in fields]
+
+
+def _has_decimal_comma(lines: Sequence[Line]) -> bool:
+    numbers = [field for _, fields in lines for field in fields if is_number(field)]
+    return any("," in field for field in numbers) and not any("." in field for field in numbers)
+
+
+def _table(path: Path, lines: list[Line], form: str, decimal_comma: bool) -> LooseTable:
+    """The longest stretch of rows of numbers, with the heading and the units above it."""
+    numeric = [sum(map(is_number, fields)) * 2 >= len(fields) > 1 for _, fields in lines]
+    if not any(numeric):
+        raise InputError(f"{shown_path(path)}: expected a table of numbers, got none; check the file.")
+    widths = Counter(len(fields) for (_, fields), rows in zip(lines, numeric, strict=True) if rows)
+    width = widths.most_common(1)[0][0]
+    first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
+    head, units = first - 1, ("",) * width
+    if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
+        units = tuple(_padded(lines[head][1], width))
+        form, head = f"{form}, a row of units", head - 1
+    named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
+    headings = _padded(lines[head][1], width) if named else [str(number) for number in range(1, width + 1)]
+    rows = tuple((number, _padded(fields, width)) for number, fields in lines[first:] if len(fields) > 1)
+    return LooseTable(tuple(headings), units, rows, decimal_comma, form if named else f"{form}, no heading")
+
+
+def _padded(fields: list[str], width: int) -> list[str]:
+    return (fields + [""] * width)[:width]
+
+
+def _sheet(path: Path, name: str | None) -> list[Line]:
+    try:
+        import openpyxl
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: workbooks are read by openpyxl, which is not installed; run "
+            "`pip install 'vegglue[field]'`, or save the sheet as CSV."
+        ) from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    except (OSError, ValueError, KeyError, openpyxl.utils.exceptions.InvalidFileException) as error:
+        raise InputError(f"{shown_path(path)} cannot be read as a workbook: {error}; save it anew.") from None
+    if name is not None and name not in book.sheetnames:
+        raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
+    chosen = book[name] if name is not None else book.worksheets[0]
+    lines = [
+        (number, ["" if cell is None else str(cell).strip() for cell in row])
+        for number, row in enumerate(chosen.iter_rows(values_only=True), 1)
+    ]
+    book.close()
+    return [(number, row) for number, row in lines if any(row)]

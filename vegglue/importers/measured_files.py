@@ -1,0 +1,144 @@
+"""The files of measurements in a folder: named as they are, or brought into the form that a case can name.
+
+What is brought into another form is written into a folder beside the config; the config says what was taken from where.
+"""
+
+import csv
+import hashlib
+import io
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vegglue.case.frame import Frame
+from vegglue.case.resolved_config import Tree
+from vegglue.case.text_files import write_text
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.config_parts import observed
+from vegglue.importers.file_words import FileWords, file_words
+from vegglue.importers.instruments import reader_of
+from vegglue.importers.loose_table import readable_text
+from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words
+from vegglue.importers.site_file import FieldSite
+from vegglue.importers.stations import StationTable, station_tables
+from vegglue.measurements.kinds import KINDS
+
+# Endings of files that may hold measurements; others need an entry in `files`.
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm", ".dis")
+# Files of a folder that are none of its measurements; what is held out is only for judging a finished model.
+OTHERS = ("holdout.csv", "answer.json", "readme.txt")
+
+
+@dataclass(frozen=True)
+class MeasuredFiles:
+    """observations: entries of a case; imported: for each file that was brought into another form what was taken."""
+
+    observations: list[Tree]
+    imported: list[Tree]
+
+
+def measured_files(
+    folder: Path, target: Path, site: FieldSite, frame: Frame | None, used: Sequence[str]
+) -> MeasuredFiles:
+    """All measurements of a folder. used: files that the site file names elsewhere, such as that of the bed.
+
+    Errors: InputError where there are none, or one cannot be read.
+    """
+    said = _entries(folder, site)
+    found: list[Tree] = []
+    imported: list[Tree] = []
+    others = []
+    for path in _candidates(folder, said, used):
+        kind = next((kind for kind in KINDS.values() if kind.file == path.name), None)
+        if kind is not None and path.name not in said and frame is None and _is_plain(path, kind.column, kind.at_point):
+            found.append(observed(kind.name, named_from(path, target)))
+        else:
+            others.append((path, said.get(path.name, FileWords())))
+    for group in _groups(others):
+        tables, records = _brought(group, frame, list(site.experiments))
+        for table in tables:
+            _write(data_folder(target) / table.file, table)
+            found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
+        imported += records
+    if not found:
+        files = ", ".join(kind.file for kind in KINDS.values())
+        raise InputError(
+            f"{shown_path(folder)}: expected one of {files}, or other tables of measurements, got none; put what was "
+            "measured there."
+        )
+    return MeasuredFiles(found, imported)
+
+
+def data_folder(target: Path) -> Path:
+    """Where what a config needs is written: <config>-data beside it."""
+    return target.with_name(f"{target.stem}-data")
+
+
+def named_from(file: Path, target: Path) -> str:
+    """The path of a file as a config names it."""
+    return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
+
+
+def record(path: Path, taken: Taken | None, said: str) -> Tree:
+    """What a config keeps of a file that it was made from."""
+    tree: Tree = {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "taken": said}
+    if taken is not None:
+        tree |= {"columns": dict(taken.columns), "units": dict(taken.units)}
+    return tree
+
+
+def _entries(folder: Path, site: FieldSite) -> dict[str, FileWords]:
+    entries = {}
+    for name, given in site.files.items():
+        if not (folder / name).is_file():
+            raise InputError(f"{shown_path(folder)}: `files` names {name}, which is not there; correct it.")
+        entries[str(name)] = file_words(given or {}, f"{shown_path(folder)}: `files.{name}`")
+    return entries
+
+
+def _candidates(folder: Path, said: Mapping[str, FileWords], used: Sequence[str]) -> list[Path]:
+    """Files of every kind in their order, then others by name."""
+    order = {kind.file: place for place, kind in enumerate(KINDS.values())}
+    paths = [
+        path
+        for path in folder.iterdir()
+        if path.is_file()
+        and path.name not in used
+        and (path.name in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
+    ]
+    return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name))
+
+
+def _is_plain(path: Path, column: str, at_point: bool) -> bool:
+    """Whether a table is in the form that a case names as it is: commas, and the columns by their own names."""
+    lines = readable_text(path).splitlines()
+    heading = [name.strip() for name in lines[0].split(",")] if lines else []
+    return {"x", column, *(["y"] if at_point else [])} <= set(heading)
+
+
+def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, FileWords]]]:
+    """Each file for itself, but records of one point together where they belong to one section."""
+    groups: dict[object, list[tuple[Path, FileWords]]] = {}
+    for path, words in files:
+        key = path if words.position is None else (words.experiment, words.section, words.floor, words.surface)
+        groups.setdefault(key, []).append((path, words))
+    return list(groups.values())
+
+
+def _brought(
+    group: Sequence[tuple[Path, FileWords]], frame: Frame | None, experiments: list[str]
+) -> tuple[list[StationTable], list[Tree]]:
+    """The tables of the files of a group, and what the config keeps of each file."""
+    placed = [in_the_channel(reader_of(path)(path, words), frame, words) for path, words in group]
+    path, words = group[0]
+    tables = station_tables(joined_rows(placed), path.stem, words, experiments, f"{shown_path(path)}:")
+    made = ", ".join(table.said for table in tables) or "no measurement, left out"
+    said = [f"{made if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)]
+    return tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
+
+
+def _write(path: Path, table: StationTable) -> None:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([table.heading, *table.rows])
+    write_text(path, text.getvalue(), "give another place by --to")

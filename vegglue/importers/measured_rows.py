@@ -1,0 +1,223 @@
+"""Rows of measurements in SI and in the frame of the model, and a line that says what was taken from which column."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array, Mask
+from vegglue.case.frame import Frame
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import ROLES, role_of
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.loose_table import LooseTable, read_loosely
+from vegglue.importers.unit_words import UNITS, si_factor, unit_named
+from vegglue.in_short import so_many
+
+# Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
+# 99 m may be a level. Others are named by `missing` in the site file.
+MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
+LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
+# Pairs of components, those that are named after the map first.
+COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
+
+
+@dataclass(frozen=True)
+class Taken:
+    """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
+    each role came from; units: the unit of each; said: what was done, in short clauses.
+    """
+
+    numbers: Mapping[str, Array]
+    words: Mapping[str, Sequence[str]]
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    said: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.numbers.values())))
+
+    def only(self, rows: Mask) -> "Taken":
+        """The rows (rows,) that are true."""
+        numbers = {role: values[rows] for role, values in self.numbers.items()}
+        words = {
+            role: [one for one, kept in zip(texts, rows, strict=True) if kept] for role, texts in self.words.items()
+        }
+        return replace(self, numbers=numbers, words=words)
+
+    def having(self, numbers: Mapping[str, Array], *said: str) -> "Taken":
+        """The rows with these numbers put in, None-valued roles left as they are, and what is said of it."""
+        return replace(self, numbers={**self.numbers, **numbers}, said=(*self.said, *said))
+
+    def without(self, *roles: str) -> "Taken":
+        """The rows without some roles."""
+        return replace(self, numbers={role: values for role, values in self.numbers.items() if role not in roles})
+
+
+def read_rows(path: Path, words: FileWords) -> Taken:
+    """What a file of columns holds, in SI. Errors: InputError, naming file, row and column."""
+    return rows_of_table(path, read_loosely(path, words.sheet), words)
+
+
+def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
+    """What a table holds, in SI: columns by `words`, else by their usual names; units likewise."""
+    columns = _columns(path, table, words)
+    numbers: dict[str, Array] = {}
+    texts: dict[str, list[str]] = {}
+    units: dict[str, str] = {}
+    said = [table.form]
+    for role, place in columns.items():
+        fields = [row[place] for _, row in table.rows]
+        if not ROLES[role].quantity:
+            texts[role] = fields
+            continue
+        units[role] = _unit(path, table, place, role, words)
+        values, marked = _numbers(path, table, place, words.missing)
+        numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
+        if marked:
+            said.append(f"{so_many(marked, 'mark')} for no value in {table.headings[place]}")
+    if not numbers:
+        known = ", ".join(sorted(ROLES))
+        raise InputError(
+            f"{shown_path(path)}: expected columns that can be told by their names, got {', '.join(table.headings)}; "
+            f"name them by `columns` of this file, by what they hold: {known}."
+        )
+    named = {role: table.headings[place] for role, place in columns.items()}
+    return Taken(numbers, texts, named, units, tuple(said))
+
+
+def in_the_channel(taken: Taken, frame: Frame | None, words: FileWords) -> Taken:
+    """The rows in the frame of the model: turned, shifted and flipped; a speed with its direction as components."""
+    taken = _components(taken)
+    if frame is not None and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
+        x, y = frame.to_model(taken.numbers["x"], taken.numbers["y"])
+        taken = taken.having({"x": x, "y": y}, "places turned from the map into the channel")
+    return _flipped(_along_and_across(taken, frame, words), words.flip)
+
+
+def _along_and_across(taken: Taken, frame: Frame | None, words: FileWords) -> Taken:
+    """u and v of components east and north; a velocity without a second component is one along the channel."""
+    pair = next((pair for pair in COMPONENTS if set(pair) <= taken.numbers.keys()), None)
+    if pair is None:
+        return taken
+    first, second = (taken.numbers[role] for role in pair)
+    turn = (
+        frame is not None and words.directions != "channel" and (pair != ("u", "v") or words.coordinates != "channel")
+    )
+    if frame is not None and turn:
+        first, second = frame.turned_to_model(first, second)
+        taken = _errors_turned(taken, frame)
+    of_map = ("velocities turned with them, as components east and north",) if turn else ()
+    return taken.without(*pair).having({"u": first, "v": second}, *of_map)
+
+
+def _errors_turned(taken: Taken, frame: Frame) -> Taken:
+    """se_u^2 = (cos a se_E)^2 + (sin a se_N)^2, and se_v likewise, where both are given, errors independent."""
+    if not {"u_se", "v_se"} <= taken.numbers.keys():
+        return taken
+    east, north = taken.numbers["u_se"], taken.numbers["v_se"]
+    (ee, en), (ne, nn) = frame.turned_to_model(1.0, 0.0), frame.turned_to_model(0.0, 1.0)
+    return taken.having({"u_se": np.hypot(ee * east, ne * north), "v_se": np.hypot(en * east, nn * north)})
+
+
+def joined_rows(parts: Sequence[Taken]) -> Taken:
+    """The rows of several files one below the other, as far as all of them have a role."""
+    first = parts[0]
+    numbers = {r: np.concatenate([one.numbers[r] for one in parts]) for r in first.numbers if _in_all(r, parts)}
+    words = {role: [text for one in parts for text in one.words[role]] for role in first.words}
+    return replace(first, numbers=numbers, words=words)
+
+
+def _in_all(role: str, parts: Sequence[Taken]) -> bool:
+    return all(role in one.numbers for one in parts)
+
+
+def taken_in_words(taken: Taken) -> str:
+    """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma, 12 rows`."""
+    roles = [
+        f"{role} from {heading}" + (f" [{taken.units[role]}]" if role in taken.units else "")
+        for role, heading in taken.columns.items()
+    ]
+    return f"{', '.join(roles)}; {', '.join(taken.said)}; {so_many(taken.size, 'row')}"
+
+
+def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
+    """The place of the column of each role; of two of one role the first."""
+    found: dict[str, int] = {}
+    for role, heading in words.columns.items():
+        if heading not in table.headings:
+            raise InputError(
+                f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
+                f"correct `columns` of this file."
+            )
+        found[role] = table.headings.index(heading)
+    for place, heading in enumerate(table.headings):
+        known = role_of(heading)
+        if known is not None and known[0] not in found and place not in found.values():
+            found[known[0]] = place
+    return found
+
+
+def _unit(path: Path, table: LooseTable, place: int, role: str, words: FileWords) -> str:
+    """By the site file, the row of units, the heading; else the SI unit."""
+    quantity = ROLES[role].quantity
+    if role in words.units:
+        return unit_named(words.units[role], quantity) or words.units[role]
+    known = role_of(table.headings[place])
+    stated = table.units[place].strip("[]() ") or (known[1] if known else None) or _bracketed(table.headings[place])
+    if not stated:
+        return next(iter(UNITS[quantity]))
+    unit = unit_named(stated, quantity)
+    if unit is None:
+        raise InputError(
+            f"{shown_path(path)}: column {table.headings[place]!r} is headed {stated!r}, which is no unit of "
+            f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file."
+        )
+    return unit
+
+
+def _bracketed(heading: str) -> str:
+    return heading[heading.rfind("[") + 1 : -1] if heading.endswith("]") and "[" in heading else ""
+
+
+def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, int]:
+    values = np.full(len(table.rows), np.nan)
+    for i, (line, row) in enumerate(table.rows):
+        try:
+            number = table.number(row[place])
+        except ValueError:
+            raise InputError(
+                f"{shown_path(path)}, row {line}: expected a number in column {table.headings[place]}, got "
+                f"{row[place]!r}; mend or remove the row."
+            ) from None
+        values[i] = np.nan if number is None else number
+    marked = (
+        np.isin(values, [*MARKS_OF_LOGGERS, *missing])
+        | (np.abs(values) > LARGEST_OF_ALL)
+        | np.array([_nines(one) for one in values])
+    )
+    return np.where(marked, np.nan, values), int(marked.sum())
+
+
+def _nines(value: float) -> bool:
+    """-99, -999.9 and the like: no level, and no velocity in any unit that comes near to it."""
+    return bool(value <= -99.0) and set(f"{-value:g}") <= set("9.")
+
+
+def _components(taken: Taken) -> Taken:
+    """u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to."""
+    numbers = taken.numbers
+    if not {"speed", "direction"} <= numbers.keys() or "u" in numbers or "east_velocity" in numbers:
+        return taken
+    to = np.radians(numbers["direction"])
+    parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
+    return taken.having(parts, "components from speed and direction").without("speed", "direction")
+
+
+def _flipped(taken: Taken, axes: Sequence[str]) -> Taken:
+    turned = {"x": ("x", "u"), "y": ("y", "v")}
+    numbers = {name: -taken.numbers[name] for axis in axes for name in turned[axis] if name in taken.numbers}
+    return taken.having(numbers, *(f"{axis} reversed" for axis in axes))

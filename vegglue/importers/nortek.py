@@ -1,0 +1,109 @@
+"""Records of one point: the ASCII exports (.dat) of Nortek's Vectrino and Vector, as their mean and its scatter.
+
+Format: Nortek's conversion to ASCII: no heading, one line a sample; Vectrino: time, counter, status, velocities x, y,
+z1, z2 [m/s], then amplitudes, ratios and correlations of four beams; Vector: burst, counter, velocities x, y, z [m/s],
+then amplitudes, ratios and correlations of three beams, pressure and two inputs. The .hdr beside it says the rate.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array, Mask
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.loose_table import readable_text
+from vegglue.importers.measured_rows import Taken
+
+LEAST_CORRELATION = 70.0  # %, the maker's advice for means and turbulence
+SPIKE = 6.0  # median absolute deviations beyond which a sample is a spike; of noise one in 10,000 is
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Columns of a line: the first velocity, the correlations, and how many there are at least."""
+
+    name: str
+    velocity: int
+    correlation: slice
+    columns: int
+
+
+_VECTRINO = _Layout("Vectrino", 3, slice(15, 19), 19)
+_VECTOR = _Layout("Vector", 2, slice(11, 14), 17)
+_LAYOUTS = (_VECTRINO, _VECTOR)
+
+
+def is_nortek(path: Path, text: str) -> bool:
+    """Whether it is a .dat with a .hdr of the same name beside it, and rows of numbers as wide as the exports."""
+    rows = text.splitlines()[:2]
+    return path.suffix.lower() == ".dat" and _heading(path) is not None and bool(rows) and len(rows[0].split()) >= 17
+
+
+def read_nortek(path: Path, words: FileWords) -> Taken:
+    """One row: the mean of the record at its `position`, its standard deviation and its length.
+
+    Samples of low correlation and spikes are left out, and counted. Errors: InputError naming the file.
+    """
+    if words.position is None:
+        raise InputError(
+            f"{shown_path(path)}: expected where the probe stood, `position: [x, y, z]`, which no record says; add "
+            "it to this file in `files`."
+        )
+    layout, rows = _rows(path)
+    u, v, w = rows[:, layout.velocity : layout.velocity + 3].T
+    sound = rows[:, layout.correlation].min(axis=1) >= LEAST_CORRELATION
+    trusted = sound & _no_spike(u) & _no_spike(v) & _no_spike(w)
+    if not trusted.any():
+        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
+    rate = _rate(path)
+    x, y, z = (np.array([one]) for one in words.position)
+    numbers = {
+        "x": x,
+        "y": y,
+        "z": z,
+        **{name: part[trusted].mean(keepdims=True) for name, part in zip("uvw", (u, v, w), strict=True)},
+    }
+    numbers["u_std"] = u[trusted].std(ddof=1, keepdims=True)
+    numbers["duration_s"] = np.array([trusted.sum() / rate])
+    said = f"{layout.name}, {len(rows):,} samples at {rate:g} Hz, {len(rows) - int(trusted.sum()):,} left out"
+    return Taken(numbers, {"device": [layout.name]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
+                 dict.fromkeys("uvw", "m/s"), (said,))  # fmt: skip
+
+
+def _rows(path: Path) -> tuple[_Layout, Array]:
+    lines = [line.split() for line in readable_text(path).splitlines() if line.strip()]
+    layout = next((one for one in _LAYOUTS if lines and len(lines[0]) >= one.columns), None)
+    try:
+        rows = np.array([[float(word) for word in line] for line in lines])
+    except ValueError as error:
+        raise InputError(
+            f"{shown_path(path)}: expected rows of numbers of a Nortek export, got {error}; export it anew."
+        ) from None
+    if layout is None or rows.ndim != 2:
+        raise InputError(
+            f"{shown_path(path)}: expected the columns of a Vectrino or Vector, got others; export it anew."
+        )
+    return layout, rows
+
+
+def _no_spike(velocity: Array) -> Mask:
+    """Samples within SPIKE times 1.4826 MAD, the robust standard deviation."""
+    off = np.abs(velocity - np.median(velocity))
+    return np.asarray(off <= SPIKE * 1.4826 * max(float(np.median(off)), 1e-4))
+
+
+def _heading(path: Path) -> Path | None:
+    return next((there for end in (".hdr", ".HDR") if (there := path.with_suffix(end)).is_file()), None)
+
+
+def _rate(path: Path) -> float:
+    heading = _heading(path)
+    found = re.search(r"^Sampling rate\s+([\d.]+)\s*Hz", readable_text(heading), re.MULTILINE) if heading else None
+    if found is None:
+        raise InputError(
+            f"{shown_path(path)}: expected `Sampling rate` in the .hdr beside it, got none; export it too."
+        )
+    return float(found[1])

@@ -1,0 +1,103 @@
+"""Polygons of patches and friction classes from GeoJSON files and shapefiles, brought into the channel."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vegglue.case.frame import Frame
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.loose_table import readable_text
+
+# What properties of a polygon are called that say its density [1/m2], its class and its name; lower case.
+DENSITIES = ("stems_per_m2", "stems", "density", "stem_density", "stems_m2")
+CLASSES = ("class", "friction_class", "friction", "roughness", "type", "landuse")
+NAMES = ("name", "id", "patch", "fid")
+Ring = list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class NamedPolygon:
+    """Corners in the channel [m]; density [1/m2] and class where the file says them."""
+
+    name: str
+    corners: Ring
+    density: float | None
+    friction_class: str | None
+
+
+def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
+    """The outer rings of all polygons of a file. Errors: InputError for what is no such file or lies in degrees."""
+    features = list(_of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path))
+    if not features:
+        raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
+    _refuse_degrees(path, frame, features)
+    found = []
+    for number, (ring, properties) in enumerate(features, 1):
+        density = _first(properties, DENSITIES)
+        of_class = _first(properties, CLASSES)
+        found.append(
+            NamedPolygon(
+                name=str(_first(properties, NAMES) or f"p{number}"),
+                corners=[_rounded(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
+                density=float(density) if density is not None else None,
+                friction_class=str(of_class) if of_class is not None else None,
+            )
+        )
+    return found
+
+
+def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
+    try:
+        tree = json.loads(readable_text(path))
+        features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+        for feature in features:
+            geometry, properties = feature["geometry"], feature.get("properties") or {}
+            parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
+            for rings in parts.get(geometry["type"], []):
+                yield _open([(float(corner[0]), float(corner[1])) for corner in rings[0]]), properties
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f"{shown_path(path)}: expected GeoJSON with polygons, got another file ({error}).") from None
+
+
+def _of_shapefile(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
+    try:
+        import shapefile
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
+            "`pip install 'vegglue[field]'`, or save it as GeoJSON."
+        ) from None
+    try:
+        with shapefile.Reader(str(path)) as reader:
+            for record in reader.shapeRecords():
+                if record.shape.shapeTypeName.startswith("POLYGON"):
+                    starts = [*record.shape.parts, len(record.shape.points)]
+                    ring = [(float(x), float(y)) for x, y, *_ in record.shape.points[starts[0] : starts[1]]]
+                    yield _open(ring), record.record.as_dict()
+    except (OSError, shapefile.ShapefileException) as error:
+        raise InputError(f"{shown_path(path)} cannot be read as a shapefile: {error}; save it anew.") from None
+
+
+def _open(ring: Ring) -> Ring:
+    return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
+
+
+def _first(properties: Mapping[str, Any], names: Iterable[str]) -> Any:
+    lower = {str(key).lower(): value for key, value in properties.items()}
+    return next((lower[name] for name in names if lower.get(name) not in (None, "")), None)
+
+
+def _refuse_degrees(path: Path, frame: Frame | None, features: list[tuple[Ring, Mapping[str, Any]]]) -> None:
+    if frame is None or max(map(abs, frame.origin)) <= 360.0:
+        return
+    if all(abs(x) <= 360.0 and abs(y) <= 90.0 for ring, _ in features for x, y in ring):
+        raise InputError(
+            f"{shown_path(path)}: expected coordinates in m like the origin of `frame`, got degrees; save it in the "
+            f"projected system{f' {frame.crs}' if frame.crs else ''}."
+        )
+
+
+def _rounded(x: float, y: float) -> tuple[float, float]:
+    return round(x, 4), round(y, 4)

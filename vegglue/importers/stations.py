@@ -1,0 +1,173 @@
+"""Measured rows as tables that a case names: points in the vertical, or stations of each kind."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.case.resolved_config import Tree
+from vegglue.errors import InputError
+from vegglue.importers.config_parts import observed
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.measured_rows import Taken
+from vegglue.measurements.kinds import KINDS, Kind
+
+# Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
+ONE_PLACE = 0.001
+# Stations of one section lie within so much of one another along the channel [m], where no section is named.
+SECTION_GAP = 0.25
+FEWEST_REPEATS = 3  # values at one place from which their scatter gives a standard error
+Row = list[str]
+
+
+@dataclass(frozen=True)
+class StationTable:
+    """One table to be written: name of its file, columns, rows; the observations that name it; what is said of it."""
+
+    file: str
+    heading: tuple[str, ...]
+    rows: list[Row]
+    observations: tuple[Tree, ...]
+    said: str
+
+
+def station_tables(
+    taken: Taken, stem: str, words: FileWords, experiments: Sequence[str], where: str
+) -> list[StationTable]:
+    """The tables of what was taken from one file. Errors: InputError, which begins with `where`."""
+    taken = _named(taken, words, experiments, where)
+    if _in_verticals(taken):
+        return [_points(taken, stem, words)]
+    found = [_stations(taken, stem, words, kind) for kind in KINDS.values() if kind.column in taken.numbers]
+    return [table for table in found if table.rows]
+
+
+def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> Taken:
+    """Every row with an experiment and a section, and with a place; rows without a place are left out."""
+    place = [role for role in ("x", "y") if role in taken.numbers]
+    if "x" not in place:
+        raise InputError(
+            f"{where} expected a column of x, got none; name it by `columns`, or give `line` or `position`."
+        )
+    taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
+    if "y" not in place:
+        taken = taken.having({"y": np.zeros(taken.size)}, "y = 0 for want of a column")
+    if words.experiment is not None:
+        names = [words.experiment] * taken.size
+    elif "experiment" in taken.words:
+        names = list(taken.words["experiment"])
+    elif len(experiments) == 1:
+        names = [experiments[0]] * taken.size
+    else:
+        raise InputError(f"{where} expected a column `experiment`, or its `experiment` among {', '.join(experiments)}.")
+    sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
+    if sections is None or "" in sections:
+        sections = _sections(taken.numbers["x"])
+    return Taken(taken.numbers, {**taken.words, "experiment": names, "section": sections}, taken.columns, taken.units,
+                 taken.said)  # fmt: skip
+
+
+def _sections(x: Array) -> list[str]:
+    """x12.5 for what stands together there: sections begin where stations are further apart than SECTION_GAP."""
+    order = np.argsort(x, kind="stable")
+    distinct = np.unique(np.round(x, 3))
+    # Equal x on many lines are sections as they are, however near; scattered ones are joined.
+    gap = ONE_PLACE if distinct.size * 2 <= x.size else SECTION_GAP
+    group = np.zeros(x.size, dtype=int)
+    group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > gap)])
+    names = {number: f"x{np.median(x[group == number]):.2f}" for number in np.unique(group)}
+    return [names[number] for number in group]
+
+
+def _in_verticals(taken: Taken) -> bool:
+    """Whether places have velocities at more than one height."""
+    if not {"z", "u"} <= taken.numbers.keys():
+        return False
+    there = np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"])
+    keys = [key for key, kept in zip(_places(taken), there, strict=True) if kept]
+    return len(set(keys)) * 2 <= len(keys)
+
+
+def _places(taken: Taken) -> list[tuple[str, str, float, float]]:
+    x, y = (np.round(taken.numbers[role] / ONE_PLACE) * ONE_PLACE for role in ("x", "y"))
+    words = taken.words
+    return list(zip(words["experiment"], words["section"], x.tolist(), y.tolist(), strict=True))
+
+
+def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
+    """Points in the vertical; a section is a case of the file, at the middle of its x."""
+    kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"]))
+    optional = [
+        role
+        for role in ("v", "w", "u_std", "duration_s")
+        if role in kept.numbers and np.isfinite(kept.numbers[role]).all()
+    ]
+    names = [
+        f"{experiment}/{section}"
+        for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
+    ]
+    x = kept.numbers["x"].copy()
+    for name in set(names):
+        here = np.array([one == name for one in names])
+        x[here] = np.median(x[here])
+    devices = kept.words.get("device", ["ADV"] * kept.size)
+    columns = [x, kept.numbers["y"], kept.numbers["z"], kept.numbers["u"], *(kept.numbers[role] for role in optional)]
+    rows = [
+        [name, device or "ADV", *map(_number, values)]
+        for name, device, values in zip(names, devices, zip(*columns, strict=True), strict=True)
+    ]
+    observations = tuple(
+        _section_observation(f"{stem}.csv", name, words, "v" in optional) for name in dict.fromkeys(names)
+    )
+    heading = ("case", "device", "x", "y", "z", "u", *optional)
+    return StationTable(
+        f"{stem}.csv", heading, rows, observations, f"{len(rows)} points of {len(observations)} sections"
+    )
+
+
+def _section_observation(file: str, name: str, words: FileWords, across: bool) -> Tree:
+    experiment, section = name.split("/", 1)
+    levels = {key: value for key, value in (("floor", words.floor), ("surface", words.surface)) if value is not None}
+    tree = {
+        "kind": "adv",
+        "file": file,
+        "experiment": experiment,
+        "section": section,
+        "case": name,
+        "average": "profile",
+    }
+    return tree | levels | ({"across": True} if across else {})
+
+
+def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind) -> StationTable:
+    """Stations of one kind; values at one place are averaged, and their scatter is the error where none is given."""
+    kept = taken.only(np.isfinite(taken.numbers[kind.column]))
+    errors = kept.numbers.get(kind.error_column)
+    if errors is None:
+        errors = np.full(kept.size, np.nan if words.standard_error is None else words.standard_error)
+    gathered: dict[tuple[str, str, float, float], list[tuple[float, float]]] = {}
+    for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
+        gathered.setdefault(place, []).append((value, error))
+    rows = [[*place[:2], *map(_number, (*place[2:], *_mean(values)))] for place, values in gathered.items()]
+    repeats = kept.size - len(rows)
+    file = f"{stem}-{kind.name}.csv"
+    said = f"{len(rows)} of {kind.words}" + (f", {repeats} repeats averaged" if repeats else "")
+    heading = ("experiment", "section", "x", "y", kind.column, kind.error_column)
+    return StationTable(file, heading, rows, (observed(kind.name, file),), said)
+
+
+def _mean(values: list[tuple[float, float]]) -> Iterator[float]:
+    """Mean, and its standard error: from those given, or s / sqrt(n); 0 for unknown where there is neither."""
+    value, error = (np.array(part) for part in zip(*values, strict=True))
+    yield float(value.mean())
+    if np.isfinite(error).all():
+        yield float(np.sqrt((error**2).sum()) / error.size)
+    elif value.size >= FEWEST_REPEATS:
+        yield float(value.std(ddof=1) / np.sqrt(value.size))
+    else:
+        yield 0.0
+
+
+def _number(value: float) -> str:
+    return f"{round(float(value), 6):.12g}"

@@ -1,0 +1,165 @@
+"""Beds from files, brought onto the channel: GeoTIFF and ESRI ASCII grids, scattered points, and cross-sections."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
+from scipy.spatial import QhullError
+
+from vegglue.arrays import Array
+from vegglue.case.frame import Frame
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
+from vegglue.site.terrain import Raster, read_raster
+
+# Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, and, of GDAL, what marks no data.
+PIXEL_SCALE, TIE_POINT, NO_DATA = 33550, 33922, 42113
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Levels of a survey in the channel. level: from x and y (n,) to z (n,) [m], NaN beyond the survey; extent: least
+    and largest x, then y, of the survey [m]; said: what was taken from where.
+    """
+
+    level: Callable[[Array, Array], Array]
+    extent: tuple[float, float, float, float]
+    said: str
+
+
+def read_terrain(path: Path, frame: Frame | None, words: FileWords, sections: bool) -> Terrain:
+    """The bed in a file, by what kind of file it is. sections: whether its points stand in cross-sections.
+
+    Errors: InputError for what cannot be read.
+    """
+    if path.suffix.lower() in (".tif", ".tiff"):
+        return _of_raster(read_geotiff(path), frame)
+    if path.suffix.lower() in (".asc", ".grd"):
+        return _of_raster(read_raster(path), frame)
+    points, said = _points(path, frame, words)
+    return _of_sections(points, said) if sections else _of_points(path, points, said)
+
+
+def read_geotiff(path: Path) -> Raster:
+    """The first band of a GeoTIFF whose rows run along the map. Errors: InputError for another or a turned one."""
+    try:
+        import tifffile
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: GeoTIFFs are read by tifffile, which is not installed; run "
+            "`pip install 'vegglue[field]'`, or save it as an ESRI ASCII grid."
+        ) from None
+    try:
+        with tifffile.TiffFile(path) as file:
+            page = file.pages.first
+            values = np.asarray(page.asarray(), dtype=np.float64)
+            tags = {code: page.tags[code].value for code in (PIXEL_SCALE, TIE_POINT, NO_DATA) if code in page.tags}
+    except (OSError, ValueError, IndexError, tifffile.TiffFileError) as error:
+        raise InputError(f"{shown_path(path)} cannot be read as a GeoTIFF: {error}; save it anew.") from None
+    if PIXEL_SCALE not in tags or TIE_POINT not in tags or tags[PIXEL_SCALE][0] != tags[PIXEL_SCALE][1]:
+        raise InputError(
+            f"{shown_path(path)}: expected a GeoTIFF with square pixels along the map (tags ModelPixelScale and "
+            "ModelTiepoint), got another; warp it to its own coordinate system first."
+        )
+    return _north_up(values[..., 0] if values.ndim == 3 else values, tags)
+
+
+def _north_up(values: Array, tags: dict[int, tuple[float, ...]]) -> Raster:
+    size = tags[PIXEL_SCALE][0]
+    column, row, _, east, north, _ = tags[TIE_POINT][:6]
+    x = np.array(east + (np.arange(values.shape[1]) + 0.5 - column) * size)
+    y = np.array(north - (np.arange(values.shape[0]) + 0.5 - row) * size)
+    if NO_DATA in tags:
+        values = np.where(values == float(str(tags[NO_DATA]).strip("\x00 ")), np.nan, values)
+    return Raster(x, y[::-1].copy(), size, values[::-1].T)
+
+
+def _of_raster(raster: Raster, frame: Frame | None) -> Terrain:
+    reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
+
+    def level(x: Array, y: Array) -> Array:
+        return np.asarray(reader(np.column_stack(frame.to_map(x, y) if frame is not None else (x, y))))
+
+    known = np.argwhere(~np.isnan(raster.values))
+    x, y = raster.x[known[:, 0]], raster.y[known[:, 1]]
+    along, across = frame.to_model(x, y) if frame is not None else (x, y)
+    return Terrain(level, _extent(along, across), f"grid of {len(known):,} levels, {raster.size:g} m apart")
+
+
+def _points(path: Path, frame: Frame | None, words: FileWords) -> tuple[Array, str]:
+    """x, y, z (points, 3) [m]; three columns without a heading are these."""
+    bare = {"x": "1", "y": "2", "z": "3"}
+    taken = read_rows(path, words)
+    if not {"x", "y", "z"} <= taken.numbers.keys():
+        raise InputError(
+            f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(taken.columns.values())}; name them "
+            f"by `columns`, or by place where there is no heading: {bare}."
+        )
+    taken = in_the_channel(taken, frame, words)
+    points = np.column_stack([taken.numbers[role] for role in "xyz"])
+    return points[np.isfinite(points).all(axis=1)], taken_in_words(taken)
+
+
+def _of_points(path: Path, points: Array, said: str) -> Terrain:
+    """Linear between the points of a triangulation, as levels of survey points are read anywhere."""
+    try:
+        surface = LinearNDInterpolator(points[:, :2], points[:, 2])
+    except (QhullError, ValueError):
+        raise InputError(
+            f"{shown_path(path)}: expected at least three points that are not on one line, got {len(points)}."
+        ) from None
+    return Terrain(lambda x, y: np.asarray(surface(x, y)), _extent(points[:, 0], points[:, 1]), said)
+
+
+def _of_sections(points: Array, said: str) -> Terrain:
+    """z(x, eta) linear along the channel between neighbouring sections, at one share eta of their widths.
+
+    eta = (y - y_left) / (y_right - y_left); so that a thalweg is carried on from one section to the next, where a
+    triangulation would make steps of it. Points of a section are those of one x, within a metre.
+    """
+    points = points[np.argsort(points[:, 0], kind="stable")]
+    parts = np.split(points, np.flatnonzero(np.diff(points[:, 0]) > 1.0) + 1)
+    sections = [part[np.argsort(part[:, 1], kind="stable")] for part in parts]
+    along = np.array([section[:, 0].mean() for section in sections])
+    ends = np.array([[section[0, 1], section[-1, 1]] for section in sections])
+
+    def level(x: Array, y: Array) -> Array:
+        low, high = (np.interp(x, along, ends[:, side]) for side in (0, 1))
+        share = (y - low) / (high - low)
+        each = np.array([np.interp(share, _shares(section), section[:, 2]) for section in sections])
+        after = (
+            np.clip(np.searchsorted(along, x), 1, max(len(along) - 1, 1)) if len(along) > 1 else np.zeros(x.size, int)
+        )
+        before = np.maximum(after - 1, 0)
+        span = np.where(after > before, along[after] - along[before], 1.0)
+        weight = np.clip((x - along[before]) / span, 0.0, 1.0) * (after > before)
+        cells = np.arange(x.size)
+        found = (1.0 - weight) * each[before, cells] + weight * each[after, cells]
+        return np.where((share >= 0.0) & (share <= 1.0), found, np.nan)
+
+    extent = (float(along.min()), float(along.max()), float(ends[:, 0].min()), float(ends[:, 1].max()))
+    return Terrain(level, extent, f"{said}, in {len(sections)} cross-sections")
+
+
+def _shares(section: Array) -> Array:
+    return np.asarray((section[:, 1] - section[0, 1]) / (section[-1, 1] - section[0, 1]))
+
+
+def filled(terrain: Terrain, x: Array, y: Array) -> tuple[Array, float]:
+    """Levels at x and y (n,) [m], that of the nearest known one beyond the survey; and the share beyond it [-]."""
+    level = terrain.level(x, y)
+    known = ~np.isnan(level)
+    if not known.any():
+        raise InputError(
+            f"The bed ({terrain.said}) lies at x = {terrain.extent[0]:.6g} to {terrain.extent[1]:.6g}, y = "
+            f"{terrain.extent[2]:.6g} to {terrain.extent[3]:.6g} m, none of it in the grid; check `frame` and `grid`."
+        )
+    nearest = NearestNDInterpolator(np.column_stack([x[known], y[known]]), level[known])
+    return np.where(known, level, nearest(x, y)), float(1.0 - known.mean())
+
+
+def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:
+    return float(x.min()), float(x.max()), float(y.min()), float(y.max())
