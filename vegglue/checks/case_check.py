@@ -11,6 +11,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_friction_classes,
     remarks_on_patches,
 )
+from vegglue.checks.directions import remarks_on_directions
 from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
 from vegglue.checks.stations import remarks_on_absurd_values, remarks_on_patch_edges, remarks_on_stations
 from vegglue.checks.steep_flow import remarks_on_steep_flow
@@ -22,6 +23,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
     remarks = (
         remarks_on_absurd_values(case, site, observations),
+        remarks_on_directions(case, observations),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
         remarks_on_patches(case, site),
