@@ -34,9 +34,12 @@ HOMES_OF_EXTRAS = {
     "arviz": {"storage", "workflow"},
     "dask": {"cluster"},
     "distributed": {"cluster"},
+    "openpyxl": {"importers"},
+    "shapefile": {"importers"},
+    "tifffile": {"importers", "storage"},
     "xarray": {"storage", "workflow"},
 }
-DISTRIBUTIONS = {"yaml": "pyyaml"}
+DISTRIBUTIONS = {"shapefile": "pyshp", "yaml": "pyyaml"}
 LONGEST_FILE, LONGEST_FUNCTION, MEDIAN_FILE, MEDIAN_FUNCTION = 400, 45, 150, 8
 CATCH_ALLS = {"utils", "helpers", "base", "types", "constants", "common", "misc"}
 # Names that every file of a family defines in its own right.
@@ -92,8 +95,9 @@ def test_what_is_imported_is_what_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[<>=\[ ]", requirement)[0] for requirement in project["dependencies"]}
     assert declared == {DISTRIBUTIONS.get(library, library) for library in HOMES} | NOWHERE_ELSE
-    extras = [*project["optional-dependencies"]["arviz"], *project["optional-dependencies"]["cluster"]]
-    assert set(HOMES_OF_EXTRAS) <= {re.split("[<>=]", one)[0] for one in extras}
+    extras = [one for name in ("arviz", "cluster", "field") for one in project["optional-dependencies"][name]]
+    wanted = {DISTRIBUTIONS.get(library, library) for library in HOMES_OF_EXTRAS}
+    assert wanted <= {re.split("[<>=]", one)[0] for one in extras}
 
 
 def test_files_are_short_and_say_what_they_are() -> None:

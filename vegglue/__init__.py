@@ -20,10 +20,12 @@ if TYPE_CHECKING:
     from vegglue.workflow.check import check
     from vegglue.workflow.compare import compare
     from vegglue.workflow.diagnose import diagnose
+    from vegglue.workflow.export import export
     from vegglue.workflow.extend import extend, extend_stepwise
     from vegglue.workflow.import_folder import import_folder
     from vegglue.workflow.infer import infer
     from vegglue.workflow.load import load
+    from vegglue.workflow.new import new
     from vegglue.workflow.next_measurement import next_measurement
     from vegglue.workflow.overview import overview
     from vegglue.workflow.report import report
@@ -32,9 +34,9 @@ if TYPE_CHECKING:
     from vegglue.workflow.twin import make_twin, reveal
 
 __all__ = [
-    "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "extend", "extend_stepwise",
-    "import_folder", "infer", "load", "load_case", "make_twin", "next_measurement", "on_cluster", "overview", "report",
-    "reveal", "run", "simulate",
+    "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "export", "extend",
+    "extend_stepwise", "import_folder", "infer", "load", "load_case", "make_twin", "new", "next_measurement",
+    "on_cluster", "overview", "report", "reveal", "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION

@@ -15,6 +15,7 @@ from vegglue.cli.loop_commands import (
     next_command,
     overview_command,
 )
+from vegglue.cli.map_commands import export_command, new_command
 from vegglue.cli.twin_commands import reveal_command, twin_command
 from vegglue.errors import InputError, StorageError
 from vegglue.version import VERSION
@@ -37,7 +38,7 @@ def version_command() -> None:
 
 # By group, in the order in which they are used.
 COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    "Begin": {"import": import_command, "check": check_command, "run": run_command},
+    "Begin": {"new": new_command, "import": import_command, "check": check_command, "run": run_command},
     "The loop": {
         "diagnose": diagnose_command,
         "extend": extend_command,
@@ -51,6 +52,7 @@ COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "overview": overview_command,
     },
     "More": {
+        "export": export_command,
         "effects": effects_command,
         "twin": twin_command,
         "reveal": reveal_command,

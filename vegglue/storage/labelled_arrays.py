@@ -22,8 +22,8 @@ def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
     """Groups of a result file as one dataset, whose attributes say what they were made from: config, config_hash,
     seed, version. Errors: InputError without xarray, StorageError for a broken file.
     """
-    xarray = _extra("xarray")
-    _extra(ENGINE)
+    xarray = extra_library("xarray")
+    extra_library(ENGINE)
     with open_hdf5(path, "r") as file:
         stated = {name: value for name, value in file.attrs.items() if not name.startswith("_")}
     parts = [xarray.load_dataset(path, group=group, engine=ENGINE) for group in groups]
@@ -32,17 +32,17 @@ def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
 
 def read_inference_data(path: Path) -> "arviz.InferenceData":
     """posterior.h5 as ArviZ sees it: posterior, prior, log_likelihood and so on. Errors: as read_labelled."""
-    arviz = _extra("arviz")
-    _extra(ENGINE)
+    arviz = extra_library("arviz")
+    extra_library(ENGINE)
     with open_hdf5(path, "r"), arviz.rc_context({"data.load": "eager"}):
         return arviz.from_netcdf(path, engine=ENGINE)
 
 
-def _extra(name: str) -> Any:
-    """A library that vegglue can do without."""
+def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load") -> Any:
+    """A library that vegglue can do without. Errors: InputError, which names who asks and the extra that has it."""
     try:
         module: ModuleType = import_module(name)
     except ImportError:
-        remedy = "run `pip install 'vegglue[arviz]'`"
-        raise InputError(f"vegglue.load: expected the library {name}, which is not installed; {remedy}.") from None
+        remedy = f"run `pip install 'vegglue[{extra}]'`"
+        raise InputError(f"{asking}: expected the library {name}, which is not installed; {remedy}.") from None
     return module

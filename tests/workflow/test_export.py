@@ -1,0 +1,130 @@
+"""What is exported is opened again by other readers, with the same numbers at the same places."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from reach import COARSE, said_to, write_reach
+
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.workflow.export import Exported, export
+
+FRAME = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"
+Done = tuple[Case, Exported, Path]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    folder = tmp_path_factory.mktemp("export")
+    case = load_case(write_reach(folder, COARSE, ("friction:\n", f"{FRAME}friction:\n")))
+    return case, export(case, runs=folder / "runs"), folder / "runs/brook/export"
+
+
+def at_cells(done: Done) -> pd.DataFrame:
+    return pd.read_csv(done[2] / "flow-june.csv")
+
+
+def test_all_forms_are_written_and_named(done: Done) -> None:
+    names = {path.name for path in done[1].files}
+    assert {
+        "stations.csv",
+        "flow-june.csv",
+        "flow.nc",
+        "bed-june.tif",
+        "u-june.tif",
+        "north_velocity-june.tif",
+    } <= names
+    assert done[1].parameters == "the middle of the priors"
+    assert all(path.is_file() for path in done[1].files)
+
+
+def test_stations_are_those_of_the_case_with_their_place_on_the_map(done: Done) -> None:
+    table = pd.read_csv(done[2] / "stations.csv")
+    assert table["value"].tolist()[:3] == [0.400, 0.436, 0.472]
+    assert done[0].frame is not None
+    x, y = done[0].frame.to_model(table["east [m]"], table["north [m]"])
+    assert np.allclose(x, table["x [m]"], atol=1e-6)
+    assert np.allclose(y, table["y [m]"], atol=1e-6)
+
+
+def test_water_flows_along_the_channel_on_the_map(done: Done) -> None:
+    table = at_cells(done)
+    wet = table["depth [m]"].notna()
+    assert wet.any()
+    assert not wet.all()
+    assert np.allclose(np.hypot(table["u [m/s]"], table["v [m/s]"])[wet],
+                       np.hypot(table["east_velocity [m/s]"], table["north_velocity [m/s]"])[wet])  # fmt: skip
+    heading = np.degrees(np.arctan2(table["north_velocity [m/s]"][wet].sum(), table["east_velocity [m/s]"][wet].sum()))
+    assert heading == pytest.approx(32.0, abs=3.0)
+
+
+def test_xarray_opens_the_mesh_with_the_same_numbers(done: Done) -> None:
+    xarray = pytest.importorskip("xarray")
+    mesh, table = xarray.load_dataset(done[2] / "flow.nc", engine="h5netcdf"), at_cells(done)
+    for name, unit in (("bed", "m"), ("level", "m"), ("u", "m/s"), ("east_velocity", "m/s")):
+        np.testing.assert_array_equal(mesh[f"{name}_june"], table[f"{name} [{unit}]"])
+        assert mesh[f"{name}_june"].attrs["units"] == unit
+    np.testing.assert_array_equal(mesh["face_x"], table["east [m]"])
+    corners = mesh["node_x"].to_numpy()[mesh["face_nodes"].to_numpy()]
+    assert np.allclose(corners.mean(axis=1), mesh["face_x"]), "nodes surround their face"
+    assert mesh.attrs["Conventions"] == "CF-1.8 UGRID-1.0"
+    assert mesh["mesh"].attrs["cf_role"] == "mesh_topology"
+    assert mesh["map"].attrs["epsg"] == 2056
+    across, along = (np.diff(part, axis=1)[:, :2] for part in (mesh["node_y"].to_numpy()[mesh["face_nodes"]], corners))
+    assert (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0] > 0.0).all(), "anticlockwise"
+
+
+def test_another_library_opens_the_mesh(done: Done) -> None:
+    netcdf = pytest.importorskip("netCDF4")
+    with netcdf.Dataset(done[2] / "flow.nc") as file:
+        values = np.ma.filled(file["depth_june"][:], np.nan)
+    np.testing.assert_array_equal(values, at_cells(done)["depth [m]"])
+
+
+def test_a_geotiff_lies_on_the_map_cell_by_cell(done: Done) -> None:
+    """As GDAL reads it: (east, north) = A (column, row), with A of the tag ModelTransformation."""
+    tifffile = pytest.importorskip("tifffile")
+    with tifffile.TiffFile(done[2] / "level-june.tif") as file:
+        page = file.pages.first
+        values, affine = page.asarray(), np.reshape(page.tags[34264].value, (4, 4))
+        assert page.tags[42113].value.startswith("-9999")
+        assert 2056 in page.tags[34735].value
+    table = at_cells(done)
+    row, column = np.indices(values.shape)
+    places = np.stack([column.ravel() + 0.5, row.ravel() + 0.5, np.zeros(values.size), np.ones(values.size)])
+    order = np.lexsort((table["y [m]"], table["x [m]"]))
+    north_up = np.reshape(np.arange(len(table))[order], values.shape[::-1]).T[::-1].ravel()
+    assert np.allclose((affine @ places)[0], table["east [m]"].to_numpy()[north_up], atol=1e-6)
+    assert np.allclose((affine @ places)[1], table["north [m]"].to_numpy()[north_up], atol=1e-6)
+    np.testing.assert_array_equal(values.ravel(), table["level [m]"].fillna(-9999.0).to_numpy()[north_up])
+
+
+def test_only_some_forms_and_a_case_without_a_frame(tmp_path: Path) -> None:
+    case = load_case(write_reach(tmp_path, COARSE))
+    found = export(case, runs=tmp_path / "runs", forms=("csv",))
+    assert [path.name for path in found.files] == ["stations.csv", "flow-june.csv"]
+    assert "east [m]" not in pd.read_csv(found.files[0]).columns
+
+
+def test_an_unknown_form_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, error = said_to(monkeypatch, capsys, "export", write_reach(tmp_path), "--only", "shape")
+    assert code == 2
+    assert "shape" in error
+
+
+def test_a_bend_lies_on_the_map_where_it_bends(tmp_path: Path) -> None:
+    """Half the grid straight, then a quarter of a circle to the left: water enters eastward and leaves northward."""
+    parts = "parts: [{length: 15}, {radius: 9.549296586, angle: 90}]"
+    bent = (COARSE[0] + "}", f"{COARSE[1]}, centreline: {{{parts}}}}}")
+    case = load_case(write_reach(tmp_path, bent))
+    found = export(case, runs=tmp_path / "runs", forms=("csv", "geotiff"))
+    assert {path.name for path in found.files} == {"stations.csv", "flow-june.csv"}
+    table = pd.read_csv(tmp_path / "runs/brook/export/flow-june.csv")
+    last = table[(table["x [m]"] > 29.0) & (table["y [m]"].abs() < 0.5)]
+    assert last["east [m]"].mean() == pytest.approx(15.0 + 9.549, abs=0.1)
+    assert last["north [m]"].mean() == pytest.approx(9.549, abs=0.8)
+    assert (last["north_velocity [m/s]"] > 5.0 * last["east_velocity [m/s]"].abs()).all()

@@ -1,0 +1,63 @@
+"""A new working folder is one that runs as it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reach import said_to
+
+import vegglue
+from vegglue.checks.case_check import check_case
+from vegglue.engine.interface import linearise
+from vegglue.engine.model import model_of
+from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow.new import Reach
+
+
+@pytest.mark.parametrize("reach", [Reach(), Reach(length=20.0, width=1.0, depth=0.3, discharge=0.1, plants=False)])
+def test_a_new_case_has_no_remarks_and_water_flows_in_it(tmp_path: Path, reach: Reach) -> None:
+    case = vegglue.new("Mill brook", reach, folder=tmp_path)
+    assert case.name == "mill-brook"
+    assert list(case.parameters) == (["n_b", "phi"] if reach.plants else ["n_b"])
+    observations = read_observations(case)
+    assert observations.table["used"].all()
+    assert check_case(case, build_site(case), observations) == []
+    assert linearise(model_of(case, observations), np.zeros(len(case.parameters))) is not None
+    assert {path.name for path in (tmp_path / "Mill brook").iterdir()} == {
+        "case.yaml", "velocities.csv", "levels.csv", "README.md",
+    }  # fmt: skip
+
+
+def test_every_key_has_its_comment_and_the_measurements_say_what_they_are(tmp_path: Path) -> None:
+    case = vegglue.new("brook", folder=tmp_path)
+    text = (tmp_path / "brook/case.yaml").read_text(encoding="utf-8")
+    assert text.count("#") > 15
+    assert "# plants" not in text
+    assert all(one.synthetic for one in case.observations)
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "brook").mkdir()
+    with pytest.raises(InputError, match="expected a name that is free"):
+        vegglue.new("brook", folder=tmp_path)
+    assert list((tmp_path / "brook").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [("--depth", "0", "--depth: expected a number above 0"), ("--length", "5", "four times")],
+)
+def test_senseless_numbers_are_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    option: str,
+    value: str,
+    said: str,
+) -> None:
+    code, error = said_to(monkeypatch, capsys, "new", "brook", "--folder", tmp_path, option, value)
+    assert code == 2
+    assert said in error
+    assert not (tmp_path / "brook").exists()

@@ -1,0 +1,110 @@
+"""name -> a working folder: a commented case of a straight reach, and measurements that belong to it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.case.text_files import case_name, write_text
+from vegglue.ensemble.solve_ensemble import solve_flow
+from vegglue.errors import InputError, shown_path
+from vegglue.flow.sensor import FlowFields
+from vegglue.workflow.new_texts import CASE, README
+
+# What the examples were made with, and their errors: the first draws of one seed, so that each time they are the same.
+TRUTH = {"n_b": 0.04, "phi": 6.0}
+VELOCITY_ERROR, LEVEL_ERROR_OF_EXAMPLE, SEED = 0.01, 0.002, 1
+# Cells across the floor: as many as a first look needs.
+CELLS_OF_FLOOR = 8
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The numbers that a new case begins with: length and width of the floor [m], slope of the bed [-], depth at the
+    outlet [m], discharge [m3/s], and whether there are plants.
+    """
+
+    length: float = 40.0
+    width: float = 3.0
+    slope: float = 0.001
+    depth: float = 0.9
+    discharge: float = 1.5
+    plants: bool = True
+
+
+def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> Case:
+    """Make <folder>/<name>/ with case.yaml, velocities.csv, levels.csv and README.md; returns the case.
+
+    The measurements are computed with TRUTH and errors, and say so; your own take their place. Errors: InputError
+    when there is such a folder already, or no water flows with these numbers; StorageError.
+    """
+    reach = reach or Reach()
+    into = Path(folder) / name
+    if into.exists():
+        raise InputError(f"{shown_path(into)}: expected a name that is free, got one in use; take another.")
+    _refuse_senseless(reach)
+    words = {"name": case_name(Path(name).name), **_numbers(reach)}
+    write_text(into / "case.yaml", _case_text(reach, words), "give another place by --folder")
+    for file, heading in (("velocities.csv", "section,x,y,u,u_se"), ("levels.csv", "x,y,level,level_se")):
+        write_text(into / file, f"{heading}\n", "give another place by --folder")
+    case = load_case(into / "case.yaml")
+    flow = solve_flow(case, {name: TRUTH[name] for name in case.parameters}).get("first")
+    if flow is None:
+        raise InputError(f"{shown_path(into)}: no steady flow is found with these numbers; try a greater --depth.")
+    _write_measurements(into, flow, reach)
+    write_text(into / "README.md", README.format(**words), "give another place by --folder")
+    return case
+
+
+def _refuse_senseless(reach: Reach) -> None:
+    for name in ("length", "width", "depth", "discharge"):
+        if getattr(reach, name) <= 0.0:
+            raise InputError(f"--{name}: expected a number above 0, got {getattr(reach, name):g}; correct it.")
+    if reach.length < 4.0 * reach.width:
+        raise InputError(
+            f"--length: expected at least four times the width, {4.0 * reach.width:g} m, got {reach.length:g}; a "
+            "shorter reach is all inflow and outlet."
+        )
+
+
+def _numbers(reach: Reach) -> dict[str, str]:
+    """Grid and patch: banks of 1:2 up to half a metre above the water, cells about twice as long as wide."""
+    dy = reach.width / CELLS_OF_FLOOR
+    beside = int(np.ceil((reach.depth + reach.slope * reach.length + 0.5) / 0.5 / dy))
+    columns = 2 * round(reach.length / dy / 4.0)
+    half = 0.5 * reach.width + beside * dy
+    patch = (reach.length / columns * round(0.4 * columns), reach.length / columns * round(0.55 * columns))
+    found = {
+        "length": reach.length, "half": half, "dx": reach.length / columns, "dy": dy, "width": reach.width,
+        "slope": reach.slope, "discharge": reach.discharge, "level": reach.depth - reach.slope * reach.length,
+        "canopy": 0.6 * reach.depth, "patch_from": patch[0], "patch_to": patch[1], "patch_side": 0.5 * reach.width,
+    }  # fmt: skip
+    return {name: f"{value:.10g}" for name, value in found.items()}
+
+
+def _case_text(reach: Reach, words: dict[str, str]) -> str:
+    text = CASE.format(**words)
+    kept = [line for line in text.splitlines() if reach.plants or not line.endswith("# plants")]
+    return "\n".join(line.removesuffix("# plants").rstrip() for line in kept) + "\n"
+
+
+def _write_measurements(into: Path, flow: FlowFields, reach: Reach) -> None:
+    """Three sections of seven verticals, before, in and behind the patch; gauges at both ends."""
+    random = np.random.default_rng(SEED)
+    rows = ["section,x,y,u,u_se"]
+    for name, share in (("A", 0.3), ("B", 0.5), ("C", 0.65)):
+        column = int(np.abs(flow.x - share * reach.length).argmin())
+        wet = np.flatnonzero(~np.isnan(flow.u[column]))
+        for row in wet[np.linspace(1, wet.size - 2, 7).round().astype(int)]:
+            u = flow.u[column, row] + VELOCITY_ERROR * random.standard_normal()
+            rows.append(f"{name},{flow.x[column]:.6g},{flow.y[row]:.6g},{u:.3f},{VELOCITY_ERROR:g}")
+    write_text(into / "velocities.csv", "\n".join(rows) + "\n", "make room")
+    levels = ["x,y,level,level_se"]
+    middle = flow.y.size // 2
+    for share in (0.1, 0.9):
+        column = int(np.abs(flow.x - share * reach.length).argmin())
+        level = flow.level[column, middle] + LEVEL_ERROR_OF_EXAMPLE * random.standard_normal()
+        levels.append(f"{flow.x[column]:.6g},{flow.y[middle]:.6g},{level:.3f},{LEVEL_ERROR_OF_EXAMPLE:g}")
+    write_text(into / "levels.csv", "\n".join(levels) + "\n", "make room")
