@@ -111,6 +111,22 @@ def test_commands_print_what_is_shown(tmp_path: Path) -> None:
             assert any(is_said(wanted, each) for each in said), "\n".join([f"$ {line}", f"shown: {wanted}", *said])
 
 
+@pytest.mark.slow
+def test_files_of_the_page_are_read_as_shown(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "own_files.md"
+    text = page.read_text(encoding="utf-8")
+    site = tmp_path / "mill"
+    site.mkdir()
+    for language, name in (("text", "velocities june.txt"), ("yaml", "site.yaml")):
+        found = re.search(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+        assert found
+        (site / name).write_text(found[1], encoding="utf-8")
+    for one in shown_in(page):
+        said = printed(one.command, tmp_path)
+        for wanted in one.lines:
+            assert any(is_said(wanted, each) for each in said), "\n".join([one.command, f"shown: {wanted}", *said])
+
+
 def printed(line: str, folder: Path) -> list[str]:
     """What a command of vegglue prints, in a folder."""
     name, *arguments = line.split()
