@@ -23,8 +23,8 @@ def test_what_cannot_be_written_is_told_and_leaves_the_old(tmp_path: Path, monke
     def full(*names: Path) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("vegglue.case.text_files.os.replace", full)
-    with pytest.raises(StorageError, match=r"note\.txt: cannot be written \(No space left on device\); make room\.$"):
+    monkeypatch.setattr("vegglue.whole_files.os.replace", full)
+    with pytest.raises(StorageError, match=r"note\.txt: the disk is full; make room\.$"):
         write_text(path, "new", "make room")
     assert path.read_text(encoding="utf-8") == "old"
 

@@ -1,11 +1,11 @@
 """Text files read up to a size and written whole or not at all, and names of cases made of any words."""
 
-import os
 import re
 import stat
 from pathlib import Path
 
-from vegglue.errors import InputError, StorageError, shown_path
+from vegglue.errors import InputError, shown_path
+from vegglue.whole_files import write_file
 
 # Signs that no text of a case may hold: control characters but tabs and ends of lines, halves of characters (which no
 # file can hold), and marks that turn the direction of what follows.
@@ -50,16 +50,12 @@ def write_text(path: Path, text: str, advice: str) -> None:
 
     Errors: StorageError, which ends with the advice; InputError for a sign that no file in UTF-8 can hold.
     """
-    new = path.with_name(path.name + ".new")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        new.write_text(text, encoding="utf-8")
-        os.replace(new, path)
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written ({error.strerror}); {advice}.") from None
+        content = text.encode()
     except UnicodeEncodeError as error:  # of the name of a folder, which need not be text
         sign = error.object[error.start]
         raise InputError(f"{str(path)!a}: cannot hold the sign {sign!a} of a name; rename what has it.") from None
+    write_file(path, content, advice)
 
 
 def case_name(words: str, otherwise: str = "case") -> str:

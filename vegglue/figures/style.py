@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any, ParamSpec
 
@@ -18,6 +18,8 @@ from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+
+from vegglue.whole_files import MAKE_ROOM, write_file
 
 Drawing = ParamSpec("Drawing")
 # name: (light, dark). Blue for the model, vermilion for measurements: told apart in every common colour blindness.
@@ -135,9 +137,10 @@ def formula_labels(axes: Axes, across: str = "", upward: str = "") -> None:
 
 def save(figure: Figure, path: Path, dots_per_inch: float = 200) -> None:
     """Write a figure by itself, PNG or SVG by the ending of `path`, in a folder that is made if need be."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    drawn = BytesIO()
     with _styled_context():
-        figure.savefig(path, dpi=dots_per_inch)
+        figure.savefig(drawn, format=path.suffix.removeprefix("."), dpi=dots_per_inch)
+    write_file(path, drawn.getvalue(), MAKE_ROOM)
 
 
 @dataclass(frozen=True)
@@ -173,8 +176,7 @@ def _lay_out(figure: Figure) -> None:
 
 def publish_text(svg: str, folder: Path, name: str, caption: str, alt: str) -> Picture:
     """Write folder/name.svg, a picture that is SVG text already, and return it for the page."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.svg").write_text(svg, encoding="utf-8")
+    write_file(folder / f"{name}.svg", svg.encode(), MAKE_ROOM)
     width = re.search(r'viewBox="0 0 ([\d.]+)', svg)
     return Picture(name, caption, alt, inline(svg, name, alt), round(float(width[1])) if width else 0)
 

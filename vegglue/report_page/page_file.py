@@ -1,14 +1,13 @@
 """A page as a file: one self-contained HTML file that needs no network, filled from a template beside this file."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jinja2
 
-from vegglue.errors import StorageError
 from vegglue.figures.style import palette_css
+from vegglue.whole_files import MAKE_ROOM, write_file
 
 # What is inlined in every page, from the files beside this one.
 STYLE, SCRIPT = "page.css", "sections.js"
@@ -19,12 +18,7 @@ def write_page(path: Path, page: Callable[[], str]) -> Path:
 
     Errors: StorageError when a file cannot be written.
     """
-    try:
-        text = page()
-        path.with_name(f"{path.name}.new").write_text(text, encoding="utf-8")
-        os.replace(path.with_name(f"{path.name}.new"), path)
-    except OSError as error:
-        raise StorageError(f"{path}: the report cannot be written ({error}); make room and run it again.") from error
+    write_file(path, page().encode(), MAKE_ROOM)
     return path
 
 

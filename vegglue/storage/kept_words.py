@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from vegglue.case.text_files import write_text
 from vegglue.results.ladder import Ladder, ladder_from, ladder_json
 from vegglue.results.open_questions import OpenQuestion, questions_from, questions_json
+from vegglue.whole_files import MAKE_ROOM
 
 LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue comparison 1", "vegglue questions 1"
 COMPARISON_FILE, QUESTIONS_FILE = "comparison.json", "questions.json"
@@ -39,7 +40,7 @@ def questions_that_fit(folder: Path, config_hash: str) -> tuple[OpenQuestion, ..
 
 def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
     tree = {"format": file_format, "config_hash": config_hash, "told": told}
-    write_text(path, json.dumps(tree, ensure_ascii=False, indent=1) + "\n", "make room and run it again")
+    write_text(path, json.dumps(tree, ensure_ascii=False, indent=1) + "\n", MAKE_ROOM)
 
 
 def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:

@@ -24,10 +24,10 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
+from vegglue.whole_files import MAKE_ROOM
 from vegglue.workflow.compare import Comparison, keep_ladder
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
-    MAKE_ROOM,
     best_place,
     calibrated,
     calibrated_anew,

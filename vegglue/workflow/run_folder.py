@@ -25,16 +25,17 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.storage.result_files import read_posterior, stored_hash
+from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 # Standard errors within which two ends of a fit are one place. Chosen, not measured.
 SAME_PLACE = 1.0
-MAKE_ROOM = "make room and run it again"
 
 
 def folder_of(runs: Path | str, case: Case) -> Path:
-    """Where the results of a case lie; made if need be."""
+    """Where the results of a case lie; made if need be. Errors: StorageError."""
     folder = Path(runs) / case.name
-    folder.mkdir(parents=True, exist_ok=True)
+    with failed_writes_told(folder, "expected a folder that can be made there; give another one by --runs"):
+        folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
@@ -68,8 +69,10 @@ def known_place(case: Case, folder: Path) -> Array | None:
     try:
         found = json.loads((folder / "best.json").read_text(encoding="utf-8"))
         if found["config_hash"] == wanted:
-            return z_at(case, {name: np.array([found["theta"][name]]) for name in case.parameters})[0]
-    except (OSError, ValueError, KeyError, TypeError):
+            z = z_at(case, {name: np.array([float(found["theta"][name])]) for name in case.parameters})[0]
+            if np.isfinite(z).all():  # a file that was edited may hold anything
+                return z
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         pass
     if stored_hash(folder / "posterior.h5") != wanted:
         return None
