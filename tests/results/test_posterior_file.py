@@ -75,7 +75,7 @@ def test_failed_write_leaves_the_older_posterior(tmp_path: Path, monkeypatch: py
     write_posterior(path, a_posterior(False), "", HASH)
 
     with monkeypatch.context() as patch:
-        patch.setattr("vegglue.storage.hdf5.os.fsync", no_space)
+        patch.setattr("vegglue.whole_files.os.fsync", no_space)
         with pytest.raises(StorageError, match="the disk is full"):
             write_posterior(path, a_posterior(True), "", "e" * 64)
     assert stored_hash(path) == HASH

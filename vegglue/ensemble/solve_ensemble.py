@@ -67,6 +67,9 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
+        if writer.set_aside is not None:
+            watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
+        writer.reopen_damaged(chunks)
         todo = [index for index in range(len(chunks)) if index not in writer.done]
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed, phase = resumed, 0, f"solving {case.name}"

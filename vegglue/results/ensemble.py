@@ -92,12 +92,17 @@ def unsolved(header: Header) -> dict[str, Group]:
     rows = {name: _filled(row, sizes) for name, row in ROWS.items()}
     rows["section_x"] = Variable(("section",), np.array([x for _, x in header.sections], float), "m")
     parameters = {name: Variable(("member",), values, header.units[name]) for name, values in header.parameters.items()}
-    finished = {"finished": Variable(("chunk",), np.zeros(header.chunks, np.int8))}
+    progress = {
+        "finished": Variable(("chunk",), np.zeros(header.chunks, np.int8)),
+        "digest": Variable(
+            ("chunk",), np.zeros(header.chunks, np.uint32)
+        ),  # CRC-32 of all that is stored of its members
+    }
     return {
         "members": Group(coordinates, rows),
         "parameters": Group({"member": coordinates["member"]}, parameters),
         "stations": table_group(header.station, "station", STATION_UNITS),
-        "progress": Group({"chunk": np.arange(header.chunks)}, finished),
+        "progress": Group({"chunk": np.arange(header.chunks)}, progress),
     }
 
 

@@ -4,10 +4,9 @@ Every group holds its own dimensions as scales. What is stored of which result s
 grows in `resume`.
 """
 
-import errno
-import os
+import fcntl
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,13 @@ import numpy as np
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.layout import Group
+from vegglue.storage.digest import is_unchanged, with_digest
+from vegglue.storage.foreign_files import why_foreign
+from vegglue.whole_files import write_file
+
+# What reading a damaged file may raise, of Python or of the HDF5 library.
+UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
+WRITTEN_STAYS = "what was written before is whole: make room, then run the same command again"
 
 
 def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
@@ -23,18 +29,8 @@ def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str
 
     Errors: StorageError when it cannot be written; a file of that name from before stays as it was.
     """
-    new = path.with_name(path.name + ".new")
     image = _image(groups, attributes)  # in memory: on a full disk the HDF5 library crashes instead of raising
-    try:
-        with storage_errors(path):
-            with new.open("wb") as file:
-                file.write(image)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(new, path)
-    finally:
-        with suppress(OSError):
-            new.unlink(missing_ok=True)
+    write_file(path, with_digest(image), WRITTEN_STAYS)
 
 
 def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
@@ -48,22 +44,58 @@ def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
 
 @contextmanager
 def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
-    """An open file for the length of the block. Errors: StorageError when it cannot be opened."""
+    """An open file for the length of the block: "r" for one that is whole, "r+" for one that grows.
+
+    Without locks of the HDF5 library: whole files are never changed in place, and a growing one is guarded by the lock
+    of its folder and may be looked at. Errors: StorageError when it cannot be opened, has changed since it was written,
+    or holds what leads out of it.
+    """
+    again = "remove it and run the step that makes it again"
     try:
-        file = h5py.File(path, mode)
-    except OSError as error:
-        what = f"{path}: cannot be opened ({error}); remove it and run the step that makes it again."
-        raise StorageError(what) from error
+        if mode == "r" and not is_unchanged(path):
+            refuse_in_use(path)
+            raise StorageError(f"{path}: is broken, it has changed since it was written; {again}.")
+        file = _without_locks(path, mode)
+    except StorageError:
+        raise
+    except UNREADABLE as error:
+        raise StorageError(f"{path}: cannot be opened ({error}); {again}.") from error
     with file:
+        try:
+            foreign = why_foreign(file)
+        except UNREADABLE as error:
+            raise StorageError(f"{path}: is broken ({error}); {again}.") from error
+        if foreign:
+            raise StorageError(f"{path}: {foreign}, which vegglue never writes, and is not read; {again}.")
         yield file
+
+
+def refuse_in_use(path: Path) -> None:
+    """Errors: StorageError when another program has the file open to change it, which locks it; OSError without one."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise StorageError(f"{path} is in use by another program; close it there.") from error
+        except OSError:
+            pass  # a file system without locks cannot tell
+
+
+def _without_locks(path: Path, mode: str) -> h5py.File:
+    try:
+        return h5py.File(path, mode, locking=False)
+    except OSError as error:
+        if "locking flag" not in str(error):
+            raise
+        return h5py.File(path, mode)  # this very process has it open, with locks
 
 
 def stored_attribute(path: Path, attribute: str) -> str | None:
     """An attribute of a file, None when there is no readable file or it has none of that name."""
     try:
-        with h5py.File(path, "r") as file:
+        with open_hdf5(path, "r") as file:
             return str(file.attrs[attribute])
-    except (OSError, KeyError):
+    except UNREADABLE:
         return None
 
 
@@ -74,19 +106,7 @@ def read_groups(file: h5py.File) -> dict[str, dict[str, np.ndarray]]:
 
 def read_group(group: h5py.Group) -> dict[str, np.ndarray]:
     """All datasets of a group by name, strings as str and booleans as bool."""
-    return {name: _values(dataset) for name, dataset in group.items() if isinstance(dataset, h5py.Dataset)}
-
-
-@contextmanager
-def storage_errors(path: Path) -> Iterator[None]:
-    """Turn a failed write into one sentence; h5py tells some of them as RuntimeError."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        full = getattr(error, "errno", None) == errno.ENOSPC or "No space left" in str(error)
-        what = "the disk is full" if full else f"cannot be written ({error})"
-        advice = "what was written before is whole: make room, then run the same command again"
-        raise StorageError(f"{path}: {what}; {advice}.") from error
+    return {name: read_values(dataset) for name, dataset in group.items() if isinstance(dataset, h5py.Dataset)}
 
 
 def _write_group(file: h5py.File, name: str, content: Group) -> None:
@@ -121,7 +141,8 @@ def _dataset(group: h5py.Group, name: str, values: Any, compressed: tuple[int, .
     return dataset
 
 
-def _values(dataset: h5py.Dataset) -> np.ndarray:
+def read_values(dataset: h5py.Dataset) -> np.ndarray:
+    """All values of a dataset, strings as str and booleans as bool."""
     if h5py.check_string_dtype(dataset.dtype):
         return dataset.asstr()[...].astype(object)
     return dataset[...].astype(bool) if dataset.attrs.get("dtype") == "bool" else dataset[...]

@@ -17,13 +17,14 @@ def hold_lock(folder: Path) -> Iterator[None]:
     """Hold `folder/.lock` for the length of the block; the file says who holds it (pid, host, time).
 
     The lock itself is `flock`, so what a killed run left behind is taken over without asking. The file is emptied, not
-    removed: removing a locked file would let two runs hold two files of one name.
+    removed: removing a locked file would let two runs hold two files of one name. A link is not followed: what it names
+    is another's.
 
     Errors: StorageError when a living process holds it, or the folder cannot be written.
     """
     path = folder / ".lock"
     try:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
     except OSError as error:
         raise StorageError(f"{path}: cannot be written ({error.strerror}); make {folder} writable.") from error
     try:

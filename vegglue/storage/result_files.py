@@ -17,7 +17,7 @@ from vegglue.results.fields import Fields, fields_from
 from vegglue.results.median_flow import flow_attributes, flow_from, flow_groups
 from vegglue.results.posterior import Posterior
 from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
-from vegglue.storage.hdf5 import open_hdf5, read_groups, stored_attribute, write_whole
+from vegglue.storage.hdf5 import UNREADABLE, open_hdf5, read_groups, stored_attribute, write_whole
 from vegglue.storage.resume import part_file
 
 POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 3", "vegglue flow 1"
@@ -87,8 +87,11 @@ def flow_that_fits(path: Path, config_hash: str, theta: Mapping[str, float]) -> 
     wanted = flow_attributes(theta) | {"config_hash": config_hash, "format": FLOW_FORMAT}
     if any(stored_attribute(path, name) != value for name, value in wanted.items()):
         return None
-    with open_hdf5(path, "r") as file:
-        return flow_from(read_groups(file))
+    try:
+        with open_hdf5(path, "r") as file:
+            return flow_from(read_groups(file))
+    except UNREADABLE:
+        return None
 
 
 def stored_hash(path: Path) -> str | None:
@@ -109,5 +112,5 @@ def _read(path: Path, expected_hash: str | None, step: str, understand: Callable
             )
         try:
             return understand(read_groups(file), dict(file.attrs))
-        except (KeyError, OSError, TypeError, ValueError) as error:
+        except UNREADABLE as error:
             raise StorageError(f"{path}: is broken or of another version ({error}); remove it and {remedy}.") from error

@@ -2,46 +2,42 @@
 
 The datasets of the part file are laid out whole before the first member is solved: appending then changes no structure
 and needs no more disk, so a run killed at any moment leaves a file that opens. The next run with the same config, seed,
-version and cut into chunks solves only the chunks that are not marked as finished.
-
-Fields wait as single-precision numbers in a plain file, every member at a place of its own, until all are there:
-a compressed HDF5 file changes its structure with every append, and a kill in the middle could leave nothing of it.
+version and cut into chunks solves only the chunks that are not marked as finished, or whose digest is another.
 """
 
-import math
 import os
-from collections.abc import Iterator, Mapping
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from vegglue.arrays import Single
+from vegglue.errors import StorageError
 from vegglue.results.ensemble import ROWS, Header, unsolved
-from vegglue.results.fields import QUANTITIES, FieldWindow, fields_group
-from vegglue.storage.hdf5 import open_hdf5, read_group, storage_errors, write_whole
+from vegglue.results.fields import fields_group
+from vegglue.results.layout import Group
+from vegglue.storage.digest import append_digest
+from vegglue.storage.hdf5 import UNREADABLE, WRITTEN_STAYS, open_hdf5, read_values, refuse_in_use, write_whole
 from vegglue.storage.lock import hold_lock
+from vegglue.storage.unfinished_fields import (
+    FIELDS_PART,
+    UnfinishedFields,
+    all_fields,
+    is_reserved,
+    reserve,
+    unfinished_fields,
+    write_fields,
+)
+from vegglue.whole_files import failed_writes_told
 
 ENSEMBLE_FORMAT, FIELDS_FORMAT = "vegglue ensemble 1", "vegglue fields 1"
-
-
-@dataclass(frozen=True)
-class UnfinishedFields:
-    """Where the fields of a run wait: an array of `shape` (member, ...) in single precision, behind a mark
-    that says which run it is.
-    """
-
-    path: Path
-    mark: bytes
-    shape: tuple[int, ...]
-    window: FieldWindow
-
-    @property
-    def member_bytes(self) -> int:
-        return 4 * math.prod(self.shape[1:])
+# What changes while a run is on its way, by group.
+GROWING = {"members": tuple(ROWS), "progress": ("finished", "digest")}
+KeptRows = Mapping[str, Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -58,6 +54,21 @@ class EnsembleWriter:
         """Chunks that need not be solved again."""
         return set(np.flatnonzero(self.file["progress/finished"][:]).tolist())
 
+    def reopen_damaged(self, chunks: Sequence[np.ndarray]) -> None:
+        """Count a finished chunk as not solved where what is stored of its members is not what was written.
+
+        chunks: the members of each (indices into the ensemble).
+        """
+        stored = {name: self.file["members"][name][...] for name in ROWS}
+        fields = None if self.unfinished is None else all_fields(self.unfinished)
+        for chunk in self.done:
+            members = np.sort(chunks[chunk])
+            rows = [values[members] for values in stored.values() if values.size]
+            found = _digest([*rows, *(() if fields is None else [fields[members]])])
+            if found != self.file["progress/digest"][chunk]:
+                self.file["progress/finished"][chunk] = 0
+        self._sync()
+
     def append(
         self, chunk: int, members: np.ndarray, rows: Mapping[str, np.ndarray], fields: np.ndarray | None = None
     ) -> None:
@@ -73,12 +84,14 @@ class EnsembleWriter:
             raise ValueError(f"chunk {chunk}: expected fields, got none")
         if set(rows) != set(ROWS):
             raise ValueError(f"chunk {chunk}: expected the rows {sorted(ROWS)}, got {sorted(rows)}")
-        with storage_errors(self.path):
-            for name, values in rows.items():
-                if group[name].size:  # h5py cannot select members of nothing: a case without stations
-                    group[name][members[order]] = _fitted(values, group[name])[order]
+        sorted_rows = {name: _fitted(rows[name], group[name].dtype)[order] for name in ROWS if group[name].size}
+        sorted_fields = [] if fields is None else [fields.astype(np.float32)[order]]
+        with failed_writes_told(self.path, WRITTEN_STAYS):
+            for name, values in sorted_rows.items():  # h5py cannot select members of nothing: a case without stations
+                group[name][members[order]] = values
             if self.unfinished is not None and fields is not None:
-                _write_fields(self.unfinished, members, fields)
+                write_fields(self.unfinished, members, fields)
+            self.file["progress/digest"][chunk] = _digest([*sorted_rows.values(), *sorted_fields])
             self._sync()  # rows and fields must be on disk before they are called finished
             self.file["progress/finished"][chunk] = 1
             self._sync()
@@ -95,21 +108,34 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
 
     A part file of another config, seed, version or cut into chunks, or a broken one, is moved to `path`.part.old, never
     mixed in.
-    Errors: StorageError when another run holds the folder or the disk is full.
+    Errors: StorageError when another run holds the folder, its files cannot be written or the disk is full.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part, unfinished = part_file(path), _unfinished_fields(path.parent, header)
+    with failed_writes_told(path, WRITTEN_STAYS):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise StorageError(f"{path}: expected a file or nothing, found a folder; move it away.")
+        if path.exists():
+            refuse_in_use(path)
+    part, unfinished = part_file(path), unfinished_fields(path.parent, header)
     with hold_lock(path.parent):
-        resumable = (unfinished is None or _is_reserved(unfinished)) and _resumable(part, header)
-        set_aside = _set_aside(part) if part.exists() and not resumable else None
-        if not part.exists():
-            _lay_out(part, unfinished, header)
+        kept = _kept_rows(part, header) if unfinished is None or is_reserved(unfinished) else None
+        set_aside = _set_aside(part) if kept is None and _is_there(part) else None
+        _lay_out(part, unfinished, header, kept)
         with open_hdf5(part, "r+") as file:
             writer = EnsembleWriter(file, part, set_aside, unfinished)
             yield writer
             complete = len(writer.done) == header.chunks
         if complete:
-            _finish(path, unfinished, header)
+            with failed_writes_told(path, WRITTEN_STAYS):
+                _finish(path, unfinished, header)
+
+
+def remove_left_over_fields(path: Path) -> None:
+    """Take away `fields.part` of a run that was killed after its ensemble at `path` was whole. Errors: StorageError."""
+    left = path.with_name(FIELDS_PART)
+    if left.exists() and not part_file(path).exists():
+        with hold_lock(path.parent), failed_writes_told(left, WRITTEN_STAYS):
+            left.unlink(missing_ok=True)
 
 
 def _attributes(header: Header) -> dict[str, Any]:
@@ -122,99 +148,95 @@ def part_file(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
-def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header) -> None:
-    """All room a run will need, the fields first: a part of an ensemble without its fields cannot be."""
-    if unfinished is not None:
-        with storage_errors(unfinished.path):
-            _reserve(unfinished)
-    write_whole(part, unsolved(header), _attributes(header))
+def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header, kept: KeptRows | None) -> None:
+    """All room a run will need, the fields first: a part of an ensemble without its fields cannot be.
+
+    What an earlier run has kept is laid out anew as well: nothing is ever written into a file as it was found.
+    """
+    if unfinished is not None and kept is None:
+        with failed_writes_told(unfinished.path, WRITTEN_STAYS):
+            reserve(unfinished)
+    groups = unsolved(header) if kept is None else _with_rows(unsolved(header), kept)
+    write_whole(part, groups, _attributes(header))
 
 
 def _finish(path: Path, unfinished: UnfinishedFields | None, header: Header) -> None:
     """Fields before the ensemble, which stands for both: a run killed in between only has this to do again."""
-    if unfinished is None:
-        os.replace(part_file(path), path)
-        return
-    group = fields_group(unfinished.window, header.experiments, _all_fields(unfinished))
-    own = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
-    write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own)
+    if unfinished is not None:
+        group = fields_group(unfinished.window, header.experiments, all_fields(unfinished))
+        own = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
+        write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own)
+    append_digest(part_file(path))
     os.replace(part_file(path), path)
-    unfinished.path.unlink()
+    if unfinished is not None:
+        unfinished.path.unlink()
 
 
-def _resumable(part: Path, header: Header) -> bool:
-    """Whether the part file holds members of exactly this run."""
+def _kept_rows(part: Path, header: Header) -> KeptRows | None:
+    """What is stored of members and progress by a run of exactly this header; None where there is no such file."""
+    if part.is_symlink():
+        return None
     try:
-        with h5py.File(part, "r") as file:
-            same = all(file.attrs[name] == value for name, value in _attributes(header).items())
-            parameters = read_group(file["parameters"])
-            return (
-                same
-                and len(file["progress/finished"]) == header.chunks
-                and all(np.array_equal(parameters[name], values) for name, values in header.parameters.items())
-            )
-    except (OSError, KeyError):
-        return False
+        with open_hdf5(part, "r") as file:
+            if any(file.attrs[name] != value for name, value in _attributes(header).items()):
+                return None
+            kept = {name: {key: file[name][key][...] for key in keys} for name, keys in GROWING.items()}
+            groups = unsolved(header)
+            for name, rows in kept.items():
+                if any(values.shape != groups[name].variables[key].values.shape for key, values in rows.items()):
+                    return None
+            return kept if all(_is_laid_out(file[name], group) for name, group in groups.items()) else None
+    except UNREADABLE:
+        pass
+    return None
+
+
+def _is_laid_out(stored: h5py.Group, group: Group) -> bool:
+    """Whether a group holds the values that do not change."""
+    growing = {key for keys in GROWING.values() for key in keys}
+    values = {**group.coordinates, **{key: one.values for key, one in group.variables.items()}}
+    return all(_equal(read_values(stored[name]), np.asarray(values[name])) for name in values.keys() - growing)
+
+
+def _with_rows(groups: Mapping[str, Group], kept: KeptRows) -> dict[str, Group]:
+    """The groups with the values of the rows kept."""
+
+    def filled(group: Group, rows: Mapping[str, np.ndarray]) -> Group:
+        variables = {
+            key: replace(group.variables[key], values=np.asarray(values, group.variables[key].values.dtype))
+            for key, values in rows.items()
+        }
+        return replace(group, variables={**group.variables, **variables})
+
+    return {name: filled(group, kept[name]) if name in kept else group for name, group in groups.items()}
+
+
+def _equal(found: np.ndarray, values: np.ndarray) -> bool:
+    return bool(
+        (found == values).all() if values.dtype.kind in "OUS" else np.array_equal(found, values, equal_nan=True)
+    )
+
+
+def _is_there(path: Path) -> bool:
+    return path.exists() or path.is_symlink()
 
 
 def _set_aside(part: Path) -> Path:
-    return part.replace(part.with_name(part.name + ".old"))
+    with failed_writes_told(part, f"remove {part} and run the same command again"):
+        return part.replace(part.with_name(part.name + ".old"))
 
 
-def _fitted(values: Any, dataset: h5py.Dataset) -> np.ndarray:
-    """Values as the dataset holds them; text cut to its room without splitting a character."""
-    if dataset.dtype.kind != "S":
-        return np.asarray(values, dataset.dtype)
-    room = dataset.dtype.itemsize
-    return np.array([str(text).encode()[:room].decode(errors="ignore").encode() for text in values], dataset.dtype)
+def _digest(arrays: Sequence[np.ndarray]) -> int:
+    """CRC-32 of the members of a chunk, in their order."""
+    found = 0
+    for values in arrays:
+        found = zlib.crc32(np.ascontiguousarray(values).tobytes(), found)
+    return found
 
 
-def _unfinished_fields(folder: Path, header: Header) -> UnfinishedFields | None:
-    """What a run with this header writes its fields to, (member, experiment, quantity, x, y); None if it keeps none."""
-    if (window := header.window) is None:
-        return None
-    shape = (header.members, len(header.experiments), len(QUANTITIES), window.x.size, window.y.size)
-    return UnfinishedFields(folder / "fields.part", f"vegglue fields of {header.config_hash}\n".encode(), shape, window)
-
-
-def _reserve(unfinished: UnfinishedFields) -> None:
-    """Take the room of all members, each NaN. Errors: OSError when there is none, and then nothing is left behind."""
-    nothing = np.full(unfinished.shape[1:], np.nan, np.float32).tobytes()
-    try:
-        with unfinished.path.open("wb") as file:
-            file.write(unfinished.mark)
-            for _ in range(unfinished.shape[0]):
-                file.write(nothing)
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError:
-        unfinished.path.unlink(missing_ok=True)
-        raise
-
-
-def _is_reserved(unfinished: UnfinishedFields) -> bool:
-    """Whether the file is there, of this run and of full size."""
-    try:
-        with unfinished.path.open("rb") as file:
-            mine = file.read(len(unfinished.mark)) == unfinished.mark
-            size = os.fstat(file.fileno()).st_size
-    except OSError:
-        return False
-    return mine and size == len(unfinished.mark) + unfinished.shape[0] * unfinished.member_bytes
-
-
-def _write_fields(unfinished: UnfinishedFields, members: np.ndarray, values: Single) -> None:
-    """Write values (len(members), ...) of some members, onto the disk. Errors: OSError."""
-    if values.shape != (len(members), *unfinished.shape[1:]):
-        raise ValueError(f"expected fields of shape {(len(members), *unfinished.shape[1:])}, got {values.shape}")
-    with unfinished.path.open("r+b") as file:
-        for member, own in zip(members, values, strict=True):
-            file.seek(len(unfinished.mark) + int(member) * unfinished.member_bytes)
-            file.write(own.astype(np.float32).tobytes())
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _all_fields(unfinished: UnfinishedFields) -> Single:
-    """The whole array, read as it is used."""
-    return np.memmap(unfinished.path, np.float32, "r", offset=len(unfinished.mark), shape=unfinished.shape)
+def _fitted(values: Any, dtype: np.dtype) -> np.ndarray:
+    """Values as a dataset of this type holds them; text cut to its room without splitting a character."""
+    if dtype.kind != "S":
+        return np.asarray(values, dtype)
+    room = dtype.itemsize
+    return np.array([str(text).encode()[:room].decode(errors="ignore").encode() for text in values], dtype)

@@ -13,6 +13,7 @@ from vegglue.parallel import one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.storage.result_files import read_ensemble, stored_hash
+from vegglue.storage.resume import remove_left_over_fields
 from vegglue.workflow.run_folder import folder_of, of_size
 
 
@@ -36,6 +37,7 @@ def simulate(
         _share_one_beside(case, path)
     if not is_simulated(case, runs):
         solve_ensemble(case, read_observations(case), path, jobs, watch)
+    remove_left_over_fields(path)
     return read_ensemble(path)
 
 
