@@ -20,7 +20,9 @@ class InputError(ValueError):
 
 
 class StorageError(OSError):
-    """A result could not be written or read: says which file, why, and what is still safe."""
+    """The machine refuses: a result could not be written or read, or a process was killed. Says what, why, and what is
+    still safe.
+    """
 
     def __str__(self) -> str:
         return _in_one_line(super().__str__())

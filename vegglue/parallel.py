@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from itertools import count
@@ -19,7 +20,7 @@ from typing import Any
 from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import threadpool_limits
 
-from vegglue.errors import InputError
+from vegglue.errors import InputError, StorageError
 from vegglue.progress import silent
 
 # Threads that may be begun beside those at work, in what is done within `at_most`.
@@ -42,13 +43,19 @@ def taken(taker: Taker) -> Iterator[None]:
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
     """work(*task) for every task, in the order in which they end. What all tasks share is best held by `work`, as in
-    functools.partial: it then travels once to each process of a cluster.
+    functools.partial: it then travels once to each process of a cluster. Errors: StorageError when a process was killed.
     """
     taker = _TAKER.get()
     if taker is not None:
         yield from (found for _, found in taker(work, tasks))
-    else:
+        return
+    try:
         yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+    except BrokenProcessPool as error:
+        raise StorageError(
+            "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
+            "the same command again, with fewer --jobs if this repeats."
+        ) from error
 
 
 def side_by_side(

@@ -1,11 +1,11 @@
 """The entry point of the shell: its list of commands, and what becomes of errors."""
 
-import sys
 from collections.abc import Callable
 
 import typer
 
 from vegglue.cli.effect_commands import effects_command
+from vegglue.cli.endings import ending_well
 from vegglue.cli.ensemble_commands import check_command, infer_command, report_command, run_command, simulate_command
 from vegglue.cli.loop_commands import (
     compare_command,
@@ -17,7 +17,6 @@ from vegglue.cli.loop_commands import (
 )
 from vegglue.cli.map_commands import export_command, new_command
 from vegglue.cli.twin_commands import reveal_command, twin_command
-from vegglue.errors import InputError, StorageError
 from vegglue.version import VERSION
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
@@ -65,19 +64,8 @@ for _group, _commands in COMMANDS.items():
 
 
 def main() -> None:
-    """Entry point: errors a user can mend are one sentence and exit code 2, a full disk or a lock 3, Ctrl-C 130."""
-    try:
-        app()
-    except InputError as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-    except StorageError as error:
-        print(error, file=sys.stderr)
-        sys.exit(3)
-    except SystemExit as ended:
-        if ended.code == 130:  # typer has made this of Ctrl-C
-            print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
-        raise
+    """Entry point."""
+    ending_well(app)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,8 @@ def console(errors: bool = False) -> "Console":
 
 def print_object(tree: Mapping[str, Any] | list[Any]) -> None:
     """Print keys and values as one JSON object on one line; numbers that are none as null."""
-    print(json.dumps(plain(tree), ensure_ascii=False, allow_nan=False))
+    spelt_out = "utf" not in (sys.stdout.encoding or "").lower()
+    print(json.dumps(plain(tree), ensure_ascii=spelt_out, allow_nan=False))
 
 
 def plain(value: Any) -> Any:

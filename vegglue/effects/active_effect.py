@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import ADDED, Effect, Stage
+from vegglue.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,10 @@ def applied(
         on = active.on
         if active.effect.stage != stage or not on.any():
             continue
-        change = active.effect.act(surroundings, **active.values)
+        try:
+            change = active.effect.act(surroundings, **active.values)
+        except SystemExit:  # of a user's effect; it would end the command as if all were well
+            raise InputError(f"The effect `{active.effect.name}` ends the program when it acts; mend it.") from None
         for name, value in change.items():
             if name in added:
                 now[name] = now[name] + _chosen(on, value, np.zeros(1))

@@ -47,7 +47,7 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever a file of the user's may raise
+    except (Exception, SystemExit) as error:  # whatever a file of the user's may raise
         raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
     found = getattr(module, "EFFECTS", None)
     if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):

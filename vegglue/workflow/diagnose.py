@@ -34,11 +34,11 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
         return kept
     with at_most(jobs):
         found = diagnose_model(model_in(case), watch, validation_of(case))
-    write_diagnosis(path, found, resolved_yaml(case), wanted)
     from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     remember_place(case, folder, found.parameters.first)
+    write_diagnosis(path, found, resolved_yaml(case), wanted)  # last: where it is, nothing else is missing
     return found
 
 

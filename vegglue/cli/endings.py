@@ -1,0 +1,63 @@
+"""How a command ends: its exit code, and one sentence where something went wrong; and what it prints to."""
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from vegglue.errors import InputError, StorageError
+
+MISTAKE, MACHINE, STOPPED = 2, 3, 130  # exit codes
+KEPT_ANYWAY = "what was finished is kept"
+
+
+def ending_well(command: Callable[[], object]) -> None:
+    """Run a command: errors a user can mend are one sentence and exit code 2, what the machine refuses (a full disk, a
+    lock, no memory) 3, Ctrl-C 130.
+    """
+    _make_printable()
+    try:
+        command()
+    except InputError as error:
+        _end(str(error), MISTAKE)
+    except StorageError as error:
+        _end(str(error), MACHINE)
+    except OSError as error:
+        where = "The output, or a file," if error.filename is None else error.filename
+        _end(f"{where} cannot be used ({error.strerror or error}); {KEPT_ANYWAY}: mend that, run it again.", MACHINE)
+    except MemoryError:
+        _end(f"The memory is full; {KEPT_ANYWAY}: run it again with fewer --jobs, or a coarser grid.", MACHINE)
+    except SystemExit as ended:
+        if ended.code == STOPPED:  # typer has made this of Ctrl-C
+            _end("Stopped; what was solved is kept, run the same command again to go on.", STOPPED)
+        _flush()
+        raise
+    _flush()
+
+
+def _end(sentence: str, code: int) -> None:
+    with suppress(OSError):
+        print(sentence, file=sys.stderr, flush=True)
+    with suppress(OSError):
+        sys.stdout.flush()
+    sys.exit(code)
+
+
+def _make_printable() -> None:
+    """Output that is closed goes nowhere, and a terminal that knows fewer letters shows what it can."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(errors="replace")
+
+
+def _flush() -> None:
+    """Print what waits, now, while a full disk can still be told."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries, and complains, again
+        _end(f"The output cannot be used ({error.strerror}); {KEPT_ANYWAY}: mend that, run it again.", MACHINE)
