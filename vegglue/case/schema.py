@@ -135,7 +135,8 @@ class Numerics(Part):
     march_span: Positive | None = Field(
         default=None, description="flow time after which a marched member has failed, 2400 when left out [s]"
     )
-    tolerance: Positive = Field(
+    # A centimetre, or a centimetre a second, is what is measured: a member that far off is not solved.
+    tolerance: Annotated[Number, Field(gt=0, le=0.01)] = Field(
         default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
     )
 

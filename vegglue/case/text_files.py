@@ -7,6 +7,7 @@ from pathlib import Path
 from vegglue.errors import InputError, shown_path
 from vegglue.whole_files import write_file
 
+LONGEST_NAME = 100  # letters of the name of a case, as in its schema
 # Signs that no text of a case may hold: control characters but tabs and ends of lines, halves of characters (which no
 # file can hold), and marks that turn the direction of what follows.
 UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
@@ -63,4 +64,4 @@ def case_name(words: str, otherwise: str = "case") -> str:
 
     otherwise: the name when nothing is left.
     """
-    return re.sub(r"[^a-z0-9_-]+", "-", words.lower()).strip("-")[:100] or otherwise
+    return re.sub(r"[^a-z0-9_-]+", "-", words.lower()).strip("-")[:LONGEST_NAME] or otherwise

@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Cluster, Config, Jobs, Json, Members, Quiet, Runs, Trust
+from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 
@@ -31,6 +31,7 @@ def simulate_command(
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
+    force: Force = False,
 ) -> None:
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
     case = vegglue.load_case(config, trust)
@@ -40,7 +41,7 @@ def simulate_command(
     case = of_size(case, members)
     current = is_simulated(case, runs)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch)
+        ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
     if as_object:
         from vegglue.cli.objects import object_of
 
@@ -96,6 +97,7 @@ def run_command(
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
+    force: Force = False,
 ) -> None:
     """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report before and after."""
     case, results = vegglue.load_case(config, trust), list[tuple[Any, Any]]()
@@ -106,7 +108,7 @@ def run_command(
             tell(of, runs, result, as_object)
 
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show)
+        vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show, force=force)
     if as_object:
         from vegglue.cli.objects import run_object
 

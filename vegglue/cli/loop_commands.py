@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Cluster, Config, Jobs, Json, Quiet, Runs, Trust, number_given
+from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
@@ -22,6 +22,7 @@ def import_command(
     ] = None,
     as_object: Json = False,
     quiet: Quiet = False,
+    force: Force = False,
 ) -> None:
     """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
 
@@ -29,7 +30,7 @@ def import_command(
 
     The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
     """
-    case = vegglue.import_folder(folder, to)
+    case = vegglue.import_folder(folder, to, force=force)
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
     imported = [one.model_dump() for one in case.imported or ()]
@@ -78,6 +79,7 @@ def extend_command(
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
+    force: Force = False,
 ) -> None:
     """Write a child config that extends its parent by one effect or more."""
     shapes = dict(number_given(text) for text in shape or [])
@@ -86,10 +88,10 @@ def extend_command(
     case = vegglue.load_case(config, trust)
     if auto:
         with heard(quiet, as_object) as watch:
-            extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch)
+            extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
         tell(case, runs, extension, as_object)
         return
-    child = vegglue.extend(case, add or [], shapes=shapes, to=to)
+    child = vegglue.extend(case, add or [], shapes=shapes, to=to, force=force)
     target = shown_path(child.source)
     if as_object:
         print_object({"config": target, "case": child.name, "added": add})

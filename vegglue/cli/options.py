@@ -33,6 +33,7 @@ Members = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, not how far the command is.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace also what you made or edited, or a larger ensemble.")]
 Trust = Annotated[bool, typer.Option("--trust", help="Run the effects of the config's own `effect_file`.")]
 
 

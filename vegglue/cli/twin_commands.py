@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import vegglue
-from vegglue.cli.options import Json, Quiet, Runs
+from vegglue.cli.options import Force, Json, Quiet, Runs
 from vegglue.cli.output import print_object
 from vegglue.errors import shown_path
 
@@ -23,10 +23,11 @@ def twin_command(
     seed: Annotated[int, typer.Option(min=0, help="Decides parameters, errors and what `?` is.")] = 1,
     as_object: Json = False,
     quiet: Quiet = False,
+    force: Force = False,
 ) -> None:
     """Make measurements with a hidden effect, to play blind against `diagnose`; the answer is sealed."""
     parent = vegglue.load_case(config)
-    case = vegglue.make_twin(parent, to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed)
+    case = vegglue.make_twin(parent, to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed, force=force)
     from vegglue.measurements.observations import read_observations
 
     target = shown_path(case.source)

@@ -1,5 +1,6 @@
 """A child config: what it extends, which effects it adds, with a prior for the amplitude of each."""
 
+import hashlib
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ import pandas as pd
 from vegglue.case.messages import nearest
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import LONGEST_NAME, case_name
 from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
@@ -112,4 +113,8 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
 
 def child_name(parent: str, added: Sequence[Candidate]) -> str:
     """A name for the child's folder of results."""
-    return case_name("-".join([parent, *(candidate.key for candidate in added)]))
+    words = "-".join([parent, *(candidate.key for candidate in added)])
+    name = case_name(words)
+    if len(name) < LONGEST_NAME:
+        return name
+    return f"{name[:-9]}-{hashlib.sha256(words.encode()).hexdigest()[:8]}"  # cut, it could be its parent's

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from vegglue.case.made_files import write_made
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.case.text_files import case_name, write_text
-from vegglue.errors import InputError
+from vegglue.case.text_files import case_name
+from vegglue.errors import InputError, shown_path
 from vegglue.measurements.kinds import KINDS, Kind, kind_of
 from vegglue.site.centreline import on_map
 from vegglue.site.grid import centreline_in
@@ -17,8 +18,11 @@ from vegglue.site.grid import centreline_in
 SEAL = "answer.sealed"
 
 
-def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Path:
-    """Write all files and return the config. Errors: StorageError when the folder cannot be written."""
+def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force: bool = False) -> Path:
+    """Write all files and return the config. force: replace what vegglue did not write, too.
+
+    Errors: InputError when such files are there; StorageError when the folder cannot be written.
+    """
     name = case_name(folder.resolve().name, "twin")
     used = _on_the_map(case, station[station["used"].to_numpy(bool)])
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
@@ -31,9 +35,12 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str) -> Pa
     }
     note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
     texts = {kind.file: _stations(used, kind) for kind in kinds}
-    for file, text in (texts | {f"{name}.yaml": note + as_yaml(tree), SEAL: seal}).items():
-        write_text(folder / file, text, "give another folder by --to")
-    return folder / f"{name}.yaml"
+    target = folder / f"{name}.yaml"
+    if target.resolve() == case.source:
+        raise InputError(f"--to {shown_path(folder)}: holds the config that the twin is made of; give another folder.")
+    named = texts | {SEAL: seal, target.name: note + as_yaml(tree)}
+    write_made({folder / file: text for file, text in named.items()}, "give another folder by --to", force)
+    return target
 
 
 def _on_the_map(case: Case, station: pd.DataFrame) -> pd.DataFrame:

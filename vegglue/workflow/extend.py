@@ -9,22 +9,21 @@ import pandas as pd
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.case.config import load_case
+from vegglue.case.made_files import write_made
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.case.text_files import write_text
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
-from vegglue.whole_files import MAKE_ROOM
 from vegglue.workflow.compare import Comparison, keep_ladder
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
@@ -63,33 +62,41 @@ class StepwiseExtension:
 
 
 def extend(
-    case: Case, add: Sequence[str], *, shapes: Mapping[str, float] | None = None, to: Path | str | None = None
+    case: Case,
+    add: Sequence[str],
+    *,
+    shapes: Mapping[str, float] | None = None,
+    to: Path | str | None = None,
+    force: bool = False,
 ) -> Case:
     """Write a config that extends the case by effects, each with a prior for its amplitude, and read it.
 
     add: names such as `streamlining` or `discharge_error[high]`; shapes: values of their shapes by name; to: the config
-    to write, beside the parent if not given. Errors: InputError for an unknown effect, place or shape.
+    to write, beside the parent if not given; force: replace a file there that vegglue did not write, too. Errors:
+    InputError for an unknown effect, place or shape, or a file that would be replaced.
     """
     added = named_candidates(case, add, shapes or {})
     target = child_path(case.source, [one for one, _ in added]) if to is None else Path(to)
-    return write_child(case, target, added)
+    return write_child(case, target, added, force)
 
 
 @one_thread()
 def extend_stepwise(
-    case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
+    case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent, force: bool = False
 ) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
     and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case.
+
+    force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
     """
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     with at_most(jobs):
-        extension = _extended(case, found, runs, watch)
+        extension = _extended(case, found, runs, watch, force)
     keep_ladder(extension.comparison, extension.cases, runs, extension.reason)
     return extension
 
 
-def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch) -> StepwiseExtension:
+def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, force: bool) -> StepwiseExtension:
     """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
     watch(Progress(f"calibrating {case.name}"))
@@ -113,7 +120,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch) -> S
         base = tried[names]
         assert base is not None
         added = [named[name] for name in names]
-        cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added))
+        cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added, force))
         remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base))
         bases.append(base)
     # Only now are the measurements for validation looked at.
@@ -171,12 +178,14 @@ def child_path(parent: Path, added: Sequence[Candidate]) -> Path:
     return parent.with_name("+".join([parent.stem, *(candidate.key for candidate in added)]) + parent.suffix)
 
 
-def write_child(parent: Case, target: Path, added: Sequence[Addition]) -> Case:
-    """Write the config that extends `parent`, and read it back as any other."""
+def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bool = False) -> Case:
+    """Write the config that extends `parent`, and read it back as any other. Errors: InputError for another's file."""
+    if target.resolve() == parent.source:
+        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
-    write_text(target, text + as_yaml(tree), MAKE_ROOM)
+    write_made({target: text + as_yaml(tree)}, "move it away", force)
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 

@@ -3,39 +3,51 @@
 A further layout of folders is a file in `importers/` that makes the keys and values of a config, and a line here.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from vegglue.case.config import load_case
+from vegglue.case.made_files import write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
-from vegglue.case.text_files import write_text
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 
 
-def import_folder(folder: Path | str, to: Path | str | None = None) -> Case:
+def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
     """Make a case of a folder of measurements: site.json or site.yaml and tables, or a published set.
 
     to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
-    makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. Errors: InputError for what is
-    missing or cannot be read.
+    makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. force: replace files that were
+    edited or not made here, too. Errors: InputError for what is missing or cannot be read, or would be replaced.
     """
     folder = Path(folder)
     target = _default_target(folder) if to is None else Path(to)
     if (of_matlab := mat_folder(folder)) is not None and not holds_confluence(folder):
         folder = tables_of_mat(of_matlab, target.with_name(f"{target.stem}-data") / "tables")
     if holds_confluence(folder):
-        _write_config(target, folder, case_from_confluence(folder, target))
-        _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target))
+        tree, tables = _with_tables(folder, target)
+        _write_config(target, folder, tree, force, tables)
+        _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target), force)
     else:
-        _write_config(target, folder, case_from_folder(folder, target))
+        _write_config(target, folder, case_from_folder(folder, target), force)
     return load_case(target)
 
 
-def _write_config(path: Path, folder: Path, tree: Tree) -> None:
+def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
     text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
-    write_text(path, text, "give another file by --to")
+    write_made({**(tables or {}), path: text}, "give another file by --to", force)
+
+
+def _with_tables(folder: Path, target: Path) -> tuple[Tree, dict[Path, str]]:
+    """The config of the confluence set, and its tables as text, to be written when it is known that they may be."""
+    with TemporaryDirectory() as name:
+        elsewhere = Path(name)
+        tree = case_from_confluence(folder, elsewhere / target.name)
+        made = sorted(path for path in elsewhere.rglob("*") if path.is_file())
+        return tree, {target.parent / path.relative_to(elsewhere): path.read_text(encoding="utf-8") for path in made}
 
 
 def _default_target(folder: Path) -> Path:

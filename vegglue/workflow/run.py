@@ -15,7 +15,7 @@ from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 from vegglue.workflow.infer import infer
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of, of_size
-from vegglue.workflow.simulate import is_simulated, simulate
+from vegglue.workflow.simulate import is_simulated, refuse_to_shrink, simulate
 
 Show = Callable[[Case, Any], None]
 
@@ -32,16 +32,18 @@ def run(
     jobs: int = -1,
     watch: Watch = silent,
     show: Show = _unseen,
+    force: bool = False,
 ) -> StepwiseExtension:
     """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then ensemble,
     posterior and report of the case and of its last child. What is up to date is not made again. members: size of the
-    ensembles instead of the case's.
+    ensembles instead of the case's; force: replace a child that was edited by hand and a larger ensemble, too.
 
     show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
     Posterior, the Path of a page, or a sentence.
     """
+    refuse_to_shrink(of_size(case, members), runs, force)
     show(case, diagnose(case, runs=runs, jobs=jobs, watch=watch))
-    extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch)
+    extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, extension)
     last = extension.cases[-1]
     if last.source != case.source:
@@ -54,16 +56,16 @@ def run(
     from vegglue.workflow.report import report
 
     # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
-    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show)]:
+    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show, force)]:
         show(each, report(each, runs=runs, members=members, watch=watch))
     return extension
 
 
-def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show) -> bool:
+def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool) -> bool:
     """Makes the ensemble and the posterior of a case where they are not up to date; False where it has none."""
     folder = folder_of(runs, case)
     current = is_simulated(case, runs)
-    ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch)
+    ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
     if stored_hash(folder / "posterior.h5") == case_hash(case):
         show(case, f"{folder / 'posterior.h5'} is up to date.")

@@ -19,20 +19,28 @@ from vegglue.workflow.run_folder import folder_of, of_size
 
 @one_thread()
 def simulate(
-    case: Case, *, runs: Path | str = "runs", members: int | None = None, jobs: int = -1, watch: Watch = silent
+    case: Case,
+    *,
+    runs: Path | str = "runs",
+    members: int | None = None,
+    jobs: int = -1,
+    watch: Watch = silent,
+    force: bool = False,
 ) -> Ensemble:
     """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields).
 
     An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
-    ensemble does not depend on; one that was stopped goes on where it was. members: size of the
-    ensemble instead of the case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is
-    told how far it is. Predictions are (member, station), in m/s for velocities and m for levels.
+    ensemble does not depend on; one that was stopped goes on where it was. members: size of the ensemble instead of the
+    case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is told how far it is;
+    force: replace a larger ensemble of the case, too. Predictions are (member, station), in m/s for velocities and m
+    for levels.
 
-    Errors: InputError for a case without parameters, or fields beyond their budget; StorageError when another run holds
-    the folder or the disk is full.
+    Errors: InputError for a case without parameters, fields beyond their budget, or a larger ensemble there;
+    StorageError when another run holds the folder or the disk is full.
     """
     case = of_size(case, members)
     path = folder_of(runs, case) / "ensemble.h5"
+    refuse_to_shrink(case, runs, force)
     if not is_simulated(case, runs):
         _share_one_beside(case, path)
     if not is_simulated(case, runs):
@@ -49,6 +57,20 @@ def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
     except (InputError, StorageError):
         return False
     return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
+
+
+def refuse_to_shrink(case: Case, runs: Path | str, force: bool) -> None:
+    """Errors: InputError when a finished ensemble of the case with more members would be replaced, unless forced."""
+    path = Path(runs) / case.name / "ensemble.h5"
+    stored = None if force else stored_hash(path)
+    if stored in (None, simulation_hash(case)):
+        return
+    members = len(read_ensemble(path).status)
+    if members > case.simulate.members and stored == simulation_hash(of_size(case, members)):
+        raise InputError(
+            f"{path}: holds {members:,} members of this case, which {case.simulate.members:,} would replace; ask for "
+            f"--members {members}, give another folder by --runs, or add --force."
+        )
 
 
 def _share_one_beside(case: Case, path: Path) -> None:

@@ -25,18 +25,20 @@ def make_twin(
     snr: float = 6.0,
     noise: str = "white",
     seed: int = 1,
+    force: bool = False,
 ) -> Case:
     """Make measurements at the stations of a case from a truth that hides something; config, tables and the sealed
     answer are written into a folder.
 
     hide: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any; snr: how visible an effect
-    without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`. Errors: InputError.
+    without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`; force: replace
+    files there that vegglue did not write, too. Errors: InputError.
     """
     model = model_in(case)
     if not case.parameters:
         raise InputError(f"{case.source}: `parameters` expected a prior or more, got none; add one.")
     station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
-    return load_case(write_twin(case, Path(to), station, sealed_answer(answer)))
+    return load_case(write_twin(case, Path(to), station, sealed_answer(answer), force))
 
 
 def reveal(folder: Path | str, *, runs: Path | str = "runs") -> list[str]:
