@@ -1,0 +1,106 @@
+"""Every fault of docs/faults.md happens here: what is said, what is kept, and that the next try has the same bits."""
+
+import re
+from pathlib import Path
+
+import pytest
+from fault_table import ENSEMBLE, FAULTS, PAGE, Fault, page
+from kills import same
+from reach import COARSE, said_to, write_reach
+
+SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
+STEPS = ("simulate", "infer")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The user's folder after all steps, when nothing happens."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        write_reach(folder, *SIXTEEN)
+        for step in STEPS:
+            assert code_of(patch, step) == 0
+    return folder
+
+
+def code_of(patch: pytest.MonkeyPatch, step: str) -> int:
+    from vegglue.cli.main import main
+
+    patch.setattr("sys.argv", ["vegglue", *words(step)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def words(command: str) -> list[str]:
+    name, *options = command.split()
+    return [name, "brook.yaml", *options, *(["--jobs", "1"] if name in STEPS else [])]
+
+
+def pattern(sentence: str) -> str:
+    return re.escape(sentence).replace(re.escape("..."), ".+")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=[f"{one.command}: {one.what}" for one in FAULTS])
+def test_a_fault_is_told_and_loses_nothing(
+    fault: Fault,
+    undisturbed: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_reach(tmp_path, *SIXTEEN)
+    for step in fault.ready:
+        assert said_to(monkeypatch, capsys, *words(step)) == (0, "")
+    before = contents(tmp_path)
+    with fault.trouble(tmp_path):
+        there = contents(tmp_path)
+        code, error = said_to(monkeypatch, capsys, *words(fault.command))
+    assert code == fault.code, error
+    assert re.fullmatch(pattern(fault.sees), error.removesuffix("\n")), error
+    if code:
+        now = contents(tmp_path)
+        changed = [name for name, content in there.items() if now.get(name) != content]
+        assert changed == [], "nothing that was there is touched"
+    restore(tmp_path, before, undisturbed)
+    for step in STEPS:
+        assert said_to(monkeypatch, capsys, *words(step)) == (0, "")
+    for name in (ENSEMBLE, ENSEMBLE.with_name("posterior.h5")):
+        assert same(tmp_path / name, undisturbed / name), name
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+def restore(folder: Path, before: dict[str, bytes], undisturbed: Path) -> None:
+    """What the sentence asks for: inputs as they were, broken results and what stands in their place taken away."""
+    for name in ("brook.yaml", "velocities.csv"):
+        (folder / name).write_bytes(before[name])
+    run = folder / "runs/brook"
+    if run.is_file():
+        run.unlink()
+    for name in ("ensemble.h5", "posterior.h5"):
+        path = run / name
+        if path.is_dir():
+            path.rmdir()
+        elif path.exists() and not same_or_broken(path, undisturbed / ENSEMBLE.with_name(name)):
+            path.unlink()
+
+
+def same_or_broken(path: Path, other: Path) -> bool:
+    try:
+        return same(path, other)
+    except (OSError, KeyError, RuntimeError, ValueError):
+        return False
+
+
+def test_the_page_of_faults_is_made_of_the_table() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "`python tests/fault_table.py` writes it"
