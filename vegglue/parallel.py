@@ -43,7 +43,7 @@ def taken(taker: Taker) -> Iterator[None]:
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
     """work(*task) for every task, in the order in which they end. What all tasks share is best held by `work`, as in
-    functools.partial: it then travels once to each process of a cluster. Errors: StorageError when a process was killed.
+    functools.partial: it then travels once to each process of a cluster. Errors: StorageError when one was killed.
     """
     taker = _TAKER.get()
     if taker is not None:

@@ -11,7 +11,7 @@ from stored import ALL, HASH, WINDOW, a_header, append, assert_whole, members_of
 
 from vegglue.errors import StorageError
 from vegglue.storage.result_files import read_ensemble, stored_hash
-from vegglue.storage.resume import ensemble_writer, remove_left_over_fields
+from vegglue.storage.resume import EnsembleWriter, ensemble_writer, part_file, remove_left_over_fields
 
 CHUNKS_OF_MEMBERS = [np.sort(members_of(chunk)) for chunk in sorted(ALL)]
 
@@ -216,6 +216,25 @@ def test_a_growing_file_can_be_followed_with_locks_on(path: Path) -> None:
             code = "import h5py,sys; print(h5py.File(sys.argv[1])['progress/finished'][:].sum())"
             said = subprocess.run([sys.executable, "-c", code, writer.path], capture_output=True, text=True, check=True)
             assert int(said.stdout) == chunk + 1
+
+
+def test_a_growing_file_is_resumed_from_any_of_its_states(path: Path, tmp_path: Path) -> None:
+    states = []
+
+    def keep(writer: EnsembleWriter) -> None:
+        states.append((writer.path.read_bytes(), writer.done))
+
+    with ensemble_writer(path, a_header()) as writer:
+        keep(writer)
+        for chunk in sorted(ALL):
+            append(writer, chunk)
+            keep(writer)
+    for number, (content, done) in enumerate(states):
+        other = tmp_path / str(number) / "ensemble.h5"
+        other.parent.mkdir()
+        part_file(other).write_bytes(content)
+        assert write_chunks(other, ALL, a_header()) == done
+        assert_whole(other, a_header())
 
 
 def test_a_file_that_this_process_has_open_is_read(path: Path) -> None:

@@ -29,11 +29,16 @@ def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str
 
     Errors: StorageError when it cannot be written; a file of that name from before stays as it was.
     """
-    image = _image(groups, attributes)  # in memory: on a full disk the HDF5 library crashes instead of raising
-    write_file(path, with_digest(image), WRITTEN_STAYS)
+    write_file(path, with_digest(_image(groups, attributes)), WRITTEN_STAYS)
+
+
+def write_to_grow(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
+    """As write_whole, for a file that will change: without a digest. Errors: StorageError."""
+    write_file(path, _image(groups, attributes), WRITTEN_STAYS)
 
 
 def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
+    """A file in memory: on a full disk the HDF5 library crashes instead of raising."""
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs.update(attributes)
         for name, content in groups.items():

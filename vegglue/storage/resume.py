@@ -21,7 +21,15 @@ from vegglue.results.ensemble import ROWS, Header, unsolved
 from vegglue.results.fields import fields_group
 from vegglue.results.layout import Group
 from vegglue.storage.digest import append_digest
-from vegglue.storage.hdf5 import UNREADABLE, WRITTEN_STAYS, open_hdf5, read_values, refuse_in_use, write_whole
+from vegglue.storage.hdf5 import (
+    UNREADABLE,
+    WRITTEN_STAYS,
+    open_hdf5,
+    read_values,
+    refuse_in_use,
+    write_to_grow,
+    write_whole,
+)
 from vegglue.storage.lock import hold_lock
 from vegglue.storage.unfinished_fields import (
     FIELDS_PART,
@@ -157,7 +165,7 @@ def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header, ke
         with failed_writes_told(unfinished.path, WRITTEN_STAYS):
             reserve(unfinished)
     groups = unsolved(header) if kept is None else _with_rows(unsolved(header), kept)
-    write_whole(part, groups, _attributes(header))
+    write_to_grow(part, groups, _attributes(header))
 
 
 def _finish(path: Path, unfinished: UnfinishedFields | None, header: Header) -> None:
