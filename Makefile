@@ -5,7 +5,9 @@ JOBS ?= -1
 DEMO_MEMBERS ?= 64
 # What the demo's one page shows, the best thing first.
 DEMO_CONFIGS := runs/demo/willows.yaml $(addprefix configs/,d3a_refined.yaml d3a.yaml d0.yaml d3b.yaml)
+# How long the fuzzer runs, and how many kills the faults are tried with.
 MINUTES ?= 60
+KILLS ?= 208
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -18,7 +20,7 @@ SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo paper test check bench blind confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper test check bench blind faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -74,6 +76,10 @@ bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
 
 blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)
+
+faults: $(READY)  # every command killed at random moments, counted in docs/faults.md: half an hour
+	$(BIN)/python tests/kills.py $(KILLS)
+	$(BIN)/python tests/fault_table.py
 
 confluence: $(READY)  # the numbers of docs/confluence.md, from the published set in the folder DATA
 	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)

@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,11 @@ from unittest.mock import patch
 
 import h5py
 import numpy as np
+
+from vegglue.case.config import load_case
+from vegglue.ensemble import solve_ensemble
+from vegglue.measurements.observations import read_observations
+from vegglue.progress import Progress
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "faults.md"
@@ -32,7 +37,8 @@ class Fault:
     """A fault, and the command it meets, in words; the exit code and the sentence (... for what differs each time).
 
     kept: what is kept, in words. trouble: makes it happen in the folder of a user for as long as it is entered. ready:
-    commands given before. lost: whether the ensemble is solved again.
+    whether an ensemble and a posterior are there already. solves: chunks of members, of four, that the command and the
+    next try solve together.
     """
 
     what: str
@@ -41,16 +47,16 @@ class Fault:
     sees: str
     kept: str
     trouble: Trouble
-    ready: tuple[str, ...] = ("simulate", "infer")
+    solves: int
+    ready: bool = True
 
 
-def failing(name: str, error: BaseException, after: int = 0) -> Trouble:
-    """A function of the system that fails, from some call on."""
+def failing(owner: Any, name: str, error: BaseException, after: int = 0) -> Trouble:
+    """A function that fails, from some call on."""
 
     @contextmanager
     def trouble(folder: Path) -> Iterator[None]:
-        module, _, function = name.rpartition(".")
-        real, calls = getattr(__import__(module, fromlist=[function]), function), []
+        real, calls = getattr(owner, name), []
 
         def fails(*arguments: Any, **more: Any) -> Any:
             calls.append(1)
@@ -58,7 +64,7 @@ def failing(name: str, error: BaseException, after: int = 0) -> Trouble:
                 raise error
             return real(*arguments, **more)
 
-        with patch(name, fails):
+        with patch.object(owner, name, fails):
             yield
 
     return trouble
@@ -124,22 +130,15 @@ def locked(path: Path) -> Iterator[None]:
 @contextmanager
 def half_solved(folder: Path, change: Callable[[Path], Any] = lambda path: None) -> Iterator[None]:
     """Two of four chunks are there from a run that was stopped."""
-    from vegglue.case.config import load_case
-    from vegglue.ensemble.solve_ensemble import solve_ensemble
-    from vegglue.measurements.observations import read_observations
-
     case = load_case(folder / "brook.yaml")
-    told = []
 
-    def stop(progress: Any) -> None:
-        told.append(progress)
-        if progress.done >= 8:
+    def stop(progress: Progress) -> None:
+        if progress.done >= case.simulate.members // 2:
             raise KeyboardInterrupt
 
-    try:
-        solve_ensemble(case, read_observations(case), folder / ENSEMBLE, 1, stop)
-    except KeyboardInterrupt:
-        change(folder / PART)
+    with suppress(KeyboardInterrupt):
+        solve_ensemble.solve_ensemble(case, read_observations(case), folder / ENSEMBLE, 1, stop)
+    change(folder / PART)
     yield
 
 
@@ -151,78 +150,83 @@ FULL, READ_ONLY = OSError(errno.ENOSPC, "No space left on device"), OSError(errn
 MAKE_ROOM = "make room and run it again."
 GO_ON = "what was written before is whole: make room, then run the same command again."
 AGAIN = "remove it and run the step that makes it again."
-CHUNK = "vegglue.ensemble.solve_ensemble._solve_numbered"
 BEFORE, OLD, CHUNKS = "what was there before", "the older result", "every finished chunk; the rest is solved next time"
+HEADING = "| what happens | command | code | what the user sees | what is kept | chunks solved |"
 FAULTS = (
     Fault("full disk, from the start", "simulate", 3, f"{PART}: the disk is full; {GO_ON}", BEFORE,
-          failing("os.fsync", FULL), ready=()),
+          failing(os, "fsync", FULL), 4, ready=False),
     Fault("full disk, half-way", "simulate", 3, f"{PART}: the disk is full; {GO_ON}", CHUNKS,
-          failing("os.fsync", FULL, after=4), ready=()),
-    Fault("full disk", "infer", 3, f"{RUN}/posterior.h5: the disk is full; {GO_ON}", OLD, failing("os.fsync", FULL)),
+          failing(os, "fsync", FULL, after=6), 5, ready=False),
+    Fault("full disk", "infer", 3, f"{RUN}/posterior.h5: the disk is full; {GO_ON}", OLD,
+          failing(os, "fsync", FULL), 0),
     Fault("full disk", "report", 3, f"{RUN}/figures/...: the disk is full; {MAKE_ROOM}", OLD,
-          failing("os.fsync", FULL)),
-    Fault("full disk", "check", 3, f"{RUN}/channel.png: the disk is full; {MAKE_ROOM}", OLD, failing("os.fsync", FULL)),
+          failing(os, "fsync", FULL), 0),
+    Fault("full disk", "check", 3, f"{RUN}/channel.png: the disk is full; {MAKE_ROOM}", OLD,
+          failing(os, "fsync", FULL), 0),
     Fault("read-only folder", "simulate", 3,
           f"{RUN}: cannot be written (Read-only file system); make the folder runs writable, then run it again.",
-          BEFORE, failing("pathlib.Path.mkdir", READ_ONLY), ready=()),
+          BEFORE, failing(Path, "mkdir", READ_ONLY), 4, ready=False),
     Fault("a file where the run's folder would be", "check", 3,
           f"{RUN}: cannot be written (File exists); expected a folder that can be made there; give another one by "
-          "--runs.", BEFORE, done_to(RUN, without_solved), ready=()),
+          "--runs.", BEFORE, done_to(RUN, without_solved), 4, ready=False),
     Fault("a folder where the ensemble would be", "simulate", 3,
           f"{ENSEMBLE}: expected a file or nothing, found a folder; move it away.", BEFORE,
-          done_to(ENSEMBLE, as_folder)),
+          done_to(ENSEMBLE, as_folder), 4),
     Fault("a worker is killed, or runs out of memory", "simulate", 3,
           "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
           "the same command again, with fewer --jobs if this repeats.", CHUNKS,
-          failing(CHUNK, BrokenProcessPool(), after=2), ready=()),
+          failing(solve_ensemble, "solve_chunk", BrokenProcessPool(), after=2), 4, ready=False),
     Fault("no memory left", "simulate", 3,
           "The memory is full; what was finished is kept: run it again with fewer --jobs, or a coarser grid.", CHUNKS,
-          failing(CHUNK, MemoryError(), after=2), ready=()),
+          failing(solve_ensemble, "solve_chunk", MemoryError(), after=2), 4, ready=False),
     Fault("two runs of one name", "simulate", 3, f"{RUN} is in use by ...; wait for it to end, or stop it.",
-          "what the first one does", lambda folder: locked(folder / RUN / ".lock"), ready=()),
+          "what the first one does", lambda folder: locked(folder / RUN / ".lock"), 4, ready=False),
     Fault("the ensemble is cut short", "infer", 3, f"{ENSEMBLE}: cannot be opened (...); {AGAIN}", OLD,
-          done_to(ENSEMBLE, cut_short)),
+          done_to(ENSEMBLE, cut_short), 4),
     Fault("one bit of the ensemble flipped", "infer", 3,
-          f"{ENSEMBLE}: is broken, it has changed since it was written; {AGAIN}", OLD, done_to(ENSEMBLE, flipped)),
+          f"{ENSEMBLE}: is broken, it has changed since it was written; {AGAIN}", OLD, done_to(ENSEMBLE, flipped), 4),
     Fault("one bit of the ensemble flipped", "simulate", 0, NOTHING, "nothing of it: all members are solved again",
-          done_to(ENSEMBLE, flipped)),
+          done_to(ENSEMBLE, flipped), 4),
     Fault("one bit of the posterior flipped", "report", 3,
           f"{RUN}/posterior.h5: is broken, it has changed since it was written; {AGAIN}", OLD,
-          done_to(RUN / "posterior.h5", flipped)),
+          done_to(RUN / "posterior.h5", flipped), 0),
     Fault("a foreign file that leads to another one", "infer", 3,
           f"{ENSEMBLE}: members/prediction is a link, which vegglue never writes, and is not read; {AGAIN}",
-          "every other file: no link is followed", done_to(ENSEMBLE, leading_out)),
-    Fault("a stopped run", "simulate", 0, NOTHING, CHUNKS, half_solved, ready=()),
+          "every other file: no link is followed", done_to(ENSEMBLE, leading_out), 4),
+    Fault("a stopped run", "simulate", 0, NOTHING, CHUNKS, half_solved, 2, ready=False),
     Fault("a stopped run, one bit of a member flipped", "simulate", 0, NOTHING,
-          "every other chunk; that one is solved again", lambda folder: half_solved(folder, damaged_member), ready=()),
+          "every other chunk; that one is solved again", lambda folder: half_solved(folder, damaged_member),
+          3, ready=False),
     Fault("a stopped run whose file is cut short", "simulate", 0, NOTHING,
           "the broken file, as ensemble.h5.part.old; all members are solved again",
-          lambda folder: half_solved(folder, cut_short), ready=()),
+          lambda folder: half_solved(folder, cut_short), 4, ready=False),
     Fault("a stopped run whose file leads to another one", "simulate", 0, NOTHING,
           "every other file; the foreign one as ensemble.h5.part.old", lambda folder: half_solved(folder, leading_out),
-          ready=()),
+          4, ready=False),
     Fault("a stopped run", "infer", 2,
           f"{ENSEMBLE}: found only a part of the members; run `vegglue simulate CONFIG` to solve the rest.",
-          CHUNKS, half_solved, ready=()),
+          CHUNKS, half_solved, 2, ready=False),
     Fault("the clock jumps by twenty years", "simulate", 0, NOTHING, "everything: no time of a file is looked at",
-          done_to(ENSEMBLE, lambda path: os.utime(path, (2.5e9, 2.5e9)))),
+          done_to(ENSEMBLE, lambda path: os.utime(path, (2.5e9, 2.5e9))), 0),
     Fault("the config was changed", "infer", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, a data "
           "file or vegglue changed since this was made; run `vegglue simulate CONFIG` again.", OLD,
-          done_to("brook.yaml", replaced("high: 0.10", "high: 0.12"))),
+          done_to("brook.yaml", replaced("high: 0.10", "high: 0.12")), 0),
     Fault("a data file was changed", "report", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, a "
           "data file or vegglue changed since this was made; run `vegglue simulate CONFIG` again.", OLD,
-          done_to("velocities.csv", replaced("0.436", "0.437"))),
+          done_to("velocities.csv", replaced("0.436", "0.437")), 0),
     Fault("fewer members than are there", "simulate --members 8", 2,
-          f"{ENSEMBLE}: holds 16 members of this case, which 8 would replace; ask for --members 16, give another "
-          "folder by --runs, or add --force.", OLD, lambda folder: nullcontext()),
+          f"{ENSEMBLE}: holds 256 members of this case, which 8 would replace; ask for --members 256, give another "
+          "folder by --runs, or add --force.", OLD, lambda folder: nullcontext(), 0),
 )  # fmt: skip
 
 
 def rows() -> str:
     """The table of the page."""
-    lines = ["| what happens | command | code | what the user sees | what is kept |", "|---|---|---:|---|---|"]
+    lines = [HEADING, "|---|---|---:|---|---|---:|"]
     for one in FAULTS:
-        lines.append(f"| {one.what} | `{one.command}` | {one.code} | {one.sees or 'nothing of it'} | {one.kept} |")
+        lines.append(
+            f"| {one.what} | `{one.command}` | {one.code} | {one.sees or 'nothing of it'} | {one.kept} | {one.solves} |"
+        )
     return "\n".join(lines)
 
 
@@ -251,7 +255,8 @@ said, and then gives the same command once more, undisturbed. `python tests/faul
 ## Faults and what comes of them
 
 Codes are those of [the commands](commands.md#what-is-kept-and-how-a-command-ends). Wherever a command can go on
-afterwards, its numbers have the bits of a run that nothing disturbed.
+afterwards, its numbers have the bits of a run that nothing disturbed. The ensemble has four chunks of members: the last
+column counts those that the command and the next `simulate` solve together.
 
 {rows}
 

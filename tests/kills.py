@@ -5,12 +5,14 @@
 
 import argparse
 import json
+import math
 import os
 import shutil
 import signal
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +25,11 @@ from reach import COARSE, write_reach
 # Of the wall clock, or of who ran it: another one each time.
 OF_THE_CLOCK = ("seconds",)
 WITH_ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.02}")
-CHANGES = (COARSE, ("members: 1024", "members: 16"), WITH_ERRORS)
+# So many members that there are four chunks of them, and a kill may come between.
+CHANGES = (COARSE, ("members: 1024", "members: 256"), WITH_ERRORS)
 # In this order, each on what those before have left; what each writes among the user's files is part of the outcome.
-COMMANDS = (
+Commands = Sequence[tuple[str, ...]]
+COMMANDS: Commands = (
     ("import", "site"),
     ("check", "brook.yaml"),
     ("twin", "brook.yaml", "--to", "riddle", "--hide", "nothing"),
@@ -41,6 +45,8 @@ COMMANDS = (
     ("next", "brook.yaml", "--jobs", "1"),
     ("run", "brook.yaml", "--jobs", "1"),
 )
+# Kills of the slowest command.
+FEWEST = 4
 OUTCOME = Path(__file__).parents[1] / "data" / "faults" / "kills.json"
 
 
@@ -92,7 +98,7 @@ def begun(folder: Path, command: tuple[str, ...], heard: Path) -> int:
         os._exit(code)
 
 
-def load_all(folder: Path) -> None:
+def load_all(folder: Path, commands: Commands = COMMANDS) -> None:
     """Run commands in this process, so that those forked from it have libraries and compiled loops at hand."""
     from vegglue.cli.main import main
 
@@ -100,7 +106,7 @@ def load_all(folder: Path) -> None:
     prepared(folder)
     here = Path.cwd()
     os.chdir(folder)
-    for command in (("run", "brook.yaml", "--jobs", "1", "--quiet"), ("check", "brook.yaml")):
+    for command in commands:
         sys.argv = ["vegglue", *command]
         with suppress(SystemExit):
             main()
@@ -112,7 +118,7 @@ def finish(folder: Path, command: tuple[str, ...], heard: Path) -> None:
     assert status == 0, f"{' '.join(command)}: {heard.read_text(errors='replace')}"
 
 
-def steps(work: Path, store: Path, commands: tuple[tuple[str, ...], ...] = COMMANDS) -> list[Step]:
+def steps(work: Path, store: Path, commands: Commands = COMMANDS) -> list[Step]:
     """Every command once, undisturbed, each in the same folder `work`, for the same paths; states kept in `store`."""
     work.mkdir()
     prepared(work)
@@ -174,23 +180,26 @@ def contents(file: h5py.File) -> dict[str, Any]:
     return found
 
 
+def shared_out(kills: int, undisturbed: Sequence[Step]) -> list[int]:
+    """So many kills or more, most for the quick commands, and for each of them some."""
+    weights = [1.0 / (0.5 + step.seconds) for step in undisturbed]
+    return [max(FEWEST, math.ceil(kills * weight / sum(weights))) for weight in weights]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kills", type=int, nargs="?", default=208)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
-    random = np.random.default_rng(asked.seed)
+    random, table = np.random.default_rng(asked.seed), {}
     with tempfile.TemporaryDirectory() as name:
         work = Path(name) / "work"
         load_all(Path(name) / "loaded")
         undisturbed = steps(work, Path(name))
-        table = {step.name: {"kills": 0, "in_time": 0} for step in undisturbed}
-        for number in range(asked.kills):
-            step = undisturbed[number % len(undisturbed)]
-            in_time = disturbed(step, work, float(random.uniform(0.0, 1.0)))
-            table[step.name]["kills"] += 1
-            table[step.name]["in_time"] += in_time
-            print(number + 1, step.name, flush=True)
+        for step, kills in zip(undisturbed, shared_out(asked.kills, undisturbed), strict=True):
+            in_time = sum(disturbed(step, work, float(share)) for share in random.uniform(0.0, 1.0, kills))
+            table[step.name] = {"kills": kills, "in_time": in_time}
+            print(f"{step.name}: {in_time} of {kills} in time", flush=True)
     OUTCOME.parent.mkdir(parents=True, exist_ok=True)
     OUTCOME.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 

@@ -1,14 +1,23 @@
 """Every fault of docs/faults.md happens here: what is said, what is kept, and that the next try has the same bits."""
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fault_table import ENSEMBLE, FAULTS, PAGE, Fault, page
 from kills import same
 from reach import COARSE, said_to, write_reach
+from stored import CHUNKS, a_header, append
 
-SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
+from vegglue.ensemble import solve_ensemble
+from vegglue.storage.resume import ensemble_writer
+
+# Four chunks, and the quicker way to a posterior.
+CHANGES = (COARSE, ("simulate: {members: 1024,", "infer: {method: glue}\nsimulate: {members: 256,"))
 STEPS = ("simulate", "infer")
 
 
@@ -18,7 +27,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        write_reach(folder, *SIXTEEN)
+        write_reach(folder, *CHANGES)
         for step in STEPS:
             assert code_of(patch, step) == 0
     return folder
@@ -52,11 +61,12 @@ def test_a_fault_is_told_and_loses_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write_reach(tmp_path, *SIXTEEN)
-    for step in fault.ready:
-        assert said_to(monkeypatch, capsys, *words(step)) == (0, "")
-    before = contents(tmp_path)
+    write_reach(tmp_path, *CHANGES)
+    if fault.ready:
+        shutil.copytree(undisturbed / "runs", tmp_path / "runs")
+    before, solved = contents(tmp_path), counted(monkeypatch)
     with fault.trouble(tmp_path):
+        solved.clear()
         there = contents(tmp_path)
         code, error = said_to(monkeypatch, capsys, *words(fault.command))
     assert code == fault.code, error
@@ -68,8 +78,23 @@ def test_a_fault_is_told_and_loses_nothing(
     restore(tmp_path, before, undisturbed)
     for step in STEPS:
         assert said_to(monkeypatch, capsys, *words(step)) == (0, "")
+    assert len(solved) == fault.solves, "chunks solved"
+    # The same bits, whatever has happened.
     for name in (ENSEMBLE, ENSEMBLE.with_name("posterior.h5")):
         assert same(tmp_path / name, undisturbed / name), name
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A list that grows by one with each chunk that is solved."""
+    solved: list[int] = []
+    real = solve_ensemble.solve_chunk
+
+    def solve(*arguments: Any, **more: Any) -> Any:
+        solved.append(1)
+        return real(*arguments, **more)
+
+    monkeypatch.setattr(solve_ensemble, "solve_chunk", solve)
+    return solved
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -104,3 +129,17 @@ def same_or_broken(path: Path, other: Path) -> bool:
 
 def test_the_page_of_faults_is_made_of_the_table() -> None:
     assert PAGE.read_text(encoding="utf-8") == page(), "`python tests/fault_table.py` writes it"
+
+
+def test_the_reader_of_the_page_follows_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reader = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert reader is not None
+    monkeypatch.chdir(tmp_path)
+    said = []
+    with ensemble_writer(tmp_path / ENSEMBLE, a_header()) as writer:
+        for chunk in range(CHUNKS):
+            append(writer, chunk)
+            # In another process: one alone would share what it has open.
+            done = subprocess.run([sys.executable, "-c", reader[1]], capture_output=True, text=True, check=True)
+            said.append(done.stdout.split(" members")[0])
+    assert said == ["4 of 12", "8 of 12", "12 of 12"]
