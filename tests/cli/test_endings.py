@@ -136,6 +136,7 @@ def die(number: int) -> int:
     return number
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_is_one_sentence() -> None:
     with pytest.raises(StorageError, match=r"A process that solved members was killed, .* with fewer --jobs"):
         list(parallel.as_finished(die, [(number,) for number in range(4)], 2))

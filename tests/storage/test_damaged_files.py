@@ -1,5 +1,6 @@
 """Files that were damaged, come from strangers or are open elsewhere: one sentence, never another's file touched."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 from stored import ALL, HASH, WINDOW, a_header, append, assert_whole, members_of, write_chunks
 
-from vegglue.errors import StorageError
+from vegglue.errors import InputError, StorageError
+from vegglue.storage.kept_words import questions_that_fit
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import EnsembleWriter, ensemble_writer, part_file, remove_left_over_fields
+from vegglue.twins.sealed_answer import opened_answer
 
 CHUNKS_OF_MEMBERS = [np.sort(members_of(chunk)) for chunk in sorted(ALL)]
 
@@ -249,6 +252,18 @@ def test_fields_left_over_are_taken_away(path: Path) -> None:
     path.with_name("fields.part").write_bytes(b"killed just before this was taken away")
     remove_left_over_fields(path)
     assert_whole(path, header)
+
+
+def test_a_pipe_in_a_received_folder_makes_nobody_wait(path: Path) -> None:
+    path.parent.mkdir()
+    for name in ("ensemble.h5", "questions.json", "answer.sealed"):
+        os.mkfifo(path.parent / name)
+    with pytest.raises(StorageError, match="cannot be opened"):
+        read_ensemble(path)
+    assert stored_hash(path) is None
+    assert questions_that_fit(path.parent, HASH) is None
+    with pytest.raises(InputError, match="it is not a file"):
+        opened_answer(path.parent / "answer.sealed")
 
 
 def test_a_folder_in_place_of_a_file_is_told_before_anything_is_solved(path: Path) -> None:

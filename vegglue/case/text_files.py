@@ -7,6 +7,8 @@ from pathlib import Path
 from vegglue.errors import InputError, shown_path
 from vegglue.whole_files import write_file
 
+# Most that a small result as JSON may take [bytes]; vegglue writes some tens of thousands.
+LARGEST_JSON = 10_000_000
 LONGEST_NAME = 100  # letters of the name of a case, as in its schema
 # Signs that no text of a case may hold: control characters but tabs and ends of lines, halves of characters (which no
 # file can hold), and marks that turn the direction of what follows.

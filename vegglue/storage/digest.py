@@ -6,6 +6,7 @@ the line, from an older version, is read as it is.
 
 import hashlib
 import os
+import stat
 from functools import lru_cache
 from pathlib import Path
 from typing import IO
@@ -35,6 +36,8 @@ def append_digest(path: Path) -> None:
 def is_unchanged(path: Path) -> bool:
     """Whether a file has the digest that stands behind it, or states none. Errors: OSError."""
     now = path.stat()
+    if not stat.S_ISREG(now.st_mode):  # opening a pipe would wait
+        raise OSError("it is not a file")
     return _is_unchanged(path.resolve(), now.st_ino, now.st_size, now.st_mtime_ns)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vegglue.case.text_files import write_text
+from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.results.ladder import Ladder, ladder_from, ladder_json
 from vegglue.results.open_questions import OpenQuestion, questions_from, questions_json
 from vegglue.whole_files import MAKE_ROOM
@@ -45,9 +45,9 @@ def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
 
 def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
+        tree = json.loads(read_text(path, LARGEST_JSON))
         if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
             return None
         return understand(tree["told"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None

@@ -7,6 +7,7 @@ import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from vegglue.case.text_files import LARGEST_JSON, read_text
 from vegglue.errors import InputError
 
 UNLISTED, BAD_PROBE, NOTHING_HIDDEN, ANY = "unlisted:", "bad_probe", "nothing", "?"
@@ -52,11 +53,11 @@ def sealed_answer(answer: Answer) -> str:
 
 def opened_answer(path: Path) -> Answer:
     """The answer in a file. Errors: InputError when there is no seal, or it is broken."""
+    lines = read_text(path, LARGEST_JSON, "`vegglue twin` writes it").splitlines()
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-        told = json.loads(zlib.decompress(base64.b64decode("".join(lines[1:]))))
+        # What is packed may claim to be of any size.
+        unpacked = zlib.decompressobj().decompress(base64.b64decode("".join(lines[1:])), LARGEST_JSON)
+        told = json.loads(unpacked)
         return Answer(**told | {"hidden": tuple(Hidden(**one) for one in told["hidden"])})
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}; `vegglue twin` writes it.") from None
-    except (ValueError, KeyError, TypeError, zlib.error):
+    except (ValueError, KeyError, TypeError, RecursionError, zlib.error):
         raise InputError(f"{path}: the seal is broken, make it again by `vegglue twin`.") from None

@@ -18,7 +18,7 @@ from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_MEMBERS
-from vegglue.case.text_files import write_text
+from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.diagnosis.excluded_stations import excluding
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import model_of
@@ -67,7 +67,7 @@ def known_place(case: Case, folder: Path) -> Array | None:
     """The best place that an earlier command found for exactly this case, z (p,)."""
     wanted = case_hash(case)
     try:
-        found = json.loads((folder / "best.json").read_text(encoding="utf-8"))
+        found = json.loads(read_text(folder / "best.json", LARGEST_JSON))
         if found["config_hash"] == wanted:
             z = z_at(case, {name: np.array([float(found["theta"][name])]) for name in case.parameters})[0]
             if np.isfinite(z).all():  # a file that was edited may hold anything
