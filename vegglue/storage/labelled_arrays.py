@@ -34,7 +34,9 @@ def read_inference_data(path: Path) -> "arviz.InferenceData":
     """posterior.h5 as ArviZ sees it: posterior, prior, log_likelihood and so on. Errors: as read_labelled."""
     arviz = extra_library("arviz")
     extra_library(ENGINE)
-    with open_hdf5(path, "r"), arviz.rc_context({"data.load": "eager"}):
+    with open_hdf5(path, "r"):
+        pass  # it is whole; closed again, since the libraries below open it with locks
+    with arviz.rc_context({"data.load": "eager"}):
         return arviz.from_netcdf(path, engine=ENGINE)
 
 
