@@ -274,8 +274,8 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
         (lambda text: text.replace("section,x,y,u", "section,x,y,v"), "velocities.csv, row 1: expected the columns"),
         (lambda text: text + "below,20,2,0.397\n", "row 17: expected experiment, section, x, y to differ"),
         (lambda text: text[:14], "velocities.csv: expected rows below the heading, got none"),
-        (lambda text: "", "velocities.csv: expected a CSV table"),
-        (lambda text: text.replace("above", "\udcff"), "velocities.csv: expected a CSV table in UTF-8"),
+        (lambda text: "", "velocities.csv, row 1: expected the columns"),
+        (lambda text: text.replace("above", "\udcff"), "velocities.csv is not text in UTF-8: save it as UTF-8"),
     ],
 )
 def test_a_broken_measurement_file_is_named_with_its_row(
