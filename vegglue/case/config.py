@@ -1,5 +1,6 @@
 """Cases as files: YAML read with all that `extends` names, and refused in one sentence where it is wrong."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     tree: Tree = {}
     for _, layer in reversed(layers):
         tree = _merged(tree, layer)
-    tree = _with_one_inflow_named(tree) | {"source": path.resolve()}
+    tree = _with_one_inflow_named(tree) | {"source": Path(os.path.realpath(path))}
     try:
         case = Case.model_validate(tree)
     except ValidationError as error:
@@ -50,7 +51,7 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
 
 def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
     """The file and what it extends, the most special one first."""
-    path = path.resolve()
+    path = Path(os.path.realpath(path))  # which a loop of links does not stop
     if path in above:
         circle = " -> ".join(shown_path(file) for file in (*above[above.index(path) :], path))
         raise InputError(f"{shown_path(above[-1])}: `extends` goes round in a circle, {circle}: take one of them out.")
@@ -90,7 +91,7 @@ def _with_full_paths(tree: Any, folder: Path) -> Any:
         return [_with_full_paths(item, folder) for item in tree]
     if not isinstance(tree, dict):
         return tree
-    paths = {key: str((folder / tree[key]).resolve()) for key in PATHS if isinstance(tree.get(key), str)}
+    paths = {key: os.path.realpath(folder / tree[key]) for key in PATHS if isinstance(tree.get(key), str)}
     return {key: _with_full_paths(value, folder) for key, value in tree.items()} | paths
 
 

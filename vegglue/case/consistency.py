@@ -1,5 +1,6 @@
 """Whether the parts of a case agree: every name used is declared and every declaration used, files and places exist."""
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from vegglue.case.parts import Interval, Value
 from vegglue.case.prior_tails import share_below
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Inflow, Stand, StandOverride
+from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import shown_path
 
 if TYPE_CHECKING:
@@ -182,9 +184,15 @@ def _files(case: Case) -> Iterator[Refusal]:
     named += [(("observations", i, "file"), observation.file) for i, observation in enumerate(case.observations)]
     named += [(("survey", "file"), case.survey.file)] if case.survey else []
     named += [(("effect_file",), case.effect_file)]
+    unseen = case.validation.observations if case.validation else ()
+    named += [(("validation", "observations", i, "file"), observation.file) for i, observation in enumerate(unseen)]
     for place, file in named:
-        if file is not None and not file.is_file():
+        if file is None:
+            continue
+        if not os.path.isfile(file):  # False for every name that no file can have, where a Path would raise
             yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
+        elif os.path.getsize(file) > LARGEST_DATA:
+            yield Refusal(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
 
 
 def _likelihood(case: Case) -> Iterator[Refusal]:
