@@ -104,6 +104,26 @@ def test_a_workbook_is_read_like_a_table(tmp_path: Path) -> None:
     assert taken.numbers["u"].tolist() == [0.5, 0.605]
     with pytest.raises(InputError, match="expected the sheet 'June', got Sheet"):
         read_loosely(tmp_path / "book.xlsx", "June")
+    (tmp_path / "none.xlsx").write_bytes(b"PK no workbook")
+    with pytest.raises(InputError, match=r"none\.xlsx cannot be read as a workbook"):
+        read_loosely(tmp_path / "none.xlsx")
+
+
+def test_what_is_wrong_in_a_file_is_named_by_check(tmp_path: Path) -> None:
+    """A wrong unit, a station outside the grid, and a stream that is reversed."""
+    rows = "".join(f"8,{y},{40 + y}\n20,{y},{42 + y}\n" for y in (-1, 0, 1))
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=f"x,y,u\n{rows}300,0,40\n")
+    remarks = " ".join(vegglue.check(vegglue.import_folder(folder, tmp_path / "b.yaml"), runs=tmp_path).remarks)
+    assert "as if it were in cm/s" in remarks
+    assert "station at x = 300, y = 0 m of experiment June is outside the grid" in remarks
+    entry = "files: {a.csv: {units: {u: cm/s}}}\n"
+    folder = folder_of(tmp_path / "other", CHANNEL + JUNE + entry, a__csv="x,y,u\n" + rows.replace(",4", ",-4"))
+    (said,) = [
+        one
+        for one in vegglue.check(vegglue.import_folder(folder, tmp_path / "o.yaml"), runs=tmp_path).remarks
+        if "upstream" in one
+    ]
+    assert "`flip: [x]`" in said
 
 
 def test_repeats_give_their_mean_and_its_error(tmp_path: Path) -> None:
@@ -137,6 +157,9 @@ def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
         ("", "a,b\n1,2\n", "expected columns that can be told by their names, got a, b"),
         ("", "y,u\n1,2\n", "expected a column of x, got none"),
         ("", "x,y,u\n1,2,3\n1,2,fast\n4,5,6\n", "row 3: expected a number in column u, got 'fast'"),
+        ("files: {a.csv: {missing: none}}", "x,y,u\n1,2,3\n", "`files.a.csv`.missing expected a number"),
+        ("files: {a.csv: {flip: z}}", "x,y,u\n1,2,3\n", "flip expected one of x, y, got 'z'"),
+        ("files: {a.csv: {line: 3}}", "x,y,u\n1,2,3\n", "line expected two points"),
         ("frame: {origin: [1, 2]}", "x,y,u\n1,2,3\n", "either `angle` or `towards: [east, north]`"),
     ],
 )

@@ -61,7 +61,10 @@ def file_words(given: Any, where: str) -> FileWords:
     for key in {"coordinates", "directions"} & set(given):
         changes[key] = _one_of(given[key], ("map", "channel"), f"{where}.{key}")
     marks = given.get("missing", ())
-    changes["missing"] = tuple(float(mark) for mark in (marks if isinstance(marks, list | tuple) else [marks]))
+    marks = marks if isinstance(marks, list | tuple) else [marks]
+    if not all(isinstance(mark, int | float) and not isinstance(mark, bool) for mark in marks):
+        raise InputError(f"{where}.missing expected a number or a list of numbers, got {marks!r}.")
+    changes["missing"] = tuple(float(mark) for mark in marks)
     flip = given.get("flip", ())
     flip = flip if isinstance(flip, list | tuple) else [flip]
     changes["flip"] = tuple(_one_of(axis, ("x", "y"), f"{where}.flip") for axis in flip)

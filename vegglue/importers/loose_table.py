@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
+from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.unit_words import is_unit
 from vegglue.in_short import so_many
@@ -63,9 +65,12 @@ def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
 def readable_text(path: Path) -> str:
     """The text of a file: UTF-8, UTF-16 with its mark, or what Windows in the west writes. Errors: InputError."""
     try:
-        raw = path.read_bytes()
+        size = path.stat().st_size
+        raw = path.read_bytes() if size <= LARGEST_DATA else b""
     except OSError as error:
         raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+    if size > LARGEST_DATA:
+        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace")
     try:
@@ -143,7 +148,7 @@ def _sheet(path: Path, name: str | None) -> list[Line]:
         ) from None
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    except (OSError, ValueError, KeyError, openpyxl.utils.exceptions.InvalidFileException) as error:
+    except (OSError, ValueError, KeyError, BadZipFile, openpyxl.utils.exceptions.InvalidFileException) as error:
         raise InputError(f"{shown_path(path)} cannot be read as a workbook: {error}; save it anew.") from None
     if name is not None and name not in book.sheetnames:
         raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
