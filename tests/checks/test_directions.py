@@ -31,7 +31,7 @@ def test_a_brook_that_runs_downhill_has_no_remark(tmp_path: Path) -> None:
 
 def test_the_whole_stream_reversed(tmp_path: Path) -> None:
     (said,) = said_of(tmp_path, "section,x,y,u\nA,8,-1,-0.4\nA,8,0,-0.5\nB,20,0,-0.4\n")
-    assert "run upstream, -0.43 m/s on average" in said
+    assert "run upstream, -0.4 m/s in the middle" in said
     assert "`flip: [x]`" in said
 
 
