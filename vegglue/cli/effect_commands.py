@@ -37,7 +37,7 @@ def effects_command(
 
     known = library(case.effect_file if case is not None else None)
     if name is None:
-        _list(tuple(known.values()), as_object)
+        _list(tuple(effect for effect in known.values() if "law" not in effect.tags), as_object)
     elif name not in known:
         raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
     else:

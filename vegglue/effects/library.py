@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 
-from vegglue.effects import boundary, exchange, force, plants, resistance, sensor, site, unlisted
+from vegglue.effects import boundary, exchange, force, grammar, plants, resistance, sensor, site, unlisted
 from vegglue.effects.definition import Effect
 from vegglue.errors import InputError, shown_path
 
@@ -24,11 +24,11 @@ SHIPPED: tuple[Effect, ...] = (
 
 @lru_cache
 def library(own: Path | None = None) -> Mapping[str, Effect]:
-    """All effects by name: those shipped, then those of a user's file, which is run to read them.
+    """All effects by name: those shipped, laws of the grammar, then those of a user's file, which is run to read them.
 
     Errors: InputError when the file cannot be run, has no EFFECTS, or repeats a name.
     """
-    known = {effect.name: effect for effect in SHIPPED}
+    known = {effect.name: effect for effect in (*SHIPPED, *grammar.EFFECTS)}
     if own is None:
         return MappingProxyType(known)
     for effect in effects_of(own):

@@ -18,6 +18,8 @@ from vegglue.measurements.kinds import velocity_rows
 
 # Combinations of shapes of an effect that a search tries at most. Chosen, not measured: each is a tangent of the flow.
 MOST_SETTINGS = 12
+# Tags of effects that are no suspects of their own: something at a place, and laws of the grammar.
+NOT_SEARCHED = {"search", "law"}
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
     found = []
     possible = where_it_may_act(case, station)
     for effect in library(case.effect_file).values():
-        if "search" in effect.tags or (effect.stage == "plants" and not case.plants.patches):
+        if NOT_SEARCHED & set(effect.tags) or (effect.stage == "plants" and not case.plants.patches):
             continue
         if effect.each == "case":
             found.append(Candidate(effect))

@@ -1,0 +1,215 @@
+"""A grammar of laws that no list holds: a term of the equations changes with what is there.
+
+    k -> k exp(a g),   nu -> nu exp(a g),   g a pure number of the size of 1, to first order a factor 1 + a g
+
+A law is a term, a quantity and a form: friction of the banks, with the speed, as a step. exp keeps every term above 0.
+Quantities q are measured by a reference r, the middle of what the data have seen; a form makes g of q and r, 0 or
+nearly so at q = r, so that a law does not stand in for the calibrated coefficient of its term. Each law is an effect
+as any other, with the tag `law`, which the search of a diagnosis leaves out. A product of two g is a quantity more.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.effects.definition import Amplitude, Effect, Shape, Stage
+from vegglue.effects.surroundings import Cells
+from vegglue.resistance.physical_constants import GRAVITY
+
+# Depth [m] at which a Froude number is held, as in `resistance`: twice the default film.
+LEAST_DEPTH_OF_LAW = 0.02
+# A plausible size a [-]: a term changes by a half where g is 1. Ends of its support: exp(3) is a factor of 20.
+PLAUSIBLE_STRENGTH, STRONGEST = 0.5, 3.0
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code."""
+
+    name: str
+    words: str
+    where: str
+    stage: Stage
+    symbol: str
+    share: Callable[[Cells], Array]
+    written: str
+
+
+@dataclass(frozen=True)
+class LawQuantity:
+    """What a law depends on. of: q in each cell; written: the same as code; usual: a usual value, the reference unless
+    told.
+    """
+
+    name: str
+    words: str
+    symbol: str
+    unit: str
+    of: Callable[[Cells], Array]
+    written: str
+    usual: float
+
+
+@dataclass(frozen=True)
+class LawForm:
+    """How g follows from q and r, as a function, as code and as text; quantiles: of the q that the data have seen, to
+    be tried as r (none: g has no r).
+    """
+
+    name: str
+    words: str
+    of: Callable[[Array, Array | float], Array]
+    written: str
+    equation: str
+    quantiles: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of the grammar, `effect` as the library lists it."""
+
+    term: LawTerm
+    quantity: LawQuantity
+    form: LawForm
+
+    @property
+    def name(self) -> str:
+        return f"law_{self.term.name}_{self.quantity.name}_{self.form.name}"
+
+    @property
+    def title(self) -> str:
+        words = self.form.words.format(q=self.quantity.words)
+        return f"{self.term.words[0].upper()}{self.term.words[1:]} {words}"
+
+    def equation(self, reference: str = "r") -> str:
+        """In one line; reference: the value of r, where it is known."""
+        g = self.form.equation.format(q=self.quantity.symbol, r=reference)
+        return f"{self.term.symbol} -> {self.term.symbol} exp(a g) {self.term.where}, g = {g}"
+
+    def g(self, cells: Cells, reference: Array | float = 1.0) -> Array:
+        """g (nx, ny, m) [-]."""
+        return self.form.of(self.quantity.of(cells), reference)
+
+    @property
+    def effect(self) -> Effect:
+        quantity = self.quantity
+        low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
+        meaning = f"reference r of {quantity.words}"
+        shape = Shape("reference", quantity.unit, meaning, quantity.usual, low, high)
+        return Effect(
+            name=self.name,
+            stage=self.term.stage,
+            title=self.title,
+            equation=self.equation(),
+            act=partial(_by_law, self),
+            amplitude=Amplitude("strength", "-", "strength a", PLAUSIBLE_STRENGTH, -STRONGEST, STRONGEST),
+            shapes=(shape,) if self.form.quantiles else (),
+            source="definition",
+            checked=True,
+            tags=("law",),
+        )
+
+
+def _by_law(law: Law, cells: Cells, strength: Array, reference: Array | float = 1.0) -> dict[str, Array]:
+    factor = np.exp(strength * law.g(cells, reference) * law.term.share(cells))
+    if law.term.stage == "exchange":
+        return {"viscosity": cells.viscosity * (factor - 1.0)}
+    return {"rate": cells.rate * factor}
+
+
+def _open_floor(cells: Cells) -> Array:
+    return (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
+
+
+_FLOOR = LawTerm(
+    "floor", "friction of the open floor", "on the floor without plants", "resistance", "k", _open_floor,
+    "(1 - cells.geometry.bank) * (1 - cells.geometry.planted)",
+)  # fmt: skip
+_BANK = LawTerm(
+    "bank", "friction of the banks", "on the banks", "resistance", "k", lambda cells: cells.geometry.bank,
+    "cells.geometry.bank",
+)  # fmt: skip
+_PLANTS = LawTerm(
+    "plants", "friction of the plants", "where plants stand", "resistance", "k", lambda cells: cells.geometry.planted,
+    "cells.geometry.planted",
+)  # fmt: skip
+_VISCOSITY = LawTerm(
+    "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", lambda cells: np.ones_like(cells.geometry.bank),
+    "1",
+)  # fmt: skip
+
+_DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5)
+_SPEED = LawQuantity("speed", "the speed", "|U|", "m/s", lambda cells: cells.speed, "cells.speed", 0.5)
+_FROUDE = LawQuantity(
+    "froude", "the Froude number", "F", "-",
+    lambda cells: cells.speed / np.sqrt(GRAVITY * cells.depth.clip(LEAST_DEPTH_OF_LAW)),
+    f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_LAW}))", 0.2,
+)  # fmt: skip
+_SHEAR = LawQuantity(
+    "shear", "the lateral shear", "|du/dy| h/|U|", "-", lambda cells: np.abs(cells.u_y) * cells.depth / cells.speed,
+    "np.abs(cells.u_y) * cells.depth / cells.speed", 0.3,
+)  # fmt: skip
+_ALONG_CHANNEL = LawQuantity(
+    "along", "the place along the channel", "x/L", "-", lambda cells: cells.geometry.share_along,
+    "cells.geometry.share_along", 0.0,
+)  # fmt: skip
+_OFFSET = LawQuantity(
+    "offset", "the distance from the axis", "|y|/b", "-", lambda cells: np.abs(cells.geometry.offset),
+    "np.abs(cells.geometry.offset)", 0.7,
+)  # fmt: skip
+_FRONT = LawQuantity(
+    "front", "the distance from the front of a patch", "d", "m", lambda cells: cells.geometry.front,
+    "cells.geometry.front", 2.0,
+)  # fmt: skip
+_EDGE = LawQuantity(
+    "edge", "the distance from the side of a patch", "d", "m", lambda cells: np.abs(cells.geometry.edge),
+    "np.abs(cells.geometry.edge)", 0.5,
+)  # fmt: skip
+
+# g of -2.3 to 2.3, -1 to 2, -1/2 to 1/2 and 0 to 1: held where q is ten or three times r, since no data reach there.
+_POWER = LawForm(
+    "power", "changes as a power of {q}", lambda q, r: np.log(np.clip(q / r, 0.1, 10.0)),
+    "np.log(np.clip({q} / {r}, 0.1, 10))", "ln({q}/{r}), {q}/{r} within 0.1 to 10", (0.5,),
+)  # fmt: skip
+_RAMP = LawForm(
+    "ramp", "changes evenly with {q}", lambda q, r: np.minimum(q / r, 3.0) - 1.0,
+    "np.minimum({q} / {r}, 3) - 1", "{q}/{r} - 1, at most 2", (0.5,),
+)  # fmt: skip
+_STEP = LawForm(
+    "step", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(5.0 * (np.minimum(q / r, 3.0) - 1.0)),
+    "0.5 * np.tanh(5 * (np.minimum({q} / {r}, 3) - 1))", "tanh(5 ({q}/{r} - 1)) / 2", (0.3, 0.5, 0.7),
+)  # fmt: skip
+_TREND = LawForm("trend", "changes evenly with {q}", lambda q, r: q, "{q}", "{q}, -1/2 to 1/2 from end to end")
+_PART = LawForm(
+    "part", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(20.0 * (q - r)),
+    "0.5 * np.tanh(20 * ({q} - {r}))", "tanh(20 ({q} - {r})) / 2", (0.3, 0.5, 0.7),
+)  # fmt: skip
+_FADING = LawForm(
+    "fading", "fades out with {q}", lambda q, r: np.exp(-q / r), "np.exp(-({q}) / {r})", "exp(-{q}/{r})", (0.3, 0.7)
+)
+
+_EVERY_TERM = (_FLOOR, _BANK, _PLANTS, _VISCOSITY)
+# Which quantities are to be seen in which terms, and the forms that make sense of them.
+_SENTENCES: tuple[tuple[tuple[LawTerm, ...], tuple[LawQuantity, ...], tuple[LawForm, ...]], ...] = (
+    (_EVERY_TERM, (_DEPTH, _SPEED, _FROUDE, _SHEAR), (_POWER, _RAMP, _STEP)),
+    (_EVERY_TERM, (_ALONG_CHANNEL,), (_TREND, _PART)),
+    (_EVERY_TERM, (_OFFSET,), (_RAMP, _STEP)),
+    ((_PLANTS, _VISCOSITY), (_FRONT,), (_FADING,)),
+    ((_FLOOR, _PLANTS, _VISCOSITY), (_EDGE,), (_FADING,)),
+)
+LAWS: dict[str, Law] = {
+    law.name: law
+    for terms, quantities, forms in _SENTENCES
+    for law in (Law(term, quantity, form) for term in terms for quantity in quantities for form in forms)
+}
+# Laws that only restate an effect of the list, within the range in which they are not held.
+SAME_AS = {
+    "law_bank_along_trend": "bank_trend",
+    "law_floor_along_trend": "bed_trend",
+    "law_bank_depth_power": "depth_dependent_bank",
+    "law_floor_depth_power": "depth_dependent_bed",
+}
+EFFECTS = tuple(law.effect for law in LAWS.values())
