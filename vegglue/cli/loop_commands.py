@@ -1,4 +1,4 @@
-"""The shell of the loop: import, diagnose, extend, compare, next."""
+"""The shell of the loop: import, diagnose, discover, extend, compare, next."""
 
 from pathlib import Path
 from typing import Annotated
@@ -61,6 +61,25 @@ def diagnose_command(
     case = vegglue.load_case(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
+    tell(case, runs, found, as_object)
+
+
+def discover_command(
+    config: Config,
+    without: Annotated[
+        list[str] | None, typer.Option(help="Listed effect that is left out of the competition, e.g. bank_trend.")
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
+    jobs: Jobs = -1,
+    runs: Runs = Path("runs"),
+    as_object: Json = False,
+    quiet: Quiet = False,
+    trust: Trust = False,
+) -> None:
+    """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
+    case = vegglue.load_case(config, trust)
+    with heard(quiet, as_object) as watch:
+        found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
 
 

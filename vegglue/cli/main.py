@@ -10,6 +10,7 @@ from vegglue.cli.ensemble_commands import check_command, infer_command, report_c
 from vegglue.cli.loop_commands import (
     compare_command,
     diagnose_command,
+    discover_command,
     extend_command,
     import_command,
     next_command,
@@ -40,6 +41,7 @@ COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Begin": {"new": new_command, "import": import_command, "check": check_command, "run": run_command},
     "The loop": {
         "diagnose": diagnose_command,
+        "discover": discover_command,
         "extend": extend_command,
         "compare": compare_command,
         "next": next_command,

@@ -7,6 +7,7 @@ from typing import Any
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.diagnosis.next_measurement import MeasurementWorth
+from vegglue.discovery.discovered import LawFound
 from vegglue.report_page.posterior_words import describe, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
@@ -15,6 +16,7 @@ from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
+from vegglue.workflow.discover import DiscoveredCase
 from vegglue.workflow.extend import StepwiseExtension
 from vegglue.workflow.next_measurement import Question
 
@@ -33,6 +35,8 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
             return _posterior(case, result) | {"file": folder / "posterior.h5"}
         case Diagnosis():
             return diagnosis_json(result)
+        case DiscoveredCase():
+            return _discovered(result)
         case StepwiseExtension():
             told = {"configs": [one.source for one in result.cases], "cases": [one.name for one in result.cases]}
             words = {"sentence": result.sentence, "reason": result.reason}
@@ -75,6 +79,26 @@ def _checked(case: Case, found: CheckedCase) -> Told:
     return {
         "case": case.name, "experiments": list(case.experiments), "cells": found.cells, "stations": found.stations,
         "used_stations": found.used_stations, "remarks": found.remarks, "picture": found.picture,
+    }  # fmt: skip
+
+
+def _discovered(result: DiscoveredCase) -> Told:
+    return {
+        "sentence": result.found.sentence,
+        "p": result.found.p,
+        "laws_tried": result.found.tried,
+        "laws": [_law(one) for one in result.found.laws],
+        "others": result.found.others,
+        "effect_file": result.effect_file,
+        "config": None if result.child is None else result.child.source,
+    }
+
+
+def _law(one: LawFound) -> Told:
+    return {
+        "name": one.name, "title": one.law.title, "equation": one.equation, "same_as": one.same_as or None,
+        "reference": one.reference, "strength": one.strength, "interval95": one.interval95, "chance": one.chance,
+        "log_evidence": one.log_evidence, "seen": one.seen, "factor": one.factor, "alike": one.alike,
     }  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
+from vegglue.workflow.discover import DiscoveredCase
 from vegglue.workflow.extend import StepwiseExtension
 
 
@@ -26,6 +27,8 @@ def show(case: Case, runs: Path, result: Any) -> None:
         case Diagnosis():
             show_diagnosis(result)
             print(f"Written to {folder / 'diagnosis.h5'}, drawn in {folder / 'diagnosis.png'}.")
+        case DiscoveredCase():
+            _show_discovery(result)
         case StepwiseExtension():
             show_ladder(result.comparison)
             print(result.sentence)
@@ -42,6 +45,18 @@ def show(case: Case, runs: Path, result: Any) -> None:
             show_posterior(case, folder, result)
         case Path():
             print(f"Report: {result.resolve()}")
+
+
+def _show_discovery(result: DiscoveredCase) -> None:
+    print(result.found.sentence)
+    for law in result.found.laws:
+        first, *further = law.lines
+        print("\n".join([f"- {first}", *(f"  {line}" for line in further)]))
+    for name, chance in result.found.others.items():
+        print(f"- {name} (chance {100 * chance:.0f} %)")
+    if result.child is not None:
+        print(f"Effect file: {result.effect_file}")
+        print(f"Child config: {result.child.source}")
 
 
 def _show_check(case: Case, found: CheckedCase) -> None:

@@ -113,7 +113,7 @@ def screen(
         projected=projected,
         effects=family_of(projected, fingerprints.one_sided, errors, seed),
         kinds=(
-            _kind_of_effects(fingerprints, projected),
+            kind_of_listed(fingerprints, projected),
             *_kinds_of_places(fingerprints, in_places),
             *_kinds_of_instruments(base.noise, instruments, of_instruments, flagged),
         ),
@@ -122,7 +122,7 @@ def screen(
     )
 
 
-def _kind_of_effects(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
+def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
     """Listed effects: as likely before, and so are the settings of one."""
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)

@@ -1,0 +1,119 @@
+"""A discovered law as a file: it says what the law does, keeps the contract, and the child config runs it."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.discovery.discovered import Discovery, LawFound
+from vegglue.discovery.effect_file import effect_name, effect_text
+from vegglue.effects.grammar import LAWS, Law
+from vegglue.errors import InputError
+from vegglue.workflow import discover as verb
+from vegglue.workflow.check import check_effects
+from vegglue.workflow.discover import DiscoveredCase, discover
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+
+
+def found_law(law: Law, **fields: object) -> LawFound:
+    """A law as a search finds it; fields: to be changed."""
+    usual = LawFound(
+        law=law, same_as="", reference=0.3 if law.form.quantiles else None, strength=-0.8, interval95=(-1.0, -0.6),
+        chance=0.9, log_evidence=20.0, seen=(0.1, 0.6), alike=("bank_vegetation",),
+    )  # fmt: skip
+    return replace(usual, **fields)
+
+
+LAW = found_law(LAWS["law_bank_speed_step"])
+
+
+def water() -> SimpleNamespace:
+    """Cells with every quantity that laws see, drawn at random; a tenth of them far from any patch."""
+    random = np.random.default_rng(3)
+    names = ("depth", "speed", "rate", "viscosity")
+    values = {name: random.uniform(0.05, 1.5, (7, 5, 2)) for name in names} | {"u_y": random.normal(size=(7, 5, 2))}
+    there = {name: random.integers(0, 2, (7, 5, 1)).astype(float) for name in ("bank", "planted")}
+    away = random.uniform(-2.0, 2.0, (7, 5, 1))
+    there |= {"share_along": np.linspace(-0.5, 0.5, 7)[:, None, None], "offset": away, "edge": away}
+    there["front"] = np.where(away > 1.6, np.inf, np.abs(away))
+    return SimpleNamespace(**values, geometry=SimpleNamespace(**there))
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_the_file_does_what_the_law_does(law: Law) -> None:
+    for reference in (0.3, -0.2) if law.quantity.name == "along" else (0.3,):
+        found = found_law(law, reference=reference if law.form.quantiles else None)
+        names: dict[str, object] = {}
+        exec(effect_text(found, None), names)
+        (effect,) = names["EFFECTS"]
+        strength = np.array([-0.8, 1.3])
+        written = effect.act(water(), strength=strength)
+        wanted = law.effect.act(water(), strength=strength, **({"reference": reference} if found.reference else {}))
+        assert written.keys() == wanted.keys()
+        for name, values in written.items():
+            np.testing.assert_allclose(values, wanted[name], rtol=1e-12, atol=1e-15)
+
+
+def discovered(monkeypatch: pytest.MonkeyPatch, config: Path, target: Path, law: LawFound) -> DiscoveredCase:
+    """What the verb makes of a law that a search would find."""
+    monkeypatch.setattr(verb, "discover_laws", lambda *_: Discovery(0.001, 44, (law,), {}))
+    return discover(load_case(config, trust=True), to=target)
+
+
+def test_the_law_becomes_a_file_and_a_child(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    result = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", LAW)
+    assert result.effect_file == tmp_path / "child.py"
+    assert len(result.effect_file.read_text(encoding="utf-8").splitlines()) <= 20
+    assert check_effects(result.effect_file, trust=True) == {"bank_speed_step": []}
+    assert result.child is not None
+    assert list(result.child.effects) == ["bank_speed_step"]
+    assert "bank_speed_step_strength" in result.child.parameters
+
+
+def test_a_file_of_the_case_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    first = discovered(monkeypatch, CONFIG, tmp_path / "first.yaml", LAW)
+    other = found_law(LAWS["law_floor_depth_ramp"])
+    second = discovered(monkeypatch, tmp_path / "first.yaml", tmp_path / "second.yaml", other)
+    assert second.child is not None
+    assert second.effect_file is not None
+    assert set(second.child.effects) == {"bank_speed_step", "floor_depth_ramp"}
+    assert set(check_effects(second.effect_file, trust=True)) == {"bank_speed_step", "floor_depth_ramp"}
+    with pytest.raises(InputError, match="exists already"):
+        discovered(monkeypatch, tmp_path / "first.yaml", tmp_path / "third.yaml", LAW)
+    assert first.effect_file is not None
+
+
+@pytest.mark.parametrize("law", [None, replace(LAW, same_as="bank_trend")])
+def test_nothing_is_written_where_no_law_is_new(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, law: LawFound | None
+) -> None:
+    found = Discovery(0.4, 44, () if law is None else (law,), {})
+    monkeypatch.setattr(verb, "discover_laws", lambda *_: found)
+    result = discover(load_case(CONFIG), to=tmp_path / "child.yaml")
+    assert (result.effect_file, result.child) == (None, None)
+    assert not list(tmp_path.iterdir())
+    assert ("bank_trend" if law else "40 % of cases") in found.sentence
+
+
+def test_an_unknown_effect_cannot_be_left_out() -> None:
+    with pytest.raises(InputError, match=r"--without: `bank_trent`.*bank_trend"):
+        discover(load_case(CONFIG), without=["bank_trent"])
+
+
+def test_a_law_is_told_with_its_range() -> None:
+    title, equation, seen, alike = LAW.lines
+    assert title == "Friction of the banks changes at one value of the speed (chance 90 %)."
+    assert equation.endswith("g = tanh(5 (|U|/0.3 m/s - 1)) / 2, a = -0.80 (95 %: -1.00 to -0.60)")
+    assert seen.startswith("seen for |U| from 0.1 to 0.6 m/s: there it changes by a factor of 0.4")
+    assert alike == "the same trace: bank_vegetation"
+
+
+def test_a_listed_effect_that_is_likelier_is_told_instead() -> None:
+    found = Discovery(0.001, 44, (replace(LAW, chance=0.3),), {"streamlining": 0.65})
+    assert found.best is None
+    assert effect_name(LAW) == "bank_speed_step"
+    assert found.sentence == "No law is needed: streamlining explains as much, with a chance of 65 %."

@@ -1,0 +1,111 @@
+"""What a search for laws has found, and how it is told."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegglue.effects.grammar import Law
+from vegglue.in_short import in_short
+
+MOST_ALIKE = 4  # told by name
+
+
+def signed(reference: float) -> str:
+    """A reference as it stands in a formula: in brackets below 0."""
+    return f"({reference:g})" if reference < 0.0 else f"{reference:g}"
+
+
+@dataclass(frozen=True)
+class LawFound:
+    """A law with its reference r, its strength a and the 95 % interval of it [-], and its chance to be what is missing.
+
+    same_as: the listed effect that it restates, or empty; seen: from where to where the data have seen its quantity;
+    alike: listed effects and laws that leave the same trace at the stations.
+    """
+
+    law: Law
+    same_as: str
+    reference: float | None
+    strength: float
+    interval95: tuple[float, float]
+    chance: float
+    log_evidence: float
+    seen: tuple[float, float]
+    alike: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the listed effect, where the law only restates it."""
+        return self.same_as or self.law.name
+
+    @property
+    def unit(self) -> str:
+        """Of its quantity, with a space before it; nothing for a pure number."""
+        return "" if self.law.quantity.unit == "-" else f" {self.law.quantity.unit}"
+
+    @property
+    def equation(self) -> str:
+        """With the reference in it, the strength as a letter."""
+        return self.law.equation("" if self.reference is None else f"{signed(self.reference)}{self.unit}")
+
+    @property
+    def factor(self) -> float:
+        """By what the term is larger at the upper end of what was seen than at the lower [-]."""
+        low, high = (float(self.law.form.of(np.array(q), self.reference or 1.0)) for q in self.seen)
+        return float(np.exp(self.strength * (high - low)))
+
+    @property
+    def range_seen(self) -> str:
+        """From where to where the data have seen its quantity."""
+        low, high = self.seen
+        return f"{self.law.quantity.symbol} from {low:.2g} to {high:.2g}{self.unit}"
+
+    @property
+    def lines(self) -> list[str]:
+        """The law in words, as an equation, and how far to trust it."""
+        low, high = self.interval95
+        same = f" It is the listed effect {self.same_as}." if self.same_as else ""
+        told = [
+            f"{self.law.title} (chance {100 * self.chance:.0f} %).{same}",
+            f"{self.equation}, a = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
+            f"seen for {self.range_seen}: there it changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
+        ]
+        more = f" and {len(self.alike) - MOST_ALIKE} more" if len(self.alike) > MOST_ALIKE else ""
+        return [*told, f"the same trace: {', '.join(self.alike[:MOST_ALIKE])}{more}"] if self.alike else told
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """p: chance that errors alone make laws stand out as much; tried: the number of laws that had something to act on.
+
+    laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together; none
+    where nothing is found.
+    """
+
+    p: float
+    tried: int
+    laws: tuple[LawFound, ...]
+    others: dict[str, float]
+
+    @property
+    def best(self) -> LawFound | None:
+        """The law that is likelier than any other cause, if there is one."""
+        if not self.laws or any(chance > self.laws[0].chance for chance in self.others.values()):
+            return None
+        return self.laws[0]
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in one sentence."""
+        best = self.best
+        if best is not None and best.same_as:
+            return f"The law that explains most is the listed effect {best.same_as}; add it by that name."
+        if best is not None:
+            return f"{best.law.title}: a law explains the misfit, with a chance of {100 * best.chance:.0f} %."
+        if self.others:
+            name, chance = max(self.others.items(), key=lambda pair: pair[1])
+            return f"No law is needed: {name} explains as much, with a chance of {100 * chance:.0f} %."
+        return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
+
+    def __repr__(self) -> str:
+        return in_short(f"Discovery: {self.sentence}", [line for law in self.laws for line in law.lines])

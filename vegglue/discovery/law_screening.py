@@ -1,0 +1,138 @@
+"""Laws beside all that is screened: one score test for each, and an alarm of their own.
+
+The errors' correlation is estimated with laws among what could be missing, else a law that is missing would pass for
+correlated errors. Listed effects, places and instruments keep their kinds and chances.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.discovery.laws_in_case import LawInCase, laws_in_case
+from vegglue.engine.interface import responses
+from vegglue.screening import score_test
+from vegglue.screening.candidates import cause_of
+from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses
+from vegglue.screening.family_wise_p import family_of
+from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
+from vegglue.screening.residual_screening import GROUPS, Screening, kind_of_listed, screen
+from vegglue.site.channel_geometry import half_width
+
+# All listed effects together are so many times as likely before the data as all laws together: strong evidence, as
+# between kinds elsewhere, is asked of a law before it is preferred to an effect that others have seen in nature.
+LISTED_ODDS = 10.0
+SEED = 1  # of the draws of errors alone, as in `screen`
+
+
+@dataclass(frozen=True)
+class LawScreening:
+    """listed: the screening without laws; laws, kind: the laws and their score tests; columns: of each law, in `kind`;
+    settings: of each column; p: chance that errors alone make laws stand out as much; cosine (c + l, c + l): between
+    the projected fingerprints of all columns, listed effects first.
+    """
+
+    listed: Screening
+    laws: list[LawInCase]
+    kind: HypothesisKind
+    columns: list[np.ndarray]
+    settings: list[dict[str, float]]
+    p: float
+    cosine: np.ndarray
+
+    @property
+    def of_listed(self) -> int:
+        """The number of columns of listed effects."""
+        return len(self.listed.fingerprints.settings)
+
+
+def screen_laws(base: Baseline, without: tuple[str, ...] = ()) -> LawScreening:
+    """Score tests of a calibrated model with laws; without: listed effects that are left out."""
+    search = search_model(base)
+    listed = _left(fingerprints_of(search, half_width(base.model.site)), without)
+    laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
+    every = _with_laws(listed, laws, base)
+    full = screen(base, (), every, SEED)
+    count = len(listed.settings)
+    columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
+    kind = _kind_of_laws(full, columns, count)
+    return LawScreening(
+        listed=_of_listed(full, listed),
+        laws=laws,
+        kind=kind,
+        columns=columns,
+        settings=every.settings[count:],
+        p=alarm_p([kind], full.errors, SEED),
+        cosine=score_test.cosines(full.projected),
+    )
+
+
+def _left(found: Fingerprints, without: tuple[str, ...]) -> Fingerprints:
+    """Fingerprints but for those of some listed effects."""
+    kept = [j for j, one in enumerate(found.candidates) if one.effect.name not in without]
+    columns = np.concatenate([found.columns[j] for j in kept]).astype(int)
+    starts = np.cumsum([0, *(found.columns[j].size for j in kept)])
+    return replace(
+        found,
+        candidates=[found.candidates[j] for j in kept],
+        columns=[np.arange(first, last) for first, last in pairwise(starts)],
+        settings=[found.settings[c] for c in columns],
+        amplitudes=[found.amplitudes[c] for c in columns],
+        causes=[found.causes[c] for c in columns],
+        values=found.values[:, columns],
+    )
+
+
+def _with_laws(listed: Fingerprints, laws: list[LawInCase], base: Baseline) -> Fingerprints:
+    """Fingerprints of listed effects, then of laws."""
+    search, first = search_model(base), len(listed.settings)
+    columns, settings, amplitudes, causes = list(listed.columns), list(listed.settings), list(listed.amplitudes), []
+    for one in laws:
+        tried = one.candidate.settings()
+        columns.append(first + np.arange(len(tried)))
+        settings += tried
+        amplitudes += [one.candidate.amplitude] * len(tried)
+        causes += [cause_of(search.model.case, one.candidate, shapes) for shapes in tried]
+        first += len(tried)
+    values = responses(search.model, search.point, causes)
+    return replace(
+        listed,
+        candidates=[*listed.candidates, *(one.candidate for one in laws)],
+        columns=columns,
+        settings=settings,
+        amplitudes=amplitudes,
+        causes=[*listed.causes, *causes],
+        values=np.hstack([listed.values, values]),
+    )
+
+
+def _part(projected: score_test.Projected, columns: slice) -> score_test.Projected:
+    return replace(
+        projected,
+        fingerprints=projected.fingerprints[:, columns],
+        length=projected.length[columns],
+        visible=projected.visible[columns],
+    )
+
+
+def _kind_of_laws(full: Screening, columns: list[np.ndarray], first: int) -> HypothesisKind:
+    """All laws are as likely before, and so are the references of one."""
+    plausible = np.array([one.plausible_gain for one in full.fingerprints.amplitudes[first:]])
+    prior = np.empty(plausible.size)
+    for of_law in columns:
+        prior[of_law] = 1.0 / (GROUPS * LISTED_ODDS * len(columns) * of_law.size)
+    return kind_of_hypotheses("law", _part(full.projected, slice(first, None)), plausible, prior)
+
+
+def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
+    """The screening of the listed effects alone, with the noise that was estimated with laws."""
+    count, projected = len(listed.settings), _part(full.projected, slice(len(listed.settings)))
+    return replace(
+        full,
+        fingerprints=listed,
+        whitened_fingerprints=full.whitened_fingerprints[:, :count],
+        projected=projected,
+        effects=family_of(projected, listed.one_sided, full.errors, SEED),
+        kinds=(kind_of_listed(listed, projected), *full.kinds[1:]),
+    )

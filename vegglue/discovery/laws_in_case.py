@@ -1,0 +1,101 @@
+"""Laws of the grammar as candidates of a case: which of them have something to act on, with references from its flow.
+
+A law is measured by what its term has seen: the quantity in the cells of the term that lie under water at the measured
+sections, at the calibrated flow. Of these the references and the range of validity are quantiles.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.effects.definition import Effect
+from vegglue.effects.grammar import LAWS, SAME_AS, Law
+from vegglue.effects.surroundings import Cells
+from vegglue.engine.interface import Model, Point, flow_at_centres
+from vegglue.measurements.kinds import velocity_rows
+from vegglue.screening.candidates import Candidate
+from vegglue.screening.places import LEAST_DEPTH
+from vegglue.site.channel_geometry import channel_geometry
+
+# Quantiles between which a law counts as seen, and the fewest cells that say what a term sees. Chosen, not measured.
+SEEN, FEWEST_SEEN = (0.05, 0.95), 10
+# Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it can be told
+# from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.
+LEAST_SPREAD = 0.1
+# Significant digits of a reference: a person reads it.
+DIGITS = 2
+
+
+@dataclass(frozen=True)
+class LawInCase:
+    """A law, its candidate with the references to be tried, and the values of its quantity from 5 to 95 % of the cells
+    of its term at the measured sections [unit of the quantity].
+    """
+
+    law: Law
+    candidate: Candidate
+    seen: tuple[float, float]
+
+
+def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
+    """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
+    flows = [_cells(model, point, experiment) for experiment in model.case.experiments]
+    found = []
+    for law in LAWS.values():
+        if SAME_AS.get(law.name) in listed or law.name in model.case.effects:
+            continue
+        values = np.concatenate([_values(law, cells) for cells in flows])
+        if values.size < FEWEST_SEEN:
+            continue
+        low, middle, high = np.quantile(values, (SEEN[0], 0.5, SEEN[1]))
+        if high - low < LEAST_SPREAD * abs(middle):
+            continue
+        found.append(LawInCase(law, Candidate(_with_references(law, values)), (float(low), float(high))))
+    return found
+
+
+def _with_references(law: Law, values: Array) -> Effect:
+    """The effect of a law that is tried with the quantiles of its quantity as references."""
+    effect = law.effect
+    if not effect.shapes:
+        return effect
+    tried = sorted({_rounded(value) for value in np.quantile(values, law.form.quantiles)})
+    (shape,) = effect.shapes
+    return replace(effect, shapes=(replace(shape, default=tried[len(tried) // 2], grid=tuple(tried)),))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _values(law: Law, cells: Cells) -> Array:
+    """The quantity of a law in the cells of its term that are under water, where it is finite."""
+    q = np.broadcast_to(law.quantity.of(cells), cells.depth.shape)
+    share = np.broadcast_to(law.term.share(cells), cells.depth.shape)
+    values = q[(share > 0.0) & (cells.depth > LEAST_DEPTH)]
+    return np.asarray(values[np.isfinite(values)])
+
+
+def _cells(model: Model, point: Point, experiment: str) -> Cells:
+    """The flow at cell centres of one experiment, dry but for the columns in which velocities were measured."""
+    flow = flow_at_centres(model, point, experiment)
+    geometry = channel_geometry(model.case, model.site, experiment)
+    station = model.station_of(experiment)
+    x = station["x"].to_numpy(float)[velocity_rows(station)]
+    grid = model.site.grid
+    measured = np.zeros((grid.x.size, 1), dtype=bool)
+    measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
+    depth, nothing = flow.depth[..., None], np.zeros_like(flow.depth)[..., None]
+    return Cells(
+        geometry=geometry,
+        depth=np.where(measured[..., None], depth, 0.0),
+        level=depth + geometry.bed,
+        u=flow.u[..., None],
+        v=flow.v[..., None],
+        rate=nothing,
+        bed_rate=nothing,
+        viscosity=nothing,
+        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9,
+    )

@@ -1,0 +1,72 @@
+"""case -> discovery: the law that the model lacks, as an effect file and a child config that uses it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vegglue.case.config import load_case
+from vegglue.case.messages import nearest
+from vegglue.case.resolved_config import as_yaml
+from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
+from vegglue.diagnosis.child_config import child_tree
+from vegglue.discovery.discovered import Discovery, LawFound
+from vegglue.discovery.effect_file import effect_name, effect_text
+from vegglue.discovery.search import discover_laws
+from vegglue.effects.library import library
+from vegglue.errors import InputError
+from vegglue.in_short import in_short
+from vegglue.parallel import at_most, one_thread
+from vegglue.progress import Watch, silent
+from vegglue.screening.candidates import Candidate
+from vegglue.workflow.run_folder import MAKE_ROOM, model_in
+
+
+@dataclass(frozen=True)
+class DiscoveredCase:
+    """What was found, and where a law is written: its effect file and the child config; None where none is."""
+
+    found: Discovery
+    effect_file: Path | None
+    child: Case | None
+
+    def __repr__(self) -> str:
+        written = [f"written to {self.effect_file}"] if self.effect_file else []
+        lines = [line for law in self.found.laws for line in law.lines]
+        return in_short(f"Discovery: {self.found.sentence}", [*lines, *written])
+
+
+@one_thread()
+def discover(
+    case: Case, *, without: Sequence[str] = (), to: Path | str | None = None, jobs: int = -1, watch: Watch = silent
+) -> DiscoveredCase:
+    """Say which law explains what the calibrated model misses; the best becomes an effect file and a child config.
+
+    without: listed effects that do not compete; to: the config to write, beside the parent if not given, its effect
+    file beside it. Nothing is written where no law is found, or it only restates a listed effect. Errors: InputError
+    for an unknown effect, when the model finds no flow, or a station has no standard error.
+    """
+    known = library(case.effect_file)
+    for name in without:
+        if name not in known:
+            raise InputError(f"--without: `{name}` is not an effect of the library: {nearest(name, known)}")
+    with at_most(jobs):
+        found = discover_laws(model_in(case), without, watch)
+    best = found.best
+    if best is None or best.same_as:
+        return DiscoveredCase(found, None, None)
+    name = effect_name(best)
+    target = Path(to) if to is not None else case.source.with_name(f"{case.source.stem}+{name}{case.source.suffix}")
+    file = target.with_name(f"{target.stem}.py")
+    return DiscoveredCase(found, file, _written(case, best, target, file))
+
+
+def _written(parent: Case, best: LawFound, target: Path, file: Path) -> Case:
+    """The child config and the effect file it names, read back as any other."""
+    write_text(file, effect_text(best, parent.effect_file), MAKE_ROOM)
+    effect = library(file.resolve())[effect_name(best)]
+    tree = {"effect_file": file.name} | child_tree(parent, target, [(Candidate(effect), {})])
+    tree = {"extends": tree.pop("extends"), **tree}
+    head = f"# Made by `vegglue discover`: {parent.name} with {effect.name}.\n# {best.equation}.\n"
+    write_text(target, head + as_yaml(tree), MAKE_ROOM)
+    return load_case(target, trust=True)  # the file was written here
