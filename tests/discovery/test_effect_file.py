@@ -22,8 +22,8 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 def found_law(law: Law, **fields: object) -> LawFound:
     """A law as a search finds it; fields: to be changed."""
     usual = LawFound(
-        law=law, same_as="", reference=0.3 if law.form.quantiles else None, strength=-0.8, interval95=(-1.0, -0.6),
-        chance=0.9, log_evidence=20.0, seen=(0.1, 0.6), alike=("bank_vegetation",),
+        law=law, same_as="", reference=0.3 if law.form.quantiles else None, scale=0.5, strength=-0.8,
+        interval95=(-1.0, -0.6), chance=0.9, log_evidence=20.0, seen=(0.1, 0.6), alike=("bank_vegetation",),
     )  # fmt: skip
     return replace(usual, **fields)
 

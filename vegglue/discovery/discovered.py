@@ -19,13 +19,14 @@ def signed(reference: float) -> str:
 class LawFound:
     """A law with its reference r, its strength a and the 95 % interval of it [-], and its chance to be what is missing.
 
-    same_as: the listed effect that it restates, or empty; seen: from where to where the data have seen its quantity;
-    alike: listed effects and laws that leave the same trace at the stations.
+    scale: a plausible strength; same_as: the listed effect that it restates, or empty; seen: from where to where the
+    data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations.
     """
 
     law: Law
     same_as: str
     reference: float | None
+    scale: float
     strength: float
     interval95: tuple[float, float]
     chance: float

@@ -6,7 +6,6 @@ A case names one such file: where it has one of its own, the law is written belo
 from pathlib import Path
 
 from vegglue.discovery.discovered import LawFound, signed
-from vegglue.effects.grammar import PLAUSIBLE_STRENGTH, STRONGEST
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 
@@ -23,10 +22,11 @@ def {name}(cells, strength):
 
 
 EFFECTS = ({others}Effect(
-    name="{name}", stage="{stage}", title="{title}", act={name},
+    name="{name}", stage="{stage}", act={name},
+    title="{title}",
     equation="{equation}",
     source="found by `vegglue discover`; seen for {seen}",
-    amplitude=Amplitude("strength", "-", "strength a of the law", scale={scale:g}, low={low:g}, high={high:g}),
+    amplitude=Amplitude("strength", "-", "strength a of the law", scale={scale:.2g}, low={low:g}, high={high:g}),
 ),)
 '''
 
@@ -51,6 +51,6 @@ def effect_text(found: LawFound, own: Path | None) -> str:
         change = f'{{"viscosity": cells.viscosity * ({factor} - 1)}}'
     return before + TEXT.format(
         name=name, equation=found.equation, seen=found.range_seen, g=g, change=change, stage=law.term.stage,
-        others="" if own is None else "*EFFECTS, ", title=law.title, scale=PLAUSIBLE_STRENGTH, low=-STRONGEST,
-        high=STRONGEST,
+        others="" if own is None else "*EFFECTS, ", title=law.title, scale=found.scale, low=-law.form.strongest,
+        high=law.form.strongest,
     )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Effect
-from vegglue.effects.grammar import LAWS, SAME_AS, Law
+from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, SAME_AS, Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.measurements.kinds import velocity_rows
@@ -49,11 +49,22 @@ def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawI
         values = np.concatenate([_values(law, cells) for cells in flows])
         if values.size < FEWEST_SEEN:
             continue
-        low, middle, high = np.quantile(values, (SEEN[0], 0.5, SEEN[1]))
+        low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
         if high - low < LEAST_SPREAD * abs(middle):
             continue
-        found.append(LawInCase(law, Candidate(_with_references(law, values)), (float(low), float(high))))
+        effect = _with_references(law, values)
+        found.append(LawInCase(law, Candidate(effect, scale=_plausible(effect, law, low, high)), (low, high)))
     return found
+
+
+def _plausible(effect: Effect, law: Law, low: float, high: float) -> float:
+    """A plausible strength a: from one end of what was seen to the other, exp(a g) changes by PLAUSIBLE_STRENGTH in ln.
+
+    So all laws are as free to change what the data see, however g is counted; at most half way to the support's end.
+    """
+    reference = effect.shapes[0].default if effect.shapes else 1.0
+    first, last = (float(law.form.of(np.array(q), reference)) for q in (low, high))
+    return min(PLAUSIBLE_STRENGTH / max(abs(last - first), 1e-9), 0.5 * effect.amplitude.high)
 
 
 def _with_references(law: Law, values: Array) -> Effect:

@@ -103,6 +103,7 @@ def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFou
         law=of_law.law,
         same_as=SAME_AS.get(of_law.law.name, ""),
         reference=refit.shapes.get("reference"),
+        scale=refit.candidate.amplitude.scale,
         strength=refit.amplitude,
         interval95=refit.interval95,
         chance=chance,

@@ -21,8 +21,8 @@ from vegglue.resistance.physical_constants import GRAVITY
 
 # Depth [m] at which a Froude number is held, as in `resistance`: twice the default film.
 LEAST_DEPTH_OF_LAW = 0.02
-# A plausible size a [-]: a term changes by a half where g is 1. Ends of its support: exp(3) is a factor of 20.
-PLAUSIBLE_STRENGTH, STRONGEST = 0.5, 3.0
+# A plausible size a [-]: a term changes by a half where g is 1.
+PLAUSIBLE_STRENGTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class LawQuantity:
 @dataclass(frozen=True)
 class LawForm:
     """How g follows from q and r, as a function, as code and as text; quantiles: of the q that the data have seen, to
-    be tried as r (none: g has no r).
+    be tried as r (none: g has no r); strongest: end of the support of a on either side, a factor of 20 where g is 1.
     """
 
     name: str
@@ -65,6 +65,7 @@ class LawForm:
     written: str
     equation: str
     quantiles: tuple[float, ...] = ()
+    strongest: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class Law:
 
     @property
     def effect(self) -> Effect:
-        quantity = self.quantity
+        quantity, strongest = self.quantity, self.form.strongest
         low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
         meaning = f"reference r of {quantity.words}"
         shape = Shape("reference", quantity.unit, meaning, quantity.usual, low, high)
@@ -105,7 +106,7 @@ class Law:
             title=self.title,
             equation=self.equation(),
             act=partial(_by_law, self),
-            amplitude=Amplitude("strength", "-", "strength a", PLAUSIBLE_STRENGTH, -STRONGEST, STRONGEST),
+            amplitude=Amplitude("strength", "-", "strength a", PLAUSIBLE_STRENGTH, -strongest, strongest),
             shapes=(shape,) if self.form.quantiles else (),
             source="definition",
             checked=True,
@@ -149,7 +150,7 @@ _FROUDE = LawQuantity(
     f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_LAW}))", 0.2,
 )  # fmt: skip
 _SHEAR = LawQuantity(
-    "shear", "the lateral shear", "|du/dy| h/|U|", "-", lambda cells: np.abs(cells.u_y) * cells.depth / cells.speed,
+    "shear", "the lateral shear", "(|du/dy| h/|U|)", "-", lambda cells: np.abs(cells.u_y) * cells.depth / cells.speed,
     "np.abs(cells.u_y) * cells.depth / cells.speed", 0.3,
 )  # fmt: skip
 _ALONG_CHANNEL = LawQuantity(
@@ -157,7 +158,7 @@ _ALONG_CHANNEL = LawQuantity(
     "cells.geometry.share_along", 0.0,
 )  # fmt: skip
 _OFFSET = LawQuantity(
-    "offset", "the distance from the axis", "|y|/b", "-", lambda cells: np.abs(cells.geometry.offset),
+    "offset", "the distance from the axis", "(|y|/b)", "-", lambda cells: np.abs(cells.geometry.offset),
     "np.abs(cells.geometry.offset)", 0.7,
 )  # fmt: skip
 _FRONT = LawQuantity(
@@ -182,7 +183,10 @@ _STEP = LawForm(
     "step", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(5.0 * (np.minimum(q / r, 3.0) - 1.0)),
     "0.5 * np.tanh(5 * (np.minimum({q} / {r}, 3) - 1))", "tanh(5 ({q}/{r} - 1)) / 2", (0.3, 0.5, 0.7),
 )  # fmt: skip
-_TREND = LawForm("trend", "changes evenly with {q}", lambda q, r: q, "{q}", "{q}, -1/2 to 1/2 from end to end")
+# The data may lie in a tenth of the channel: then a is large, although the term changes little there.
+_TREND = LawForm(
+    "trend", "changes evenly with {q}", lambda q, r: q, "{q}", "{q}, -1/2 to 1/2 from end to end", strongest=8.0
+)
 _PART = LawForm(
     "part", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(20.0 * (q - r)),
     "0.5 * np.tanh(20 * ({q} - {r}))", "tanh(20 ({q} - {r})) / 2", (0.3, 0.5, 0.7),

@@ -1,0 +1,89 @@
+"""The search for a law in the small channel of twins: silent where nothing is hidden, and right where a law is.
+
+A listed effect is called by its name. One data set of an independent code in the end.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.discovery.discovered import Discovery
+from vegglue.discovery.laws_in_case import LEAST_SPREAD, laws_in_case
+from vegglue.discovery.search import discover_laws
+from vegglue.engine.interface import Model, linearise
+from vegglue.engine.model import coarser
+from vegglue.twins.twin import measured_twin, true_place, twin_base
+from vegglue.workflow.run_folder import model_in
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return model_in(load_case(CONFIG))
+
+
+def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
+    coarse = coarser(model)
+    assert coarse is not None
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    laws = {one.law.name: one for one in laws_in_case(coarse, point, ["bank_trend", "bed_trend"])}
+    assert len(laws) > 30
+    assert "law_bank_along_trend" not in laws, "bank_trend competes by itself"
+    assert "law_bank_depth_power" in laws, "depth_dependent_bank does not compete here"
+    for one in laws.values():
+        low, high = one.seen
+        assert low < high
+        for settings in one.candidate.settings():
+            assert low <= settings.get("reference", low) * (1 + 1e-9) or one.law.quantity.name == "along"
+    low, high = laws["law_floor_depth_ramp"].seen
+    assert 0.5 < low < high < 1.3
+    assert high - low > LEAST_SPREAD
+
+
+def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
+    """What is found in measurements of a truth that hides something at a ratio of 8, errors white."""
+    ground = twin_base(model, true_place(len(model.names), seed))
+    station, _ = measured_twin(ground, hidden, 8.0, "white", seed)
+    return discover_laws(replace(model, station=station))
+
+
+@pytest.mark.slow
+def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
+    """Three seeds; each names one by chance in at most 5 %."""
+    for seed in (2, 6, 7):
+        found = searched(model, [], seed)
+        assert found.laws == (), found.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("hidden", "seed"), [("law_viscosity_offset_step", 2), ("law_floor_along_part", 2), ("law_bank_along_part", 6)]
+)
+def test_a_hidden_law_is_found(model: Model, hidden: str, seed: int) -> None:
+    """Its term and its quantity."""
+    found = searched(model, [hidden], seed)
+    assert found.best is not None, found
+    assert found.best.law.name.rsplit("_", 1)[0] == hidden.rsplit("_", 1)[0]
+
+
+@pytest.mark.slow
+def test_banks_smoother_in_fast_water(model: Model) -> None:
+    """The speed is in the set; depth and a listed law of depth leave the same trace, and the listed one goes first."""
+    found = searched(model, ["law_bank_speed_step"], 2)
+    assert {law.law.term.name for law in found.laws} == {"bank"}
+    assert "speed" in {law.law.quantity.name for law in found.laws}
+    assert set(found.others) <= {"depth_dependent_bank", "bank_vegetation"}
+
+
+@pytest.mark.slow
+def test_a_listed_effect_is_called_by_its_name(model: Model) -> None:
+    found = searched(model, ["bank_trend"], 2)
+    assert found.best is None
+    assert max(found.others, key=found.others.__getitem__) == "bank_trend"
+    left_out = "law_bank_along_trend"
+    assert left_out not in {law.law.name for law in found.laws}
