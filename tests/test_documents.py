@@ -127,6 +127,21 @@ def test_files_of_the_page_are_read_as_shown(tmp_path: Path) -> None:
             assert any(is_said(wanted, each) for each in said), "\n".join([one.command, f"shown: {wanted}", *said])
 
 
+@pytest.mark.slow
+def test_the_law_of_the_page_is_found(tmp_path: Path) -> None:
+    """The commands of docs/discover.md, on the channel of twins."""
+    for name in ("configs/twin.yaml", "data/twin"):
+        (tmp_path / name).parent.mkdir()
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
+    for one in shown_in(ROOT / "docs" / "discover.md"):
+        said = printed(one.command, tmp_path)
+        for wanted in one.lines:
+            assert any(is_said(wanted, each) for each in said), "\n".join(
+                [f"$ {one.command}", f"shown: {wanted}", *said]
+            )
+
+
 def printed(line: str, folder: Path) -> list[str]:
     """What a command of vegglue prints, in a folder."""
     name, *arguments = line.split()

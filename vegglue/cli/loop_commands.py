@@ -75,11 +75,12 @@ def discover_command(
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
+    force: Force = False,
 ) -> None:
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
     case = vegglue.load_case(config, trust)
     with heard(quiet, as_object) as watch:
-        found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch)
+        found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch, force=force)
     tell(case, runs, found, as_object)
 
 

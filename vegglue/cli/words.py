@@ -6,6 +6,8 @@ from typing import Any
 from vegglue.case.schema import Case
 from vegglue.cli.brief_posterior import show_posterior
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
+from vegglue.discovery.discovered import chance_told
+from vegglue.errors import shown_path
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -53,10 +55,10 @@ def _show_discovery(result: DiscoveredCase) -> None:
         first, *further = law.lines
         print("\n".join([f"- {first}", *(f"  {line}" for line in further)]))
     for name, chance in result.found.others.items():
-        print(f"- {name} (chance {100 * chance:.0f} %)")
-    if result.child is not None:
-        print(f"Effect file: {result.effect_file}")
-        print(f"Child config: {result.child.source}")
+        print(f"- {name} (chance {chance_told(chance)})")
+    if result.child is not None and result.effect_file is not None:
+        print(f"Effect file: {shown_path(result.effect_file)}")
+        print(f"Child config: {shown_path(result.child.source)}")
 
 
 def _show_check(case: Case, found: CheckedCase) -> None:

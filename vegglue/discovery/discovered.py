@@ -10,6 +10,11 @@ from vegglue.in_short import in_short
 MOST_ALIKE = 4  # told by name
 
 
+def chance_told(chance: float) -> str:
+    """A chance as it is told: never 100 %."""
+    return "over 99 %" if chance > 0.99 else f"{100 * chance:.0f} %"
+
+
 def signed(reference: float) -> str:
     """A reference as it stands in a formula: in brackets below 0."""
     return f"({reference:g})" if reference < 0.0 else f"{reference:g}"
@@ -67,7 +72,7 @@ class LawFound:
         low, high = self.interval95
         same = f" It is the listed effect {self.same_as}." if self.same_as else ""
         told = [
-            f"{self.law.title} (chance {100 * self.chance:.0f} %).{same}",
+            f"{self.law.title} (chance {chance_told(self.chance)}).{same}",
             f"{self.equation}, a = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
             f"seen for {self.range_seen}: there it changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
         ]
@@ -102,10 +107,10 @@ class Discovery:
         if best is not None and best.same_as:
             return f"The law that explains most is the listed effect {best.same_as}; add it by that name."
         if best is not None:
-            return f"{best.law.title}: a law explains the misfit, with a chance of {100 * best.chance:.0f} %."
+            return f"{best.law.title}: a law explains the misfit, with a chance of {chance_told(best.chance)}."
         if self.others:
             name, chance = max(self.others.items(), key=lambda pair: pair[1])
-            return f"No law is needed: {name} explains as much, with a chance of {100 * chance:.0f} %."
+            return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
         return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
 
     def __repr__(self) -> str:

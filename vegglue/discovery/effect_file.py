@@ -45,7 +45,7 @@ def effect_text(found: LawFound, own: Path | None) -> str:
     reference = "" if found.reference is None else signed(found.reference)
     law = found.law
     g = law.form.written.format(q=law.quantity.written, r=reference)
-    factor = f"np.exp(strength * g * {law.term.written})"
+    factor = f"np.exp(strength * g{law.term.written})"
     change = f'{{"rate": cells.rate * {factor}}}'
     if law.term.stage == "exchange":
         change = f'{{"viscosity": cells.viscosity * ({factor} - 1)}}'

@@ -27,7 +27,7 @@ PLAUSIBLE_STRENGTH = 0.5
 
 @dataclass(frozen=True)
 class LawTerm:
-    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code."""
+    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code, a factor."""
 
     name: str
     words: str
@@ -127,19 +127,19 @@ def _open_floor(cells: Cells) -> Array:
 
 _FLOOR = LawTerm(
     "floor", "friction of the open floor", "on the floor without plants", "resistance", "k", _open_floor,
-    "(1 - cells.geometry.bank) * (1 - cells.geometry.planted)",
+    " * (1 - cells.geometry.bank) * (1 - cells.geometry.planted)",
 )  # fmt: skip
 _BANK = LawTerm(
     "bank", "friction of the banks", "on the banks", "resistance", "k", lambda cells: cells.geometry.bank,
-    "cells.geometry.bank",
+    " * cells.geometry.bank",
 )  # fmt: skip
 _PLANTS = LawTerm(
     "plants", "friction of the plants", "where plants stand", "resistance", "k", lambda cells: cells.geometry.planted,
-    "cells.geometry.planted",
+    " * cells.geometry.planted",
 )  # fmt: skip
 _VISCOSITY = LawTerm(
     "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", lambda cells: np.ones_like(cells.geometry.bank),
-    "1",
+    "",
 )  # fmt: skip
 
 _DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5)

@@ -1,14 +1,14 @@
 """case -> discovery: the law that the model lacks, as an effect file and a child config that uses it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vegglue.case.config import load_case
+from vegglue.case.made_files import write_made
 from vegglue.case.messages import nearest
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.case.text_files import write_text
 from vegglue.diagnosis.child_config import child_tree
 from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.discovery.effect_file import effect_name, effect_text
@@ -19,7 +19,7 @@ from vegglue.in_short import in_short
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.screening.candidates import Candidate
-from vegglue.workflow.run_folder import MAKE_ROOM, model_in
+from vegglue.workflow.run_folder import model_in
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,20 @@ class DiscoveredCase:
 
 @one_thread()
 def discover(
-    case: Case, *, without: Sequence[str] = (), to: Path | str | None = None, jobs: int = -1, watch: Watch = silent
+    case: Case,
+    *,
+    without: Sequence[str] = (),
+    to: Path | str | None = None,
+    jobs: int = -1,
+    watch: Watch = silent,
+    force: bool = False,
 ) -> DiscoveredCase:
     """Say which law explains what the calibrated model misses; the best becomes an effect file and a child config.
 
     without: listed effects that do not compete; to: the config to write, beside the parent if not given, its effect
-    file beside it. Nothing is written where no law is found, or it only restates a listed effect. Errors: InputError
-    for an unknown effect, when the model finds no flow, or a station has no standard error.
+    file beside it; force: replace files there that vegglue did not write, too. Nothing is written where no law is
+    found, or it only restates a listed effect. Errors: InputError for an unknown effect, when the model finds no flow,
+    a station has no standard error, or a file would be replaced.
     """
     known = library(case.effect_file)
     for name in without:
@@ -58,15 +65,15 @@ def discover(
     name = effect_name(best)
     target = Path(to) if to is not None else case.source.with_name(f"{case.source.stem}+{name}{case.source.suffix}")
     file = target.with_name(f"{target.stem}.py")
-    return DiscoveredCase(found, file, _written(case, best, target, file))
+    return DiscoveredCase(found, file, _written(case, best, target, file, force))
 
 
-def _written(parent: Case, best: LawFound, target: Path, file: Path) -> Case:
+def _written(parent: Case, best: LawFound, target: Path, file: Path, force: bool) -> Case:
     """The child config and the effect file it names, read back as any other."""
-    write_text(file, effect_text(best, parent.effect_file), MAKE_ROOM)
-    effect = library(file.resolve())[effect_name(best)]
-    tree = {"effect_file": file.name} | child_tree(parent, target, [(Candidate(effect), {})])
-    tree = {"extends": tree.pop("extends"), **tree}
-    head = f"# Made by `vegglue discover`: {parent.name} with {effect.name}.\n# {best.equation}.\n"
-    write_text(target, head + as_yaml(tree), MAKE_ROOM)
+    text, name, law = effect_text(best, parent.effect_file), effect_name(best), best.law.effect
+    effect = replace(law, name=name, shapes=(), amplitude=replace(law.amplitude, scale=best.scale))
+    tree = child_tree(parent, target, [(Candidate(effect), {})])
+    tree = {"extends": tree.pop("extends"), "effect_file": file.name, **tree}
+    head = f"# Made by `vegglue discover`: {parent.name} with {name}.\n# {best.equation}.\n"
+    write_made({file: text, target: head + as_yaml(tree)}, "give another file by --to", force)
     return load_case(target, trust=True)  # the file was written here
