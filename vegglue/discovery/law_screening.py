@@ -23,7 +23,7 @@ from vegglue.site.channel_geometry import half_width
 # All listed effects together are so many times as likely before the data as all laws together: strong evidence, as
 # between kinds elsewhere, is asked of a law before it is preferred to an effect that others have seen in nature.
 LISTED_ODDS = 10.0
-SEED = 1  # of the draws of errors alone, as in `screen`
+LAW_SEED = 1  # of the draws of errors alone, as in `screen`
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def screen_laws(base: Baseline, without: tuple[str, ...] = ()) -> LawScreening:
     listed = _left(fingerprints_of(search, half_width(base.model.site)), without)
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
     every = _with_laws(listed, laws, base)
-    full = screen(base, (), every, SEED)
+    full = screen(base, (), every, LAW_SEED)
     count = len(listed.settings)
     columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
     kind = _kind_of_laws(full, columns, count)
@@ -63,7 +63,7 @@ def screen_laws(base: Baseline, without: tuple[str, ...] = ()) -> LawScreening:
         kind=kind,
         columns=columns,
         settings=every.settings[count:],
-        p=alarm_p([kind], full.errors, SEED),
+        p=alarm_p([kind], full.errors, LAW_SEED),
         cosine=score_test.cosines(full.projected),
     )
 
@@ -133,6 +133,6 @@ def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
         fingerprints=listed,
         whitened_fingerprints=full.whitened_fingerprints[:, :count],
         projected=projected,
-        effects=family_of(projected, listed.one_sided, full.errors, SEED),
+        effects=family_of(projected, listed.one_sided, full.errors, LAW_SEED),
         kinds=(kind_of_listed(listed, projected), *full.kinds[1:]),
     )
