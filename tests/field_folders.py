@@ -6,7 +6,7 @@ from typing import Any
 
 SITE: dict[str, Any] = {
     "channel": {"length_m": 40.0, "bottom_width_m": 3.0, "bank_slope_v_per_h": 0.6667, "bed_slope": 0.001},
-    "patches": [{"x": [16, 20], "y": [0, 1.5], "stems_per_m2": 20}, {"x": [26, 30], "y": [-1.5, 0]}],
+    "patches": [{"x": [16, 20], "y": [0, 1.5], "stems_per_m2": 20}, {"x": [26, 30], "y": [-1.5, 0], "stems_per_m2": 1}],
     "canopy_height_guess_m": 0.6,
     "experiments": {"low": {"discharge_m3_s": 1.2, "downstream_level_m": 0.7}},
     "holdout": {"high": {"discharge_m3_s": 2.0, "downstream_level_m": 0.9}},

@@ -14,7 +14,7 @@ from vegglue.case.resolved_config import as_yaml
 from vegglue.case.safe_yaml import safe_yaml
 from vegglue.errors import InputError
 from vegglue.importers.site_file import read_site
-from vegglue.workflow.import_folder import import_folder
+from vegglue.workflow.import_folder import assumptions_of, import_folder
 
 ODD = (
     None, True, "", "3", "much", [], {}, [[]], 0, -1, 1e-300, 1e300, 10**400, float("nan"), float("inf"), "\ud800",
@@ -71,6 +71,10 @@ def test_whatever_stands_in_it_is_read_or_refused(tmp_path: Path, place: tuple[A
             "`patches[0].x` expected two numbers, the lower one first",
         ),
         (json.dumps(put(SITE, ("patches", 1), {"x": [1, 2]})), "`patches[1].y` is missing; add it."),
+        (
+            json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5]})),
+            "expected `stems_per_m2` of every patch or of none, got none of `patches[0]`; add it there.",
+        ),
         (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "a name without the sign '\\x00'"),
     ],
     ids=lambda text: text[:20],
@@ -96,3 +100,15 @@ def test_an_experiment_keeps_its_name(tmp_path: Path, name: str) -> None:
 def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "site", channel=SITE["channel"] | {"length_m": 0.5}, patches=[])
     assert import_folder(folder, tmp_path / "site.yaml").grid.cell[0] == 0.125
+
+
+def test_what_nobody_said_is_told(tmp_path: Path) -> None:
+    folder = field_folder(tmp_path / "site", eddy_viscosity=0.02, holdout={})
+    assert assumptions_of(folder) == [
+        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01.",
+        "site.json: taken as notes, and not read: eddy_viscosity.",
+        "holdout.csv is not read: site.json names no experiment under `holdout`.",
+    ]
+    bare = field_folder(tmp_path / "bare", patches=[])
+    assert "no plants" in assumptions_of(bare)[0]
+    assert assumptions_of(field_folder(tmp_path / "whole", eddy_viscosity_m2_s=0.01)) == []

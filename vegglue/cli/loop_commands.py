@@ -34,12 +34,17 @@ def import_command(
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
     imported = [one.model_dump() for one in case.imported or ()]
+    from vegglue.workflow.import_folder import assumptions_of
+
+    assumed = assumptions_of(folder)
     if as_object:
         names = {"experiments": list(case.experiments), "patches": patches, "parameters": list(case.parameters)}
-        print_object({"config": target, "case": case.name, **names, "imported": imported})
+        print_object({"config": target, "case": case.name, **names, "imported": imported, "assumed": assumed})
         return
     for one in case.imported or ():
         print(f"{one.name}: {one.taken}.")
+    for sentence in assumed:
+        print(sentence)
     print(
         f"{target}: {len(case.experiments)} experiment(s), {len(patches)} patches, "
         f"{len(case.parameters)} parameters with wide priors."

@@ -185,7 +185,7 @@ def site_file(folder: Path) -> Path:
 def read_site(path: Path) -> FieldSite:
     """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
     try:
-        return FieldSite.model_validate(read_tree(path) if path.suffix == ".yaml" else _of_json(path))
+        site = FieldSite.model_validate(read_tree(path) if path.suffix == ".yaml" else _of_json(path))
     except InputError:
         raise
     except ValidationError as error:
@@ -194,6 +194,42 @@ def read_site(path: Path) -> FieldSite:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except ValueError as error:
         raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
+    _refuse_some_uncounted(path, site)
+    return site
+
+
+def _refuse_some_uncounted(path: Path, site: FieldSite) -> None:
+    """Errors: InputError when stems were counted in some patches only: the others would seem all but bare."""
+    counted = ["stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None]
+    if any(counted) and not all(counted):
+        raise InputError(
+            f"{shown_path(path)}: expected `stems_per_m2` of every patch or of none, got none of "
+            f"`patches[{counted.index(False)}]`; add it there."
+        )
+
+
+def left_open(folder: Path) -> list[str]:
+    """What the site file of a folder does not say and `import` assumes, and what it says that nobody reads.
+
+    Errors: InputError as those of `read_site`.
+    """
+    path = site_file(folder)
+    site, given = read_site(path), read_tree(path) if path.suffix == ".yaml" else _of_json(path)
+    assumed = []
+    if "eddy_viscosity_m2_s" not in site.model_fields_set:
+        assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}")
+    if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
+        assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
+    if site.patches and not any("stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None):
+        assumed.append("plants equally dense in all patches that have no file")
+    if not site.patches:
+        assumed.append("no plants")
+    unread = [str(key) for key in given if key not in FieldSite.model_fields]
+    told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
+    told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
+    if (folder / "holdout.csv").is_file() and not site.holdout:
+        told.append(f"holdout.csv is not read: {path.name} names no experiment under `holdout`.")
+    return told
 
 
 def _of_json(path: Path) -> Any:

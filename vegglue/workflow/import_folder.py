@@ -14,6 +14,7 @@ from vegglue.case.schema import Case
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
+from vegglue.importers.site_file import left_open, site_file
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -34,6 +35,12 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
     else:
         _write_config(target, folder, case_from_folder(folder, target), force)
     return load_case(target)
+
+
+def assumptions_of(folder: Path | str) -> list[str]:
+    """What `import` assumes of a folder because nobody said it, and what it does not read; nothing of a known set."""
+    folder = Path(folder)
+    return left_open(folder) if site_file(folder).is_file() else []
 
 
 def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
