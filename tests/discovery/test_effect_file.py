@@ -87,6 +87,17 @@ def test_a_file_of_the_case_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert first.effect_file is not None
 
 
+def test_a_config_does_not_extend_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Not even one that vegglue wrote, and would replace."""
+    discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", LAW)
+    before = (tmp_path / "child.yaml").read_bytes()
+    with pytest.raises(InputError, match="is the config that it extends"):
+        discovered(
+            monkeypatch, tmp_path / "child.yaml", tmp_path / "child.yaml", found_law(LAWS["law_bank_depth_ramp"])
+        )
+    assert (tmp_path / "child.yaml").read_bytes() == before
+
+
 @pytest.mark.parametrize("law", [None, replace(LAW, same_as="bank_trend")])
 def test_nothing_is_written_where_no_law_is_new(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, law: LawFound | None

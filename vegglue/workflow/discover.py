@@ -14,7 +14,7 @@ from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.discovery.effect_file import effect_name, effect_text
 from vegglue.discovery.search import discover_laws
 from vegglue.effects.library import library
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_short
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
@@ -70,6 +70,8 @@ def discover(
 
 def _written(parent: Case, best: LawFound, target: Path, file: Path, force: bool) -> Case:
     """The child config and the effect file it names, read back as any other."""
+    if target.resolve() == parent.source:
+        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
     text, name, law = effect_text(best, parent.effect_file), effect_name(best), best.law.effect
     effect = replace(law, name=name, shapes=(), amplitude=replace(law.amplitude, scale=best.scale))
     tree = child_tree(parent, target, [(Candidate(effect), {})])
