@@ -190,10 +190,10 @@ def where_it_fails(found: Diagnosis | None) -> str:
         return ""
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
     worst = zones.iloc[int(np.argmax(size))]
-    place = " ".join(part for part in (str(worst["experiment"]), str(worst["section"])) if part)
+    section = f"section {worst['section']}, " if str(worst["section"]) else ""
     return (
-        f"The model {'as it was ' if accepted_causes(found) else ''}misses most in {place}, {worst['zone']}: by "
-        f"{fixed(float(size.max()), 1)} standard errors, where errors alone make 1."
+        f"{'Before, the' if accepted_causes(found) else 'The'} model misses most at {section}{worst['zone']}, in experiment "
+        f"{worst['experiment']}: by {fixed(float(size.max()), 1)} standard errors. Errors of measuring alone would make 1."
     )
 
 
