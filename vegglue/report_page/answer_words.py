@@ -191,9 +191,10 @@ def where_it_fails(found: Diagnosis | None) -> str:
     size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
     worst = zones.iloc[int(np.argmax(size))]
     section = f"section {worst['section']}, " if str(worst["section"]) else ""
+    model = "Before, the model" if accepted_causes(found) else "The model"
     return (
-        f"{'Before, the' if accepted_causes(found) else 'The'} model misses most at {section}{worst['zone']}, in experiment "
-        f"{worst['experiment']}: by {fixed(float(size.max()), 1)} standard errors. Errors of measuring alone would make 1."
+        f"{model} misses most at {section}{worst['zone']}, in experiment {worst['experiment']}: by "
+        f"{fixed(float(size.max()), 1)} standard errors. Errors of measuring alone would make 1."
     )
 
 
