@@ -42,7 +42,9 @@ def infer(
     case = of_size(case, members if ensemble is None else len(ensemble.status))
     observations = read_observations(case)
     if not observations.table["used"].any():
-        raise InputError(f"{case.name}: expected a station in use, got none; `vegglue check` says why.")
+        raise InputError(
+            f"{case.name}: expected a station in use, got none: nothing can be inferred; `vegglue check` says why."
+        )
     folder = folder_of(runs, case)
     if ensemble is None:
         ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
