@@ -9,7 +9,7 @@ from posteriors import changed
 from report_runs import MEMBERS
 
 from vegglue.report_page.findings import findings
-from vegglue.report_page.key_numbers import key_numbers, verdict_of
+from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
 from vegglue.report_page.run import Run
 from vegglue.report_page.tables import parameter_rows
 
@@ -36,9 +36,12 @@ def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
 
 
 def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
+    posterior = toy[0].posterior
     manning, drag = (row.posterior for row in parameter_rows(toy[0])[:2])
-    assert float(manning.split()[0]) == pytest.approx(toy[0].posterior.marginals.median["n_b"], rel=0.01)
-    assert drag.startswith("10<sup>")
+    assert float(manning.split()[0]) == pytest.approx(posterior.marginals.median["n_b"], rel=0.01)
+    assert float(drag.split()[0]) == pytest.approx(posterior.marginals.median["phi"], rel=0.01), "known to a tenth"
+    vague = changed(posterior, log10_sd=posterior.marginals.log10_sd | {"phi": 0.2})
+    assert estimate(vague, "phi").startswith("10<sup>")
 
 
 def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
