@@ -11,7 +11,10 @@ TESTS = Path(__file__).parent
 LONGEST = [
     TESTS / name
     for name in (
+        "test_documents.py",
         "end_to_end/test_open_pair.py",
+        "engine/test_engines.py",
+        "workflow/test_run.py",
         "end_to_end/test_open_effects.py",
         "end_to_end/test_open_places.py",
         "importers/test_confluence.py",
