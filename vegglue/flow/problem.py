@@ -4,7 +4,8 @@
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
 
 with k = g / (C^2 h) [1/m] from the friction laws where all of a cell is wet. On a grid along a centreline of curvature
-kappa, x along it and y across, J = 1 - y kappa (Smith and McLean 1984, doi:10.1029/WR020i009p01301), they are
+kappa, x along it and y across, J = 1 - y kappa (Smith and McLean 1984, doi:10.1029/WR020i009p01301; not checked against
+it, tests compare each term with the same equations on the map), they are
 
     dh/dt + [d(hu)/dx + d(J hv)/dy] / J = 0
     du/dt + (u/J) du/dx + v du/dy - (kappa/J) u v + (g/J) dz_s/dx + k |U| u = [dT_xx/dx / J + d(J^2 T_xy)/dy / J^2] / h

@@ -49,6 +49,7 @@ def _loaded(path: Path, *names: str) -> dict[str, Array]:
     try:
         found = loadmat(path)
         return {name: np.asarray(found[name], dtype=np.float64) for name in names}
+    # scipy raises NotImplementedError for files of version 7.3, which are HDF5.
     except (OSError, ValueError, NotImplementedError, KeyError, MatReadError) as error:
         raise InputError(
             f"{shown_path(path)} cannot be read as a file of the set ({error}); download it anew."
