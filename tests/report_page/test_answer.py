@@ -76,7 +76,9 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
     assert '<a href="../toy-eddies/report.html">' in better
     assert "Measure <b>a gauge at x = 5 m</b>, to tell eddies from &lt;wind&gt;: 1 station" in measure
     nothing = next_steps(replace(toy, diagnosis=NOTHING, loop=replace(loop, questions=())))
-    assert any("nothing is left to be told apart" in step for step in nothing)
+    assert any("what that model leaves open stands in its report" in step for step in nothing)
+    alone = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=())))
+    assert any("nothing is left to be told apart" in step for step in alone)
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
     assert any("vegglue extend toy.yaml --auto" in step for step in asked)
     assert any("vegglue next toy.yaml" in step for step in asked)

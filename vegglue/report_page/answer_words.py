@@ -238,7 +238,9 @@ def _measurements(run: Run, command: str) -> Iterator[str]:
     if questions is None:
         yield f"<code>vegglue next {command}</code> says what to measure next."
         return
-    if not questions:
+    if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
+        yield "Nothing is left to be told apart in what was found; what that model leaves open stands in its report."
+    elif not questions:
         yield "No further measurement is needed: nothing is left to be told apart."
     settled = [one for one in questions if one.measurements and one.measurements[0].enough]
     measurements = {one.measurements[0].name: one.measurements[0] for one in reversed(settled)}
