@@ -14,15 +14,16 @@ from vegglue.flow.equations import all_depths, cell_depths, residual_of, side_fl
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
 
 
-def eased(problem: Problem, state: Array, slope: Array) -> Array:
+def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bool_]) -> Array:
     """R(state), (nx, 3, ny, m), its rows of momentum of thin water written as slope (u - u*); zero when R is.
 
-    slope (nx, 3, ny, 1): `slope_of_friction` of the reference member.
+    slope (nx, 3, ny, 1): `slope_of_friction` of the reference member; at_outlet (ny,): rows whose outlet face, too, is
+    written so.
     """
     depth = cell_depths(problem, state)
     closed, sides = closures(problem, state, depth), side_fluxes(problem, depth)
     out = residual_of(problem, state, depth, sides, closed)
-    thin_water.ease(out, state, depth, closed.rate, sides[0], slope, problem.film)
+    thin_water.ease(out, state, depth, closed.rate, sides[0], slope, problem.film, at_outlet)
     return out
 
 
@@ -58,8 +59,13 @@ def where_thin(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_
 def carry_thin(
     problem: Problem, values: Array, state: Array, thin: NDArray[np.bool_], thick: Array, back: bool = False
 ) -> None:
-    """Velocities or their rates (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
+    """Velocities (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
     thin_water.stretch(values, state, thin, *problem.wetting, thick, back)
+
+
+def weigh_thin(problem: Problem, rates: Array, state: Array, thin: NDArray[np.bool_], thick: Array) -> None:
+    """Rows of momentum (nx, 3, ny, m) of thin faces weighed by rho at the levels of a state, in place."""
+    thin_water.weigh(rates, state, thin, *problem.wetting, thick)
 
 
 def largest_correction(problem: Problem, step: Single, state: Array, thin: NDArray[np.bool_], thick: Array) -> Array:

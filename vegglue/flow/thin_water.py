@@ -4,14 +4,16 @@ face carries in the level.
 Steps with another member's Jacobian overshoot along the waterline long after the rest of the flow has settled. Hence,
 on thin faces,
 
-    rows of momentum are written as slope (u - u*), u* their root in u, all else as it is;
-    the unknown is w = rho u, rho = h / h_c, with h_c the depth at the reference member: what it carries is linear in w.
+    rows of momentum along the channel are written as slope (u - u*), u* their root in u, all else as it is;
+    the unknown is w = rho u, rho = h / h_c, with h_c the depth at the reference member: what it carries is linear in w;
+    rows of momentum are weighed by rho, those across the channel by at most one.
 
-Deep water stays as it is, roots stay roots, and at the reference member nothing changes. With the rows alone a member
-of one chunk of an ensemble of 5,000 took 8 steps instead of 15, of another 15 instead of 30 (means of 100, when they
-came). With both, the median of four chunks is 6 to 9 instead of 8 to 11; the mean, which stragglers rule, did not fall.
-A nonlinear preconditioner from the left and one from the right, as in Cai and Keyes 2002,
-doi:10.1137/S106482750037620X; not checked against it.
+Along the channel the flow around gives the slope, and friction the velocity. Across it a cell at the waterline is a dead
+end: what comes in gives the velocity, and friction the level. There the row as it is leads to the root, while one
+written with its root is off by the ratio of what both faces carry, 1e4 where one is wet and the other dry.
+
+Deep water stays as it is, roots stay roots, and at the reference member nothing changes. A nonlinear preconditioner
+from the left and one from the right, as in Cai and Keyes 2002, doi:10.1137/S106482750037620X; not checked against it.
 """
 
 import math
@@ -67,10 +69,10 @@ def friction_slope(state, depth, drag, west):
 
 
 @compiled
-def ease(out, state, depth, drag, west, slope, film):
-    """Momentum rows of thin water, in place, as slope (u - u*); blended in below THIN films.
+def ease(out, state, depth, drag, west, slope, film, at_outlet):
+    """Rows of momentum along the channel in thin water, in place, as slope (u - u*); blended in below THIN films.
 
-    slope (nx, 3, ny, 1): of the state whose factors are in use.
+    slope (nx, 3, ny, 1): of the state whose factors are in use; at_outlet (ny,): rows eased at the outlet, too.
     """
     nx, _, ny, m = state.shape
     before, per_thin = west / depth[0], 0.5 / (THIN * film)
@@ -78,19 +80,18 @@ def ease(out, state, depth, drag, west, slope, film):
         for j in range(ny):
             if depth[i, j].min() > 2.0 * THIN * film:
                 continue
-            for e in (1, 2):
-                if (e == 1 and j == 0) or (e == 2 and i == nx - 1):
-                    continue
-                a, b, one, two, three, four = _beside(state, before, i, j, e == 2)
-                at_reference = slope[i, e, j, 0]
-                for k in range(m):
-                    other = 0.25 * (one[k] + two[k] + three[k] + four[k])
-                    pair = depth[i, j, k] + depth[a, b, k]
-                    rough = (drag[i, j, k] * depth[i, j, k] + drag[a, b, k] * depth[a, b, k]) / pair
-                    rate = out[i, e, j, k]
-                    gap = _gap(state[i, e, j, k], other * other + REST_SPEED * REST_SPEED, rough, rate)
-                    share = min(pair * per_thin, 1.0)
-                    out[i, e, j, k] = rate + (1.0 - share * share) * (at_reference * gap - rate)
+            if i == nx - 1 and not at_outlet[j]:
+                continue
+            a, b, one, two, three, four = _beside(state, before, i, j, True)
+            at_reference = slope[i, 2, j, 0]
+            for k in range(m):
+                other = 0.25 * (one[k] + two[k] + three[k] + four[k])
+                pair = depth[i, j, k] + depth[a, b, k]
+                rough = (drag[i, j, k] * depth[i, j, k] + drag[a, b, k] * depth[a, b, k]) / pair
+                rate = out[i, 2, j, k]
+                gap = _gap(state[i, 2, j, k], other * other + REST_SPEED * REST_SPEED, rough, rate)
+                share = min(pair * per_thin, 1.0)
+                out[i, 2, j, k] = rate + (1.0 - share * share) * (at_reference * gap - rate)
 
 
 @compiled
@@ -148,8 +149,8 @@ def _rho(h: float, reference: float, per_thin: float) -> float:
 
 @compiled
 def stretch(values, state, faces, bed, rise, half_range, film, thick, back):
-    """Entries of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx, 3,
-    ny, m).
+    """Velocities of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx,
+    3, ny, m).
     """
     nx, _, ny, m = state.shape
     per_thin = 1.0 / (THIN * film)
@@ -164,6 +165,26 @@ def stretch(values, state, faces, bed, rise, half_range, film, thick, back):
                     h = wet_depth(_above(state, bed, rise, i, j, a, b, k), wide, film)
                     rho = _rho(h, reference, per_thin)
                     values[i, e, j, k] *= 1.0 / rho if back else rho
+
+
+@compiled
+def weigh(rates, state, faces, bed, rise, half_range, film, thick):
+    """Rows of momentum of some faces (nx, 3, ny) times rho at the levels of a state, in place, those across the channel
+    at most times one; rates (nx, 3, ny, m).
+    """
+    nx, _, ny, m = state.shape
+    per_thin = 1.0 / (THIN * film)
+    for i in range(nx):
+        for e in (1, 2):
+            for j in range(ny):
+                if not faces[i, e, j]:
+                    continue
+                a, b = _beyond(i, e, j)
+                wide, reference = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j]
+                for k in range(m):
+                    h = wet_depth(_above(state, bed, rise, i, j, a, b, k), wide, film)
+                    rho = _rho(h, reference, per_thin)
+                    rates[i, e, j, k] *= min(rho, 1.0) if e == 1 else rho
 
 
 @compiled

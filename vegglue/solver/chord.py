@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.flow.chord_equations import carry_thin, eased, largest_correction, where_thin
+from vegglue.flow.chord_equations import carry_thin, eased, largest_correction, weigh_thin, where_thin
 from vegglue.flow.problem import Problem, take
 from vegglue.solver.anderson import Memory, kept
 from vegglue.solver.jacobian import Factors
@@ -163,8 +163,8 @@ def stream(
 
 def _step(part: Problem, state: Array, thin: NDArray[np.bool_], shared: Factors) -> Single:
     """The correction in the unknowns of chord steps."""
-    rates = eased(part, state, shared.slope)
-    carry_thin(part, rates, state, thin, shared.thick)
+    rates = eased(part, state, shared.slope, part.boundaries.outlet)
+    weigh_thin(part, rates, state, thin, shared.thick)
     return shared.step(rates)
 
 

@@ -32,9 +32,15 @@ def _stored(problem: Problem, state: Array) -> Single:
 def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, time_step: float = 10.0) -> ChordSolution:
     """One member (m = 1) from a start that may be far away."""
     state, size = start, np.inf
+    # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
+    nowhere = np.zeros(start.shape[2], dtype=bool)
     for iteration in range(1, most + 1):
         slope = slope_of_friction(problem, state)
-        rates, columns_far, stored = eased(problem, state, slope), jacobian(problem, state), _stored(problem, state)
+        rates, columns_far, stored = (
+            eased(problem, state, slope, nowhere),
+            jacobian(problem, state),
+            _stored(problem, state),
+        )
         step, time_step = _bounded_step(rates, columns_far, stored, time_step)
         size = float(np.abs(step).max())
         if not size < LONGEST_CORRECTION:
