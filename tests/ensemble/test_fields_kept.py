@@ -25,7 +25,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.fields import Fields, megabytes, predict_at, window_of
 from vegglue.site.grid import Grid, build_grid
 from vegglue.site.gridded_site import build_site
-from vegglue.solver import batch
+from vegglue.solver import nested_grids
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble, read_fields
 
@@ -133,13 +133,13 @@ def changed(case: Case, **keys: Any) -> Case:
 
 def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.MonkeyPatch) -> None:
     case, _, _ = finished
-    solve = batch.solve_members
+    solve = nested_grids.solve_nested
 
     def fail_second(*arguments: Any) -> Any:
         solved = solve(*arguments)
         return replace(solved, status=np.where(np.arange(len(solved.status)) == 1, FAILED, solved.status))
 
-    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.solve_members", fail_second)
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.solve_nested", fail_second)
     rows = solve_chunk(case, build_site(case), read_observations(case), sample_at(case, np.full((3, 2), 0.4)))
     assert [bool(np.isfinite(fields).any()) for fields in rows["fields"]] == [True, False, True]
 

@@ -6,7 +6,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
 from vegglue.measurements.observations import Observations
-from vegglue.site.gridded_site import build_site
+from vegglue.site.gridded_site import Site, build_site
 from vegglue.site.zones import ranges_without_cells
 
 # Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.
@@ -21,15 +21,21 @@ def model_of(case: Case, observations: Observations, engine: Engine = NEWTON) ->
 
 
 def coarser(model: Model) -> Model | None:
-    """The model on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
+    """The model on coarser cells, see `coarser_grid`; None where there are none."""
+    found = coarser_grid(model.case, model.site)
+    return None if found is None else replace(model, case=found[0], site=found[1])
+
+
+def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
+    """The case on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
 
     None where their number is odd or would become too small, or an inflow or the outlet would hold no cell centre.
     """
-    grid = model.site.grid
+    grid = site.grid
     along = 1 if grid.dx > LONG_CELL * grid.dy else 2
     if grid.x.size % along or grid.y.size % 2 or min(grid.x.size / along, grid.y.size / 2) < FEWEST_CELLS:
         return None
-    cell = (along * model.case.grid.cell[0], 2.0 * model.case.grid.cell[1])
-    case: Case = model.case.model_copy(update={"grid": model.case.grid.model_copy(update={"cell": cell})})
-    site = build_site(case)
-    return None if any(ranges_without_cells(case, site.grid)) else replace(model, case=case, site=site)
+    cell = (along * case.grid.cell[0], 2.0 * case.grid.cell[1])
+    coarse: Case = case.model_copy(update={"grid": case.grid.model_copy(update={"cell": cell})})
+    on_coarse = build_site(coarse)
+    return None if any(ranges_without_cells(coarse, on_coarse.grid)) else (coarse, on_coarse)

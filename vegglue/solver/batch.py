@@ -87,9 +87,7 @@ def solve_members(
     points (m, d): where they are in the unit cube; problem_of: the problem of members at other points; start_from: a
     member to come from, a rough estimate if not given; how: what to do where Newton fails.
     """
-    (nx, ny), m = problem.shape, len(points)
-    state = np.moveaxis(np.empty((m, nx, 3, ny)), 0, -1)
-    solved = SolvedMembers(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
+    solved = none_solved(problem)
     linearised = [] if start_from is None else [start_from]
     metric = parameter_metric(points, [one.slopes for one in linearised])
     batch = _Batch(problem, problem_of, metric, tolerance, how)
@@ -99,6 +97,13 @@ def solve_members(
         _solve_cluster(batch, cluster, first, following, solved, linearised)
     solved.state[..., solved.status == FAILED] = np.nan
     return solved
+
+
+def none_solved(problem: Problem) -> SolvedMembers:
+    """All members of a problem before any is solved."""
+    (nx, ny), m = problem.shape, problem.members
+    state = np.moveaxis(np.empty((m, nx, 3, ny)), 0, -1)
+    return SolvedMembers(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
 
 
 def _solve_cluster(

@@ -32,6 +32,19 @@ def parameter_metric(points: Array, slopes: Sequence[tuple[Array, ...]]) -> Para
     return ParameterMetric(points, axes, points @ axes)
 
 
+def metric_of_flows(points: Array, states: Array) -> ParameterMetric:
+    """The same by the flows of the members themselves (nx, 3, ny, m), NaN where there is none: their tangents are the
+    slopes of a plane through them, none where they are too few for one.
+    """
+    known = np.flatnonzero(np.isfinite(states).all(axis=(0, 1, 2)))
+    if known.size <= points.shape[1]:
+        return parameter_metric(points, [])
+    flat = states[..., known].reshape(-1, known.size).T
+    plane = np.column_stack([np.ones(known.size), points[known]])
+    slopes = np.linalg.lstsq(plane, flat, rcond=None)[0][1:]
+    return parameter_metric(points, [tuple(slopes)])
+
+
 def principal_axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
     """A (d, d), the principal axes of G = sum S'S, S the tangents d state/ds of one flow or more; each as long as the
     square root of the change along it, the longest one.

@@ -81,7 +81,7 @@ def solve_reference(
         if shared is None:
             continue
         return _reference(problem_of, problem, point, band, solution.state, shared, spent)
-    return _marched(problem, spent, tolerance, how)
+    return marched(problem, spent, tolerance, how)
 
 
 def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
@@ -186,7 +186,7 @@ def _tangents(
     return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
 
 
-def _marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
+def marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
     """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
     start = backwater(problem)
     marched = march_to_rest(problem, start, tolerance, how)

@@ -1,0 +1,80 @@
+"""Members solved on ever finer cells: the same flows as from neighbours, and failures told."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from reach import COARSE, write_reach
+
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import parameters_at
+from vegglue.case.prior import sobol_points
+from vegglue.case.schema import Case
+from vegglue.engine.model import coarser_grid
+from vegglue.flow.problem import Problem
+from vegglue.flow.problem_setup import build_problem
+from vegglue.site.gridded_site import Site, build_site
+from vegglue.solver import nested_grids
+from vegglue.solver.batch import none_solved, solve_members
+from vegglue.solver.march import USUAL_FALL_BACK
+from vegglue.solver.nested_grids import GridProblem, solve_nested
+from vegglue.solver.parameter_metric import metric_of_flows
+from vegglue.solver.status import SOLVED_BY_NEWTON
+
+TOLERANCE = 1e-7
+
+
+def problem_at(case: Case, site: Site, points: np.ndarray) -> Problem:
+    return build_problem(case, site, next(iter(case.experiments)), parameters_at(case, points))
+
+
+@pytest.fixture(scope="module")
+def grids_and_points(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[GridProblem], np.ndarray]:
+    case = load_case(write_reach(tmp_path_factory.mktemp("reach"), COARSE))
+    points, place = sobol_points(len(case.parameters), 24, 3), (case, build_site(case))
+    grids: list[GridProblem] = []
+    while place is not None:
+        of = partial(problem_at, *place)
+        grids.insert(0, GridProblem(of(points), of))
+        place = coarser_grid(*place)
+    assert len(grids) > 1
+    return grids, points
+
+
+def test_the_same_flows_as_from_neighbours(grids_and_points: tuple[list[GridProblem], np.ndarray]) -> None:
+    grids, points = grids_and_points
+    nested = solve_nested(grids, points, TOLERANCE, USUAL_FALL_BACK)
+    beside = solve_members(grids[-1].problem, points, grids[-1].problem_of, TOLERANCE)
+    assert (nested.status == SOLVED_BY_NEWTON).all()
+    assert np.abs(nested.state - beside.state).max() < 20 * TOLERANCE
+
+
+def test_members_without_a_flow_on_coarser_cells_are_solved(
+    grids_and_points: tuple[list[GridProblem], np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grids, points = grids_and_points
+    whole = solve_nested(grids, points, TOLERANCE, USUAL_FALL_BACK)
+    solve = nested_grids.solve_members
+
+    def without_two(*arguments: object, **others: object) -> object:
+        solved = solve(*arguments, **others)
+        solved.state[..., [3, 5]] = np.nan
+        return solved
+
+    monkeypatch.setattr(nested_grids, "solve_members", without_two)
+    fewer = solve_nested(grids, points, TOLERANCE, USUAL_FALL_BACK)
+    assert (fewer.status == SOLVED_BY_NEWTON).all()
+    assert np.abs(fewer.state - whole.state).max() < 20 * TOLERANCE
+
+
+def test_a_metric_of_flows_is_longest_along_what_changes_them_most(
+    grids_and_points: tuple[list[GridProblem], np.ndarray],
+) -> None:
+    points = np.random.default_rng(1).random((30, 2))
+    states = np.zeros((4, 3, 5, 30))
+    states[:] = 1.0 + 3.0 * points[:, 0] + 0.1 * points[:, 1]
+    states[..., 7] = np.nan
+    spread = np.ptp(metric_of_flows(points, states).coordinates, axis=0)
+    assert spread.max() > 2 * spread.min()
+    few = none_solved(grids_and_points[0][0].problem).state * np.nan
+    np.testing.assert_array_equal(metric_of_flows(points[:24], few).axes, np.eye(2))
