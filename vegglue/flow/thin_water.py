@@ -8,8 +8,8 @@ on thin faces,
     the unknown is w = rho u, rho = h / h_c, with h_c the depth at the reference member: what it carries is linear in w;
     rows of momentum are weighed by rho, those across the channel by at most one.
 
-Along the channel the flow around gives the slope, and friction the velocity. Across it a cell at the waterline is a dead
-end: what comes in gives the velocity, and friction the level. There the row as it is leads to the root, while one
+Along the channel the flow around gives the slope, and friction the velocity. Across it a cell at the waterline is a
+dead end: what comes in gives the velocity, and friction the level. There the row as it is leads to the root, while one
 written with its root is off by the ratio of what both faces carry, 1e4 where one is wet and the other dry.
 
 Deep water stays as it is, roots stay roots, and at the reference member nothing changes. A nonlinear preconditioner
