@@ -60,7 +60,7 @@ def test_the_folder_of_a_run_lies_in_runs(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_nothing_that_is_read_can_hold_code() -> None:
-    """No pickle, eval or shell anywhere but in what speaks to workers of a cluster, which the user names."""
+    """No pickle, eval or shell anywhere; one file starts a program, the command of `engine`, which needs --trust."""
     banned = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "subprocess"}
     for path in FILES:
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -71,7 +71,8 @@ def test_nothing_that_is_read_can_hold_code() -> None:
         called = {
             node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
         }
-        assert not imported & banned, path
+        assert imported & banned == ({"subprocess"} if path.name == "command_run.py" else set()), path
+        assert "shell=True" not in path.read_text(encoding="utf-8"), path
         assert not called & {"eval", "exec", "__import__"}, path
         assert "allow_pickle=True" not in path.read_text(encoding="utf-8"), path
 
