@@ -56,7 +56,8 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
 
 def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame) -> Rung:
     """The case where it predicts best, without the measurements set aside."""
-    return rung(calibrated(case, folder_of(runs, case), aside), validation_of(case))
+    folder = folder_of(runs, case)
+    return rung(calibrated(case, folder, aside), validation_of(case, folder))
 
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:

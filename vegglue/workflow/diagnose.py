@@ -16,6 +16,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
+from vegglue.workflow.command_model import with_command, with_words_on_command
 from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remember_place, validation_of
 
 
@@ -33,7 +34,9 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     if kept is not None:
         return kept
     with at_most(jobs):
-        found = diagnose_model(model_in(case), watch, validation_of(case))
+        model = with_command(model_in(case), folder, watch)
+        found = diagnose_model(model, watch, validation_of(case, folder))
+        found = with_words_on_command(found, model, folder, watch)
     from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")

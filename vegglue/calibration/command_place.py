@@ -1,0 +1,85 @@
+"""Where a command fits best: the built-in engine leads there, and the command is run to correct it on the way.
+
+At each place the built-in engine is corrected to the predictions and slopes of the command (`engine/corrected`) and
+calibrated; where that ends, the command is run again. A place is kept when the command itself fits better there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, objective
+from vegglue.calibration.noise import Noise
+from vegglue.engine.command_runs import CommandRuns
+from vegglue.engine.corrected import Correction, corrected, correction_at
+from vegglue.engine.interface import Model, linearise
+from vegglue.errors import InputError
+from vegglue.progress import Watch, silent
+
+# Places at which the command is linearised at most, and how often a step that fits worse is halved. Chosen, not
+# measured: most cases need three places, and each costs two runs for each parameter.
+MOST_PLACES, MOST_HALVINGS = 8, 4
+
+
+@dataclass(frozen=True)
+class CommandPlace:
+    """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
+    next step would have been negligible.
+    """
+
+    model: Model
+    z: Array
+    settled: bool
+
+
+def command_place(runs: CommandRuns, model: Model, known: Array | None = None, watch: Watch = silent) -> CommandPlace:
+    """The search, from z = `known` (p,), else from the middle of the prior.
+
+    Errors: InputError when the command fails at the start, or the built-in engine finds no flow.
+    """
+    z = np.zeros(len(model.names)) if known is None else known
+    here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+    base = baseline(here, known)
+    for _ in range(MOST_PLACES):
+        if _is_near(base, z):
+            return CommandPlace(here, z, settled=True)
+        step = _lower(runs, model, here, base, z, watch)
+        if step is None:
+            break
+        z = step
+        here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+        base = baseline(here, z)
+    return CommandPlace(here, z, settled=False)
+
+
+def _model_at(runs: CommandRuns, model: Model, correction: Correction, watch: Watch) -> Model:
+    return replace(model, engine=corrected(correction, runs, watch))
+
+
+def _is_near(base: Baseline, z: Array) -> bool:
+    """Whether the calibrated model lies so near z (p,) that another step would gain next to nothing."""
+    away = base.fitted.point.z - z
+    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < NEGLIGIBLE_DECREASE)
+
+
+def _lower(runs: CommandRuns, model: Model, here: Model, base: Baseline, z: Array, watch: Watch) -> Array | None:
+    """A place towards the calibrated model where the command itself fits better than at z (p,); None where there is
+    none.
+    """
+    before, step = _objective(here, base.noise, z), base.fitted.point.z - z
+    for _ in range(MOST_HALVINGS):
+        try:
+            there = correction_at(runs, model, z + step, watch, slopes=False)
+        except InputError:  # the command fails there: it may not nearer by
+            there = None
+        if there is not None and _objective(_model_at(runs, model, there, watch), base.noise, z + step) < before:
+            return np.asarray(z + step)
+        step = step / 2.0
+    return None
+
+
+def _objective(model: Model, noise: Noise, z: Array) -> float:
+    point = linearise(model, z)
+    return np.inf if point is None else objective(noise, point)
