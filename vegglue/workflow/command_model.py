@@ -11,16 +11,17 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.command_place import CommandPlace, command_place
-from vegglue.case.parameter_space import z_at
+from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.engine.command_runs import CommandRuns, command_predictions, command_runs
+from vegglue.engine.command_runs import CommandRuns, command_predictions, command_runs, ended_runs
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import so_many
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.likelihood import root_mean_square, stations_by_kind
+from vegglue.measurements.kinds import kind_of
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.whole_files import MAKE_ROOM
@@ -77,6 +78,30 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         said.append("The search for its best place did not settle: its predictions may be rough.")
     verdict = replace(found.verdict, remarks=(" ".join(said), *found.verdict.remarks))
     return replace(found, verdict=verdict)
+
+
+def command_tried(model: Model, folder: Path) -> str:
+    """What came of one run of the command, at the medians of the priors; differences are root mean squares.
+
+    Errors: InputError when it fails.
+    """
+    case, bare = model.case, without_effects(model)
+    middle = np.zeros(len(bare.names))
+    theta = {name: float(value[0]) for name, value in theta_at(bare.case, middle).items()}
+    runs = command_runs(case, folder)
+    ((_, end),) = ended_runs(runs, bare.case, model.station, [theta])
+    if end.prediction is None:
+        raise InputError(
+            f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; its "
+            f"files lie in {shown_path(runs.folder)}."
+        )
+    own = linearise(bare, middle)
+    told = []
+    for name, rows in stations_by_kind(model.station).items():
+        kind, found = kind_of(name), end.prediction[rows]
+        off = "" if own is None else f", {root_mean_square(found - own.prediction[rows]):.2g} from the built-in engine"
+        told.append(f"{kind.words} {found.min():.3g} to {found.max():.3g} {kind.unit}{off}")
+    return f"The command of `engine` took {end.seconds:.1f} s at the medians of the priors: {'; '.join(told)}."
 
 
 def refuse_command(case: Case, verb: str) -> None:
