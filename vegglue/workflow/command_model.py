@@ -92,8 +92,8 @@ def command_tried(model: Model, folder: Path) -> str:
     ((_, end),) = ended_runs(runs, bare.case, model.station, [theta])
     if end.prediction is None:
         raise InputError(
-            f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; its "
-            f"files lie in {shown_path(runs.folder)}."
+            f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; "
+            f"its files lie in {shown_path(runs.folder)}."
         )
     own = linearise(bare, middle)
     told = []
