@@ -1,5 +1,7 @@
 """A command as the engine of a case, all the way: the built-in solver called as one says what it says inside."""
 
+import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,12 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import built_in, by_server, served
-from reach import COARSE, write_reach
+from reach import COARSE, ROOT, write_reach
+from reach import vegglue as shell
 
 import vegglue
 from vegglue.case.schema import Case
 from vegglue.results.ensemble import Ensemble
+from vegglue.storage.result_files import read_ensemble
 
+PAGE = ROOT / "docs" / "own_engine.md"
 SMALL = ("members: 1024", "members: 16")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 KNOWN = "members: 16, seed: 7}\ninfer: {sigma: known}"
@@ -69,3 +74,31 @@ def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPat
     for name, median in inside.marginals.median.items():
         assert command.marginals.median[name] == pytest.approx(median, rel=2e-3)
         np.testing.assert_allclose(np.std(command.sample.theta[name]), np.std(inside.sample.theta[name]), rtol=0.02)
+
+
+def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its config and its script, in a few members from the shell; without --trust nothing runs."""
+    monkeypatch.chdir(tmp_path)
+    write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
+    text = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
+    (tmp_path / "brook_by_command.yaml").write_text(text, encoding="utf-8")
+    shutil.copy(PAGE.parent / "examples" / "solver_as_command.py", tmp_path)
+    refused = shell(tmp_path, "check", "brook_by_command.yaml", succeed=False)
+    assert refused.returncode == 2
+    assert "which runs as code" in refused.stderr
+    assert not (tmp_path / "runs").exists()
+    checked = shell(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout
+    assert re.search(r"The command of `engine` took [\d.]+ s at the medians of the priors: velocity 0\.\d+ to", checked)
+    said = shell(tmp_path, "simulate", "brook_by_command.yaml", "--trust", "--members", 2, "--jobs", 2).stdout
+    assert "2 members, run by the command, 0 failed" in said
+    found = read_ensemble(tmp_path / "runs" / "brook_by_command" / "ensemble.h5")
+    inside = vegglue.simulate(pair.inside, runs=tmp_path / "inside", members=2, jobs=1)
+    np.testing.assert_allclose(found.prediction, inside.prediction, atol=3e-6)
+
+
+@pytest.mark.parametrize("script", sorted((PAGE.parent / "examples").glob("engine_*.py")), ids=lambda path: path.stem)
+def test_templates_can_be_read_by_python(script: Path) -> None:
+    """No more is known of them: the codes are not there."""
+    compile(script.read_text(encoding="utf-8"), script.name, "exec")
+    assert "it was never run" in script.read_text(encoding="utf-8")
+    assert script.name in PAGE.read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.baseline import Baseline, baseline, places_of_prior
 from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, objective
 from vegglue.calibration.noise import Noise
 from vegglue.engine.command_runs import CommandRuns
@@ -35,12 +35,11 @@ class CommandPlace:
 
 
 def command_place(runs: CommandRuns, model: Model, known: Array | None = None, watch: Watch = silent) -> CommandPlace:
-    """The search, from z = `known` (p,), else from the middle of the prior.
+    """The search, from z = `known` (p,), else from the first place of the prior where the command runs.
 
-    Errors: InputError when the command fails at the start, or the built-in engine finds no flow.
+    Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
     """
-    z = np.zeros(len(model.names)) if known is None else known
-    here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+    z, here = _start(runs, model, known, watch)
     base = baseline(here, known)
     for _ in range(MOST_PLACES):
         if _is_near(base, z):
@@ -52,6 +51,17 @@ def command_place(runs: CommandRuns, model: Model, known: Array | None = None, w
         here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
         base = baseline(here, z)
     return CommandPlace(here, z, settled=False)
+
+
+def _start(runs: CommandRuns, model: Model, known: Array | None, watch: Watch) -> tuple[Array, Model]:
+    """A known place, else the middle of the prior or, where the command fails, the next of its Sobol' points."""
+    refused = InputError(f"{model.case.name}: the command has no place to start from.")
+    for z in places_of_prior(len(model.names)) if known is None else [known]:
+        try:
+            return z, _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+        except InputError as error:
+            refused = error
+    raise refused
 
 
 def _model_at(runs: CommandRuns, model: Model, correction: Correction, watch: Watch) -> Model:
