@@ -63,6 +63,7 @@ def test_weighed_members_give_the_same_posterior(pair: Pair) -> None:
         assert command.median[name] == pytest.approx(median, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vegglue.inference.refine.EFFECTIVE_DRAWS", WORTH)
     monkeypatch.setattr("vegglue.inference.importance_sampling.FIRST_DRAWS", FIRST)
@@ -76,6 +77,7 @@ def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPat
         np.testing.assert_allclose(np.std(command.sample.theta[name]), np.std(inside.sample.theta[name]), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its config and its script, in a few members from the shell; without --trust nothing runs."""
     monkeypatch.chdir(tmp_path)

@@ -58,6 +58,7 @@ def _start(runs: CommandRuns, model: Model, known: Array | None, watch: Watch) -
     refused = InputError(f"{model.case.name}: the command has no place to start from.")
     for z in places_of_prior(len(model.names)) if known is None else [known]:
         try:
+            correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
             return z, _model_at(runs, model, correction_at(runs, model, z, watch), watch)
         except InputError as error:
             refused = error

@@ -101,7 +101,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
     watch(Progress(f"calibrating {case.name}"))
-    parent = calibrated(case, folder_of(runs, case), aside)
+    parent = calibrated(case, folder_of(runs, case), aside, watch)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
     rungs: dict[Names, Rung] = {(): rung(parent)}
@@ -126,7 +126,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
         bases.append(base)
     # Only now are the measurements for validation looked at.
     ladder = [
-        rung(replace(base, model=replace(base.model, case=one)), validation_of(one, folder_of(runs, one)))
+        rung(replace(base, model=replace(base.model, case=one)), validation_of(one, folder_of(runs, one), watch))
         for one, base in zip(cases, bases, strict=True)
     ]
     return StepwiseExtension(

@@ -24,6 +24,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
+from vegglue.progress import Watch, silent
 from vegglue.storage.result_files import read_posterior, stored_hash
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 from vegglue.workflow.command_model import unseen_with_command, with_command
@@ -54,7 +55,7 @@ def model_in(case: Case) -> Model:
     return model_of(case, read_observations(case))
 
 
-def validation_of(case: Case, folder: Path | None = None) -> Model | None:
+def validation_of(case: Case, folder: Path | None = None, watch: Watch = silent) -> Model | None:
     """The case at the measurements that no calibration sees, if it names any; folder: of its results, in which runs of
     its command are kept, if it has one.
     """
@@ -64,7 +65,7 @@ def validation_of(case: Case, folder: Path | None = None) -> Model | None:
     there = case.model_copy(update=seen)
     # An effect on a section or device that was calibrated to need not be in what was not.
     unseen = model_of(there, read_observations(there.model_copy(update={"effects": {}})))
-    return unseen if folder is None else unseen_with_command(unseen, model_in(case), folder)
+    return unseen if folder is None else unseen_with_command(unseen, model_in(case), folder, watch)
 
 
 def known_place(case: Case, folder: Path) -> Array | None:
@@ -91,9 +92,9 @@ def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None
     write_text(folder / "best.json", text, MAKE_ROOM)
 
 
-def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
+def calibrated(case: Case, folder: Path, aside: pd.DataFrame, watch: Watch = silent) -> Baseline:
     """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
-    model = with_command(model_in(case), folder)
+    model = with_command(model_in(case), folder, watch)
     base = calibrated_anew(model, known_place(case, folder), aside)
     remember_place(case, folder, best_place(base))
     return base
