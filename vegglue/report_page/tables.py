@@ -228,7 +228,10 @@ def health_facts(run: Run) -> Iterator[tuple[str, str]]:
         most = ensemble.iterations.max()
         yield "iterations of a solved member", f"{np.median(ensemble.iterations[solved]):.0f} (most {most})"
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
-    yield "processor time", f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member"
+    yield (
+        "time of the runs" if ensemble.by_command else "processor time",
+        f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
+    )
     for name in posterior.parameters:
         low, high = posterior.marginals.bound_mass[name]
         yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
