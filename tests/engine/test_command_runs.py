@@ -11,9 +11,10 @@ from commands import SMOOTH, commanded
 
 from vegglue.case.schema import Case
 from vegglue.engine.command_runs import CommandRuns, command_predictions, command_runs, ended_runs, own_parameters
-from vegglue.errors import InputError
+from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, taken
+from vegglue.storage.lock import hold_lock
 
 THETAS = [{"n_b": 0.03, "phi": 2.0}, {"n_b": 0.04, "phi": 3.0}, {"n_b": 0.05, "phi": 4.0}]
 PHI = "json.load(open('parameters.json'))['parameters']['phi']['value']"
@@ -22,6 +23,11 @@ COUNTED = "import os; open(os.path.join({folder!r}, str(os.getpid())), 'w').clos
 
 def table_of(case: Case):  # type: ignore[no-untyped-def]
     return read_observations(case).table
+
+
+def visible(runs: CommandRuns) -> list[Path]:
+    """All in the folder of the runs but its lock."""
+    return [path for path in runs.folder.iterdir() if path.name != ".lock"]
 
 
 def counting(tmp_path: Path, rest: str = "") -> tuple[Case, CommandRuns, Path]:
@@ -40,7 +46,7 @@ def test_what_has_run_is_not_run_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again[:2], first)
     np.testing.assert_array_equal(again[2], again[3])
     assert len(list(marks.iterdir())) == 3
-    assert sorted(path.suffix for path in runs.folder.iterdir()) == [".json"] * 3, "folders of good runs are gone"
+    assert sorted(path.suffix for path in visible(runs)) == [".json"] * 3, "folders of good runs are gone"
 
 
 def test_predictions_are_those_of_their_parameters(tmp_path: Path) -> None:
@@ -63,7 +69,7 @@ def test_another_state_of_the_model_is_run_anew(tmp_path: Path) -> None:
 def test_what_is_kept_and_damaged_is_run_anew(tmp_path: Path, text: str) -> None:
     case, runs, marks = counting(tmp_path)
     command_predictions(runs, case, table_of(case), THETAS[:1])
-    (kept,) = runs.folder.iterdir()
+    (kept,) = visible(runs)
     kept.write_text(text, encoding="utf-8")
     _, reasons = command_predictions(runs, case, table_of(case), THETAS[:1])
     assert reasons == [""]
@@ -119,7 +125,14 @@ def test_whoever_leaves_early_ends_what_is_under_way(tmp_path: Path) -> None:
     assert (position, end.reason) == (0, "")
     assert time.monotonic() - began < 30.0
     assert len(list(marks.iterdir())) <= 3
-    assert [path.suffix for path in runs.folder.iterdir() if path.is_file()] == [".json"]
+    assert [path.suffix for path in visible(runs) if path.is_file()] == [".json"]
+
+
+def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
+    case, runs, _ = counting(tmp_path)
+    runs.folder.mkdir(parents=True)
+    with hold_lock(runs.folder), pytest.raises(StorageError, match="engine is in use by process"):
+        command_predictions(runs, case, table_of(case), THETAS[:1])
 
 
 def test_a_program_that_is_not_there_is_told_before_anything_runs(tmp_path: Path) -> None:

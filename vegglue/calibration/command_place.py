@@ -26,37 +26,38 @@ MOST_PLACES, MOST_HALVINGS = 8, 4
 @dataclass(frozen=True)
 class CommandPlace:
     """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
-    next step would have been negligible.
+    next step would have been negligible; places: at how many the slopes of the command were taken.
     """
 
     model: Model
     z: Array
     settled: bool
+    places: int
 
 
-def command_place(runs: CommandRuns, model: Model, known: Array | None = None, watch: Watch = silent) -> CommandPlace:
-    """The search, from z = `known` (p,), else from the first place of the prior where the command runs.
+def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> CommandPlace:
+    """The search, from the first place of the prior where the command runs: it hangs on nothing but the case.
 
     Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
     """
-    z, here = _start(runs, model, known, watch)
-    base = baseline(here, known)
-    for _ in range(MOST_PLACES):
+    z, here = _start(runs, model, watch)
+    base = baseline(here)
+    for places in range(1, MOST_PLACES + 1):
         if _is_near(base, z):
-            return CommandPlace(here, z, settled=True)
-        step = _lower(runs, model, here, base, z, watch)
-        if step is None:
+            return CommandPlace(here, z, True, places)
+        lower = _lower(runs, model, here, base, z, watch)
+        if lower is None or places == MOST_PLACES:
             break
-        z = step
+        z = lower
         here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
         base = baseline(here, z)
-    return CommandPlace(here, z, settled=False)
+    return CommandPlace(here, z, False, places)
 
 
-def _start(runs: CommandRuns, model: Model, known: Array | None, watch: Watch) -> tuple[Array, Model]:
-    """A known place, else the middle of the prior or, where the command fails, the next of its Sobol' points."""
+def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Model]:
+    """The middle of the prior or, where the command fails, the next of its Sobol' points."""
     refused = InputError(f"{model.case.name}: the command has no place to start from.")
-    for z in places_of_prior(len(model.names)) if known is None else [known]:
+    for z in places_of_prior(len(model.names)):
         try:
             correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
             return z, _model_at(runs, model, correction_at(runs, model, z, watch), watch)

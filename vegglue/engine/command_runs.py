@@ -31,7 +31,8 @@ from vegglue.engine.command_run import CommandEnd, run_command_once
 from vegglue.errors import InputError, shown_path
 from vegglue.parallel import cores_allowed, is_taken
 from vegglue.progress import Progress, Watch, silent
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.storage.lock import hold_lock
+from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 OneTheta = Mapping[str, float]
 
@@ -85,7 +86,7 @@ def ended_runs(
 
     What is closed early, or stopped by Ctrl-C, stops the runs under way. Errors: StorageError.
     """
-    stations, stop = stations_text(station), Event()
+    stations = stations_text(station)
     given = [{PARAMETERS_FILE: parameters_text(case, theta), STATIONS_FILE: stations} for theta in thetas]
     keys = [hashlib.sha256("\n".join([runs.digest, *one.values()]).encode()).hexdigest()[:32] for one in given]
     first: dict[str, int] = {}
@@ -97,18 +98,31 @@ def ended_runs(
             continue
         else:
             first[key] = position
-    pool = ThreadPoolExecutor(cores_allowed())
-    try:
-        waiting = {pool.submit(_run, runs, key, given[at], len(station), stop): key for key, at in first.items()}
-        while waiting:
-            ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for one in ended:
-                key, end = waiting.pop(one), one.result()
-                for position in (at for at, same in enumerate(keys) if same == key):
-                    yield position, end
-    finally:
-        stop.set()
-        pool.shutdown(wait=True, cancel_futures=True)
+    with closing(_new_runs(runs, {key: given[at] for key, at in first.items()}, len(station))) as ends:
+        for key, end in ends:
+            yield from ((position, end) for position, same in enumerate(keys) if same == key)
+
+
+def _new_runs(
+    runs: CommandRuns, given: Mapping[str, Mapping[str, str]], stations: int
+) -> Generator[tuple[str, CommandEnd], None, None]:
+    """The key of each run and how it ended; given: its files by key. Of two vegglue in one folder one is refused."""
+    if not given:
+        return
+    with failed_writes_told(runs.folder, MAKE_ROOM):
+        runs.folder.mkdir(parents=True, exist_ok=True)
+    stop = Event()
+    with hold_lock(runs.folder):
+        pool = ThreadPoolExecutor(cores_allowed())
+        try:
+            waiting = {pool.submit(_run, runs, key, files, stations, stop): key for key, files in given.items()}
+            while waiting:
+                ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for one in ended:
+                    yield waiting.pop(one), one.result()
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def command_predictions(

@@ -62,9 +62,10 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
     why = "running the command once more"
     there, reasons = command_predictions(runs, bare.case, model.station, [theta], watch, why)
     said = [
-        "Predictions and slopes are those of the command of `engine`, the slopes by central differences, two runs for "
-        f"each of {so_many(len(bare.names), 'parameter')}; what an effect or a place would change, and how the flow "
-        "bends away from these slopes, is what the built-in engine says of the same site."
+        "Predictions and slopes are those of the command of `engine`, the slopes by central differences, "
+        f"{so_many(place.places, 'time')} two runs for each of {so_many(len(bare.names), 'parameter')}; what an effect "
+        "or a place would change, and how the flow bends away from these slopes, is what the built-in engine says "
+        "of the same site."
     ]
     if reasons[0] or reckoned is None:
         said.append(f"At the parameters found last the command gives nothing to compare ({reasons[0]}).")
@@ -117,20 +118,20 @@ def _place_of(model: Model, folder: Path, watch: Watch) -> CommandPlace:
     runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
     known = _kept_place(path, wanted, len(model.names))
     if known is not None:
-        z, settled = known
-        return CommandPlace(_corrected_at(runs, model, z, watch), z, settled)
+        z, settled, places = known
+        return CommandPlace(_corrected_at(runs, model, z, watch), z, settled, places)
     found = command_place(runs, model, watch=watch)
-    text = json.dumps({"config_hash": wanted, "z": found.z.tolist(), "settled": found.settled})
+    text = json.dumps({"config_hash": wanted, "z": found.z.tolist(), "settled": found.settled, "places": found.places})
     write_text(path, text, MAKE_ROOM)
     return found
 
 
-def _kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool] | None:
+def _kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int] | None:
     try:
         found = json.loads(read_text(path, LARGEST_JSON))
         z = np.array(found["z"], dtype=float)
         if found["config_hash"] == wanted and z.shape == (parameters,) and np.isfinite(z).all():
-            return z, bool(found["settled"])
+            return z, bool(found["settled"]), int(found["places"])
     except (InputError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None
