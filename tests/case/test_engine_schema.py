@@ -98,3 +98,10 @@ def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, engine: str, senten
 def test_no_fields_are_kept_of_a_command(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"`simulate.fields` cannot be kept of a command"):
         with_engine(tmp_path, ENGINE, ("members: 1024", "members: 8, fields: {x: [0, 10]}"))
+
+
+def test_a_child_may_have_the_built_in_engine_again(tmp_path: Path) -> None:
+    """To be compared with its parent; nothing of it is code."""
+    with_engine(tmp_path)
+    (tmp_path / "child.yaml").write_text("extends: brook.yaml\nname: child\nengine: null\n", encoding="utf-8")
+    assert load_case(tmp_path / "child.yaml").engine is None
