@@ -135,11 +135,20 @@ def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
         command_predictions(runs, case, table_of(case), THETAS[:1])
 
 
-def test_a_program_that_is_not_there_is_told_before_anything_runs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("program", ["no_such_code", "./code", "bin/code"])
+def test_a_program_that_is_not_there_is_told_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
+) -> None:
+    """Nor is one found from where the user stands: a run stands elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    for path in (tmp_path / "code", tmp_path / "bin" / "code"):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("#!/bin/sh\n", encoding="utf-8")
+        path.chmod(0o755)
     case = commanded(tmp_path)
     assert case.engine is not None
-    missing = case.model_copy(update={"engine": case.engine.model_copy(update={"command": "no_such_code run"})})
-    with pytest.raises(InputError, match=r"`engine.command` expected a program that can be run, got 'no_such_code'"):
+    missing = case.model_copy(update={"engine": case.engine.model_copy(update={"command": f"{program} run"})})
+    with pytest.raises(InputError, match=f"`engine.command` expected a program that can be run, got '{program}'"):
         command_runs(missing, tmp_path / "runs")
 
 

@@ -8,6 +8,7 @@ The key is a hash of the command, of its files and of all that the run was given
 
 import hashlib
 import json
+import os
 import shutil
 import sys
 from collections.abc import Generator, Mapping, Sequence
@@ -60,7 +61,8 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
             "let the command itself hand its work to the cluster."
         )
     words = settings.words(sys.executable)
-    if shutil.which(words[0]) is None:
+    from_here = os.sep in words[0] and not os.path.isabs(words[0])  # but it is started in a folder of its own
+    if from_here or shutil.which(words[0]) is None:
         raise InputError(
             f"{shown_path(case.source)}: `engine.command` expected a program that can be run, got {words[0]!r}; "
             "install it, give its full path, or name it in `engine.files` and make it executable."
