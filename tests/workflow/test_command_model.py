@@ -1,5 +1,6 @@
 """Models of a case whose engine is a command: the corrected engine, the place where it fits best, effects on top."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from reach import COARSE
 import vegglue
 from vegglue.calibration.command_place import command_place
 from vegglue.case.parameter_space import theta_at
+from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command_runs import command_runs
 from vegglue.engine.corrected import corrected, correction_at
@@ -19,7 +21,8 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of, with_effect
-from vegglue.workflow.command_model import with_command
+from vegglue.workflow.command_model import _kept_place, with_command
+from vegglue.workflow.run_folder import validation_of
 
 SMALL = ("members: 1024", "members: 8")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
@@ -172,3 +175,26 @@ def test_a_slope_may_be_of_one_side(tmp_path: Path) -> None:
     steps = 1e-4 * np.eye(2)
     slope = (of_the_command(own, steps) - of_the_command(own, -steps)).T / 2e-4
     np.testing.assert_allclose(point.slope, slope, rtol=0.05)
+
+
+def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path) -> None:
+    """In their own experiment and at their own stations, corrected at the place of the calibration."""
+    (tmp_path / "unseen.csv").write_text("section,x,y,u\nbelow,20,0.5,0.4\nbelow,20,1.0,0.4\n", encoding="utf-8")
+    flow, file = "{May: {discharge: 1.5, level: 0.9}}", "{kind: velocity, file: unseen.csv, experiment: May}"
+    unseen = f"validation: {{experiments: {flow}, observations: [{file}]}}\nsimulate:"
+    case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL, WITH_ERROR, ("simulate:", unseen))
+    folder = tmp_path / "runs"
+    place = {"config_hash": case_hash(case), "z": HERE.tolist(), "settled": True, "places": 1}
+    (folder / "engine").mkdir(parents=True)
+    (folder / "engine" / "place.json").write_text(json.dumps(place), encoding="utf-8")
+    model = validation_of(case, folder)
+    assert model is not None
+    point = linearise(model, HERE)
+    assert point is not None
+    np.testing.assert_allclose(point.prediction, of_the_command(model, HERE[None])[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"config_hash": "x", "z": [0, 0], "settled": true, "places": 1}'])
+def test_a_place_that_is_damaged_or_another_is_not_taken(tmp_path: Path, text: str) -> None:
+    (tmp_path / "place.json").write_text(text, encoding="utf-8")
+    assert _kept_place(tmp_path / "place.json", "y", 2) is None
