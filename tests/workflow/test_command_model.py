@@ -198,3 +198,14 @@ def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path
 def test_a_place_that_is_damaged_or_another_is_not_taken(tmp_path: Path, text: str) -> None:
     (tmp_path / "place.json").write_text(text, encoding="utf-8")
     assert _kept_place(tmp_path / "place.json", "y", 2) is None
+
+
+@pytest.mark.parametrize(("noise", "step", "rough"), [(0.0, 0.1, ()), (0.0, 1.0, ()), (0.5, 0.1, ("n_b", "phi"))])
+def test_slopes_of_a_code_that_does_not_rest_are_told_to_be_rough(
+    tmp_path: Path, noise: float, step: float, rough: tuple[str, ...]
+) -> None:
+    """Its predictions move by more than the step moves them; a smooth code is not blamed, nor at the largest step."""
+    restless = SMOOTH.replace("/ 1000!r}", f"/ 1000 + {noise} * math.sin(1e6 * n * phi * float(row['x']))!r}}")
+    case = commanded(tmp_path, f"import math\n{restless}", f", step: {step}", COARSE, SMALL)
+    own = model_of(case, read_observations(case))
+    assert correction_at(command_runs(case, tmp_path), own, HERE).rough == rough

@@ -26,13 +26,15 @@ MOST_PLACES, MOST_HALVINGS = 8, 4
 @dataclass(frozen=True)
 class CommandPlace:
     """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
-    next step would have been negligible; places: at how many the slopes of the command were taken.
+    next step would have been negligible; places: at how many the slopes of the command were taken; rough: parameters
+    whose slopes there are mostly noise.
     """
 
     model: Model
     z: Array
     settled: bool
     places: int
+    rough: tuple[str, ...]
 
 
 def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> CommandPlace:
@@ -40,27 +42,28 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> Com
 
     Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
     """
-    z, here = _start(runs, model, watch)
+    z, correction = _start(runs, model, watch)
+    here = _model_at(runs, model, correction, watch)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
         if _is_near(base, z):
-            return CommandPlace(here, z, True, places)
+            return CommandPlace(here, z, True, places, correction.rough)
         lower = _lower(runs, model, here, base, z, watch)
         if lower is None or places == MOST_PLACES:
             break
-        z = lower
-        here = _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+        z, correction = lower, correction_at(runs, model, lower, watch)
+        here = _model_at(runs, model, correction, watch)
         base = baseline(here, z)
-    return CommandPlace(here, z, False, places)
+    return CommandPlace(here, z, False, places, correction.rough)
 
 
-def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Model]:
+def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correction]:
     """The middle of the prior or, where the command fails, the next of its Sobol' points."""
     refused = InputError(f"{model.case.name}: the command has no place to start from.")
     for z in places_of_prior(len(model.names)):
         try:
             correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
-            return z, _model_at(runs, model, correction_at(runs, model, z, watch), watch)
+            return z, correction_at(runs, model, z, watch)
         except InputError as error:
             refused = error
     raise refused

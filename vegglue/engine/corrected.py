@@ -26,6 +26,10 @@ from vegglue.errors import InputError
 from vegglue.flow.local_changes import Term
 from vegglue.progress import Watch, silent
 
+# Share of a difference [-] that is bend or noise, above which a slope is told to be rough: root mean square over
+# stations of f(h) + f(-h) - 2 f(0) over f(h) - f(-h). A flow that bends as much as it slopes has a twentieth at a step
+# of 0.1, and half at the largest step there is; noise alone has 1.7.
+ROUGH_SHARE = 0.5
 # What makes a station the same in two tables.
 SAME_STATION = ["experiment", "kind", "section", "x", "y"]
 
@@ -34,8 +38,9 @@ SAME_STATION = ["experiment", "kind", "section", "x", "y"]
 class Correction:
     """What the command has more than the built-in engine at z (q,) of the parameters `names` that it is given.
 
-    station: of which; value (n,) [m/s or m]; slope (n, q), zero where it was not asked for. A station that is not among
-    them, such as one that could be measured next, is predicted by the built-in engine alone.
+    station: of which; value (n,) [m/s or m]; slope (n, q), zero where it was not asked for; rough: parameters whose
+    slopes are mostly noise. A station that is not among them, such as one that could be measured next, is predicted by
+    the built-in engine alone.
     """
 
     names: tuple[str, ...]
@@ -43,6 +48,7 @@ class Correction:
     station: pd.DataFrame
     value: Array
     slope: Array
+    rough: tuple[str, ...] = ()
 
 
 def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) -> Engine:
@@ -77,10 +83,11 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch = sile
         )
     if np.isnan(found[0]).any():
         raise InputError(f"{model.case.name}: the command failed where it is calibrated: {reasons[0]}.")
-    slope = np.zeros_like(own.slope)
-    if slopes:
-        slope = _differences(model.case.name, names, points, found, reasons) - own.slope
-    return Correction(names, here, model.station, found[0] - own.prediction, slope)
+    value = found[0] - own.prediction
+    if not slopes:
+        return Correction(names, here, model.station, value, np.zeros_like(own.slope))
+    slope = _differences(model.case.name, names, points, found, reasons) - own.slope
+    return Correction(names, here, model.station, value, slope, _rough(names, found))
 
 
 def without_effects(model: Model) -> Model:
@@ -121,6 +128,14 @@ def _differences(name: str, names: Sequence[str], points: Array, found: Array, r
         first, last = (ahead, behind) if len(ends) == 2 else (ends[0], 0)
         slope[:, j] = (found[first] - found[last]) / (points[first, j] - points[last, j])
     return slope
+
+
+def _rough(names: Sequence[str], found: Array) -> tuple[str, ...]:
+    """Parameters whose differences are mostly noise, see ROUGH_SHARE; found (1 + 2 q, n)."""
+    here, ahead, behind = found[0], found[1 : 1 + len(names)], found[1 + len(names) :]
+    bend = np.sqrt(np.mean((ahead + behind - 2.0 * here) ** 2, axis=1))
+    slope = np.sqrt(np.mean((ahead - behind) ** 2, axis=1))
+    return tuple(name for name, a, b in zip(names, bend, slope, strict=True) if a > ROUGH_SHARE * b)
 
 
 def _correction_in(correction: Correction, model: Model, z: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.engine.command_runs import CommandRuns, command_predictions, command_runs, ended_runs
+from vegglue.engine.command_runs import command_predictions, command_runs, ended_runs
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError, shown_path
@@ -45,7 +45,8 @@ def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch 
     if model.case.engine is None:
         return unseen
     runs = command_runs(model.case, folder)
-    return _corrected_at(runs, unseen, _place_of(model, folder, watch).z, watch)
+    correction = correction_at(runs, unseen, _place_of(model, folder, watch).z, watch)
+    return replace(unseen, engine=corrected(correction, runs, watch))
 
 
 def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: Watch = silent) -> Diagnosis:
@@ -75,6 +76,11 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         off = root_mean_square((there[0] - reckoned.prediction)[used] / error[used])
         doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
         said.append(f"At the parameters found last it differs from what was reckoned with by {off:.2f} errors{doubt}.")
+    if place.rough:
+        said.append(
+            f"Its differences in {' and '.join(place.rough)} are mostly noise: let its flow come to rest, or set "
+            "`engine.step` larger."
+        )
     if not place.settled:
         said.append("The search for its best place did not settle: its predictions may be rough.")
     verdict = replace(found.verdict, remarks=(" ".join(said), *found.verdict.remarks))
@@ -119,7 +125,9 @@ def _place_of(model: Model, folder: Path, watch: Watch) -> CommandPlace:
     known = _kept_place(path, wanted, len(model.names))
     if known is not None:
         z, settled, places = known
-        return CommandPlace(_corrected_at(runs, model, z, watch), z, settled, places)
+        correction = correction_at(runs, model, z, watch)
+        here = replace(model, engine=corrected(correction, runs, watch))
+        return CommandPlace(here, z, settled, places, correction.rough)
     found = command_place(runs, model, watch=watch)
     text = json.dumps({"config_hash": wanted, "z": found.z.tolist(), "settled": found.settled, "places": found.places})
     write_text(path, text, MAKE_ROOM)
@@ -135,7 +143,3 @@ def _kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, 
     except (InputError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None
-
-
-def _corrected_at(runs: CommandRuns, model: Model, z: Array, watch: Watch) -> Model:
-    return replace(model, engine=corrected(correction_at(runs, model, z, watch), runs, watch))
