@@ -25,6 +25,8 @@ from vegglue.progress import silent
 
 # Threads that may be begun beside those at work, in what is done within `at_most`.
 _SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
+# How many cores may be used in what is done within `at_most`.
+_CORES: ContextVar[int | None] = ContextVar("cores", default=None)
 # Given work and tasks, the position of each task and work(*task), in the order in which they end.
 Taker = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
 # Who takes tasks to other machines, in what is done within `taken`.
@@ -39,6 +41,16 @@ def taken(taker: Taker) -> Iterator[None]:
         yield
     finally:
         _TAKER.reset(token)
+
+
+def is_taken() -> bool:
+    """Whether a taker takes tasks elsewhere."""
+    return _TAKER.get() is not None
+
+
+def cores_allowed() -> int:
+    """How many cores may be used here: those of `at_most`, all without it."""
+    return _CORES.get() or int(cpu_count())
 
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
@@ -80,11 +92,13 @@ def at_most(jobs: int) -> Iterator[None]:
     """So many threads at once in all that is done within; -1 for one on every core. Errors: InputError for 0."""
     if jobs == 0:
         raise InputError("jobs: expected the number of cores to use, or -1 for all of them, got 0.")
-    token = _SPARE.set(Semaphore((cpu_count() if jobs < 0 else jobs) - 1))
+    cores = int(cpu_count()) if jobs < 0 else jobs
+    spare, allowed = _SPARE.set(Semaphore(cores - 1)), _CORES.set(cores)
     try:
         yield
     finally:
-        _SPARE.reset(token)
+        _SPARE.reset(spare)
+        _CORES.reset(allowed)
 
 
 def in_threads(

@@ -2,6 +2,8 @@
 
 import ast
 import os
+import re
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -20,12 +22,15 @@ COMMANDS = (
 ALARM = "from pathlib import Path\nPath('ran').write_text('')\nEFFECTS = ()\n"
 
 
-@pytest.fixture
-def strangers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+CODE = ("effect_file: own.py", 'engine: {command: "{python} {own}", files: {own: own.py}}')
+
+
+@pytest.fixture(params=CODE, ids=["effects", "engine"])
+def strangers(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A config that extends one that names code, which leaves a mark when it runs."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "own.py").write_text(ALARM, encoding="utf-8")
-    write_reach(tmp_path, COARSE, ("name: brook", "name: brook\neffect_file: own.py"))
+    (tmp_path / "own.py").write_text(ALARM.replace("'ran'", repr(str(tmp_path / "ran"))), encoding="utf-8")
+    write_reach(tmp_path, COARSE, ("name: brook", f"name: brook\n{request.param}"))
     child = tmp_path / "child.yaml"
     child.write_text("extends: brook.yaml\nname: child\n", encoding="utf-8")
     return child
@@ -39,7 +44,7 @@ def test_no_command_runs_code_that_a_config_names(
     arguments = [*options, strangers] if options == ["--config"] else [strangers, *options]
     code, said = said_to(monkeypatch, capsys, name, *arguments)
     assert code == 2
-    assert "which runs as code: read it, and add --trust if you trust it" in said
+    assert re.search("which runs as code: read it.* and add --trust if you trust", said)
     assert not Path("ran").exists()
     assert not Path("runs").exists()
 
@@ -48,7 +53,8 @@ def test_only_trust_runs_it(strangers: Path) -> None:
     with pytest.raises(InputError, match="runs as code"):
         load_case(strangers)
     assert not Path("ran").exists()
-    vegglue.check(load_case(strangers, trust=True))
+    with suppress(InputError):  # of a command that leaves no predictions
+        vegglue.check(load_case(strangers, trust=True))
     assert Path("ran").exists()
 
 
@@ -60,7 +66,7 @@ def test_the_folder_of_a_run_lies_in_runs(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_nothing_that_is_read_can_hold_code() -> None:
-    """No pickle, eval or shell anywhere but in what speaks to workers of a cluster, which the user names."""
+    """No pickle, eval or shell anywhere; one file starts a program, the command of `engine`, which needs --trust."""
     banned = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "subprocess"}
     for path in FILES:
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -71,7 +77,8 @@ def test_nothing_that_is_read_can_hold_code() -> None:
         called = {
             node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
         }
-        assert not imported & banned, path
+        assert imported & banned == ({"subprocess"} if path.name == "command_run.py" else set()), path
+        assert "shell=True" not in path.read_text(encoding="utf-8"), path
         assert not called & {"eval", "exec", "__import__"}, path
         assert "allow_pickle=True" not in path.read_text(encoding="utf-8"), path
 

@@ -165,13 +165,18 @@ def grid_difference(point: Point, on_coarse: Point | None) -> Array:
     return point.prediction - (point if on_coarse is None else on_coarse).prediction
 
 
-def _starts(model: Model, noise: Noise) -> list[Point]:
-    """The FITTED_POINTS with the least objective, of the middle of the prior and Sobol' points around it."""
+def places_of_prior(parameters: int) -> Array:
+    """The middle of the prior, and Sobol' points around it, z (PRIOR_POINTS, p)."""
     from scipy.stats import norm, qmc  # late: what only looks at a case need not wait for it
 
-    prior_points = norm.ppf(qmc.Sobol(len(model.names), seed=1).random(PRIOR_POINTS))
-    prior_points[0] = 0.0
-    found = [point for z in prior_points if (point := linearise(model, 0.7 * z)) is not None]
+    places = norm.ppf(qmc.Sobol(parameters, seed=1).random(PRIOR_POINTS))
+    places[0] = 0.0
+    return np.asarray(0.7 * places)
+
+
+def _starts(model: Model, noise: Noise) -> list[Point]:
+    """The FITTED_POINTS with the least objective, of the places of the prior."""
+    found = [point for z in places_of_prior(len(model.names)) if (point := linearise(model, z)) is not None]
     if not found:
         raise InputError(f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior.")
     return sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]

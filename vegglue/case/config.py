@@ -18,6 +18,8 @@ from vegglue.errors import InputError, shown_path
 
 # Keys whose value is a path, relative to the file it is written in.
 PATHS = ("file", "raster", "points", "effect_file")
+# A key whose values are such paths, by a name each.
+NAMED_PATHS = "files"
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
 
@@ -25,8 +27,8 @@ DECLARING = ("law", "distribution")
 def load_case(path: Path | str, trust: bool = False) -> Case:
     """The case in a YAML file, with all it extends.
 
-    trust: whether a Python file that the case names may be run. Errors: InputError, which says what is wrong, where,
-    and what to do.
+    trust: whether a Python file or a command that the case names may be run. Errors: InputError, which says what is
+    wrong, where, and what to do.
     """
     path = Path(path)
     layers = _layers(path, ())
@@ -42,6 +44,11 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
         raise InputError(
             f"{shown_path(path)}: `effect_file` names {shown_path(case.effect_file)}, which runs as code: read it, and "
             "add --trust if you trust it."
+        )
+    if case.engine is not None and not trust:
+        raise InputError(
+            f"{shown_path(path)}: `engine` names the command {case.engine.command!r}, which runs as code: read it and "
+            "the files it runs, and add --trust if you trust them."
         )
     refusal = disagreement(case)
     if refusal is not None:
@@ -92,6 +99,10 @@ def _with_full_paths(tree: Any, folder: Path) -> Any:
     if not isinstance(tree, dict):
         return tree
     paths = {key: os.path.realpath(folder / tree[key]) for key in PATHS if isinstance(tree.get(key), str)}
+    named = tree.get(NAMED_PATHS)
+    if isinstance(named, dict):
+        full = {name: os.path.realpath(folder / file) for name, file in named.items() if isinstance(file, str)}
+        paths[NAMED_PATHS] = named | full
     return {key: _with_full_paths(value, folder) for key, value in tree.items()} | paths
 
 

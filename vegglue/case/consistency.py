@@ -24,7 +24,7 @@ LEAST_PROBABILITY = 1e-6
 
 def disagreement(case: Case) -> Refusal | None:
     """The first thing in a case that does not agree with the rest of it; None when all agrees."""
-    checks = (_names, _files, _effects, _values, _parameters, _sides, _likelihood)
+    checks = (_names, _files, _effects, _values, _parameters, _sides, _likelihood, _engine)
     return next((refusal for check in checks for refusal in check(case)), None)
 
 
@@ -152,7 +152,7 @@ def _parameters(case: Case) -> Iterator[Refusal]:
         place = ("parameters", name)
         if name in DIMENSIONS:
             yield Refusal(place, f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it")
-        if name not in used:
+        if name not in used and case.engine is None:  # a command may know what the built-in solver does not
             yield Refusal(place, "is declared but used nowhere: name it where its value belongs, or remove it")
 
 
@@ -193,6 +193,18 @@ def _files(case: Case) -> Iterator[Refusal]:
             yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
         elif os.path.getsize(file) > LARGEST_DATA:
             yield Refusal(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
+
+
+def _engine(case: Case) -> Iterator[Refusal]:
+    """Files of the command are there, and nothing is asked of it that it does not give."""
+    if case.engine is None:
+        return
+    for name, path in case.engine.files.items():
+        if not os.path.exists(path):
+            complaint = f"expected an existing file or folder, got {shown_path(path)}: put it there or correct the path"
+            yield Refusal(("engine", "files", name), complaint)
+    if case.simulate.fields is not None:
+        yield Refusal(("simulate", "fields"), "cannot be kept of a command, which predicts at stations only: remove it")
 
 
 def _likelihood(case: Case) -> Iterator[Refusal]:

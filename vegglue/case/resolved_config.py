@@ -13,7 +13,11 @@ from vegglue.case.schema import Case
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
     ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
-) | {"simulate": {"field_budget"}, "observations": {"__all__": {"synthetic"}}}
+) | {
+    "simulate": {"field_budget"},
+    "observations": {"__all__": {"synthetic"}},
+    "engine": {"keep", "step"},
+}
 # Goes up whenever the same case gets other numbers, so that results of before no longer fit it.
 EQUATIONS = 3
 Tree = dict[str, Any]
@@ -54,8 +58,17 @@ def plain_tree(tree: Any, of_file: Callable[[Path], Any]) -> Any:
 
 
 def _hash(tree: Tree) -> str:
-    contents = plain_tree(tree, lambda file: hashlib.sha256(file.read_bytes()).hexdigest())
+    contents = plain_tree(tree, digest_of)
     return hashlib.sha256(json.dumps([EQUATIONS, contents], ensure_ascii=False).encode()).hexdigest()
+
+
+def digest_of(path: Path) -> str:
+    """sha256 of the content of a file; of a folder, of the names and contents of all files below it."""
+    if not path.is_dir():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    below = sorted(file for file in path.rglob("*") if file.is_file())
+    listed = [(file.relative_to(path).as_posix(), hashlib.sha256(file.read_bytes()).hexdigest()) for file in below]
+    return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
 
 
 def _relative(file: Path, source: Path) -> str:

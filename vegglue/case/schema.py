@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from vegglue.case.engine_schema import CommandEngine
 from vegglue.case.frame import Frame
 from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
 from vegglue.case.prior_width import unusable
@@ -214,6 +215,7 @@ class Case(Part):
     eddy_viscosity: Value = Field(default=0.01, description="[m2/s]")
     effects: dict[str, EffectEntry] = Field(default_factory=dict, description="physical effects at work, see `effects`")
     effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
+    engine: CommandEngine | None = Field(default=None, description="a command instead of the solver, needs --trust")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
     frame: Frame | None = Field(default=None, description="where the grid lies on the map")

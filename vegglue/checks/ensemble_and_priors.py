@@ -55,12 +55,14 @@ def remarks_on_kept_fields(case: Case, site: Site) -> Iterator[str]:
 
 
 def remarks_on_idle_parameters(case: Case, site: Site) -> Iterator[str]:
-    """Parameters whose value changes nothing in any experiment."""
+    """Parameters whose value changes nothing in any experiment, or nothing in the built-in engine."""
     classes = {name for index, name in enumerate(site.class_names) if (site.friction_class == index).any()}
     growing = _growing(case, site)
     acting = {value for place, value, _ in values(case) if _acts(place, classes, growing)}
     for name in case.parameters:
-        if name not in acting:
+        if name not in acting and case.engine is not None:
+            yield f"Parameter {name} acts in the command of `engine` only: what effects would change ignores it."
+        elif name not in acting:
             yield f"Parameter {name} acts in no cell of any experiment: its posterior will be its prior."
 
 

@@ -104,7 +104,7 @@ def _law(one: LawFound) -> Told:
 
 def _ensemble(found: Ensemble) -> Told:
     marched, failed = (members_with(found.status, number) for number in (SOLVED_BY_MARCHING, FAILED))
-    mass_error = found.mass_error[found.status != FAILED].max(initial=0.0)
+    mass_error = None if found.by_command else found.mass_error[found.status != FAILED].max(initial=0.0)
     return {"members": len(found.status), "marched": marched, "failed": failed, "largest_mass_error": mass_error}
 
 

@@ -34,7 +34,7 @@ Members = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, not how far the command is.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace also what you made or edited, or a larger ensemble.")]
-Trust = Annotated[bool, typer.Option("--trust", help="Run the effects of the config's own `effect_file`.")]
+Trust = Annotated[bool, typer.Option("--trust", help="Run the config's `effect_file` and the command of its `engine`.")]
 
 
 def number_given(text: str) -> tuple[str, float]:

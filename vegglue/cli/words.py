@@ -1,5 +1,6 @@
 """Results in words, as they are printed for a reader."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +71,16 @@ def _show_check(case: Case, found: CheckedCase) -> None:
     )
 
 
+def _reasons(ensemble: Ensemble) -> str:
+    """The reason of most failures, '' without any."""
+    reasons = Counter(ensemble.reason[ensemble.status == FAILED].astype(str)).most_common(1)
+    return "".join(f"; {count} of them: {reason}" for reason, count in reasons)
+
+
 def _solved(ensemble: Ensemble) -> str:
     status = ensemble.status
+    if ensemble.by_command:
+        return f"{len(status):,} members, run by the command, {members_with(status, FAILED)} failed{_reasons(ensemble)}"
     marched, failed = (members_with(status, number) for number in (SOLVED_BY_MARCHING, FAILED))
     return (
         f"{len(status):,} members, {marched} by marching, {failed} failed, "

@@ -58,17 +58,11 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
     StorageError when another run holds the folder or the disk is full (what was written stays).
     """
-    if not case.parameters:
-        raise InputError(f"{shown_path(case.source)}: `parameters` expected a prior or more, got none: add one.")
+    refuse_too_many(case, observations)
     site = build_site(case)
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{shown_path(case.source)}: {sentence}")
-    if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
-        raise InputError(
-            f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "
-            f"have {predictions:,} predictions; expected at most {MOST_PREDICTIONS:,}, take fewer of either."
-        )
     sample = sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
@@ -87,6 +81,17 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
             watch(Progress(phase, solved, header.members, "members", failed, resumed))
 
 
+def refuse_too_many(case: Case, observations: Observations) -> None:
+    """Errors: InputError for a case without parameters, or with more predictions than a file is laid out for."""
+    if not case.parameters:
+        raise InputError(f"{shown_path(case.source)}: `parameters` expected a prior or more, got none: add one.")
+    if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
+        raise InputError(
+            f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "
+            f"have {predictions:,} predictions; expected at most {MOST_PREDICTIONS:,}, take fewer of either."
+        )
+
+
 def chunk_size(members: int) -> int:
     """Members solved by one task at most; it depends on nothing but the size of the ensemble."""
     if members <= SPARSE_MEMBERS:
@@ -100,6 +105,15 @@ def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[Start
     start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
     slopes = [one.slopes for one in start_from.values() if one is not None]
     return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
+
+
+def solved_members(case: Case, observations: Observations, sample: PriorSample, jobs: int) -> np.ndarray:
+    """Predictions (member, station) of the members of a sample, NaN where one failed."""
+    site, found = build_site(case), np.full((len(sample.points), len(observations.table)), np.nan)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    for index, rows in _solve_all(case, site, observations, sample, chunks, [*range(len(chunks))], start_from, jobs):
+        found[chunks[index]] = rows["prediction"]
+    return found
 
 
 def _solve_all(

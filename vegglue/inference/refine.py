@@ -15,8 +15,9 @@ from vegglue.calibration.fit import MapEstimate
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
-from vegglue.engine.interface import predict
+from vegglue.engine.interface import Engine, predict
 from vegglue.engine.model import model_of
+from vegglue.engine.newton import NEWTON
 from vegglue.inference.glue import check_stations
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import Sample, sample
@@ -36,14 +37,16 @@ from vegglue.version import VERSION
 EFFECTIVE_DRAWS = 1000
 
 
-def refine(ensemble: Ensemble, case: Case, observations: Observations, watch: Watch = silent) -> Posterior:
+def refine(
+    ensemble: Ensemble, case: Case, observations: Observations, watch: Watch = silent, engine: Engine = NEWTON
+) -> Posterior:
     """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict unseen data.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
     or no flow is found from the best members.
     """
     check_stations(ensemble, observations.table)
-    base = modes_and_errors(model_of(case, observations), ensemble, case.infer.sigma, watch)
+    base = modes_and_errors(model_of(case, observations, engine), ensemble, case.infer.sigma, watch)
     run = partial(predict, base.model, [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
     finished = counted(watch, f"drawing around {len(base.fits)} mode(s)", EFFECTIVE_DRAWS, "effective draws")

@@ -135,7 +135,7 @@ def _of_ensemble(ensemble: Ensemble) -> Iterator[str]:
     failed = members_with(ensemble.status, FAILED)
     if failed > FAILED_TOLERATED * len(ensemble.status):
         yield f"{failed:,} of {count(len(ensemble.status), 'member')} failed"
-    if largest_mass_error(ensemble) >= MASS_LIMIT:
+    if not ensemble.by_command and largest_mass_error(ensemble) >= MASS_LIMIT:
         yield f"a member loses or gains {percent(largest_mass_error(ensemble))} of its discharge"
 
 

@@ -76,7 +76,8 @@ def findings(run: Run) -> list[Finding]:
         *_discharge(case, observations),
         _weights(posterior, notation),
         _members(run.ensemble),
-        _mass(run.ensemble),
+        *_mass(run.ensemble),
+        *_engine(case),
     ]
     return sorted(found, key=lambda finding: not finding.doubt)
 
@@ -218,14 +219,25 @@ def _weights(posterior: Posterior, notation: Notation) -> Finding:
 
 
 def _members(ensemble: Ensemble) -> Finding:
-    newton, marched, failed = (members_with(ensemble.status, number) for number in STATUS_WORDS)
-    text = f"{count(newton, 'member')} solved by Newton's method, {marched:,} by marching in time, {failed:,} failed"
+    newton, marched, failed, run = (members_with(ensemble.status, number) for number in STATUS_WORDS)
+    own = f"{count(newton, 'member')} solved by Newton's method, {marched:,} by marching in time"
+    text = f"{count(run, 'member')} run by the command" if ensemble.by_command else own
     return Finding(
         "members",
-        text + ("; they have no weight." if failed else "."),
+        f"{text}, {failed:,} failed{'; they have no weight' if failed else ''}.",
         doubt=failed > FAILED_TOLERATED * len(ensemble.status),
     )
 
 
-def _mass(ensemble: Ensemble) -> Finding:
-    return Finding("mass", mass_in_words(ensemble), doubt=largest_mass_error(ensemble) >= MASS_LIMIT)
+def _mass(ensemble: Ensemble) -> Iterator[Finding]:
+    if not ensemble.by_command:
+        yield Finding("mass", mass_in_words(ensemble), doubt=largest_mass_error(ensemble) >= MASS_LIMIT)
+
+
+def _engine(case: Case) -> Iterator[Finding]:
+    if case.engine is not None:
+        told = (
+            "Predictions are those of the command of `engine`; the flow that is drawn, and what an effect or a place "
+            "would change, are those of the built-in engine at the same parameters."
+        )
+        yield Finding("engine", _html([told]))

@@ -34,7 +34,8 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
     drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
-    yield published_svg(run, drawn, f"channel-{experiment}", _channel_caption(flow, experiment), alt)
+    caption = _channel_caption(flow, experiment, _of_engine(run))
+    yield published_svg(run, drawn, f"channel-{experiment}", caption, alt)
 
 
 def _outlines(run: Run, experiment: str) -> list[Outline]:
@@ -55,16 +56,22 @@ def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str
             f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
         )
     return (
-        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, at true scale, median "
-        f"parameters.{moves} Between two streamlines flows a tenth of the discharge; dots are stations."
+        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, at true scale, "
+        f"median parameters{_of_engine(run)}.{moves} Between two streamlines flows a tenth of the discharge; dots are "
+        "stations."
     )
 
 
-def _channel_caption(flow: FlowFields, experiment: str) -> str:
+def _of_engine(run: Run) -> str:
+    """Whose flow is drawn, where it is not that of the predictions: a command leaves none to draw."""
+    return "" if run.case.engine is None else ", by the built-in engine"
+
+
+def _channel_caption(flow: FlowFields, experiment: str, engine: str) -> str:
     wet = np.isfinite(flow.depth).any(axis=1)
     level, depth = np.nanmean(flow.level[wet], axis=1), np.nanmax(flow.depth[wet], axis=1)
     return (
-        f"<b>The whole channel, experiment {html.escape(experiment)}</b> (y stretched): the water level falls "
+        f"<b>The whole channel, experiment {html.escape(experiment)}</b> (y stretched{engine}): the water level falls "
         f"{fixed(level[0] - level[-1], 2)} m over {np.ptp(flow.x[wet]):.0f} m, the greatest depth goes from "
         f"{fixed(depth[0], 2)} to {fixed(depth[-1], 2)} m."
     )

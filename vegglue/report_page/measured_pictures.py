@@ -153,7 +153,7 @@ def discharges(run: Run) -> Iterator[Picture]:
     """Discharge by each rule beside what the model let through, for each ADV section."""
     sections = [name for name, _ in run.ensemble.sections]
     for (experiment, section), rules in run.observations.discharge.items():
-        if section not in sections:
+        if section not in sections or run.ensemble.by_command:  # which says nothing of what passes a section
             continue
         through = run.ensemble.section_flow[:, run.ensemble.experiments.index(experiment), sections.index(section)]
         spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])

@@ -18,7 +18,7 @@ from vegglue.report_page.posterior_words import identification, pressed_bounds
 from vegglue.report_page.run import Run, station_zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CorrectedCanopy
-from vegglue.solver.status import FAILED, STATUS_WORDS, members_with
+from vegglue.solver.status import FAILED, RUN_BY_COMMAND, STATUS_WORDS, members_with
 
 # Answers of the column "Identified"; that there are too few members to tell is said in full.
 YES_NO = {"identified": "yes", "not identified": "no"}
@@ -198,7 +198,8 @@ def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
 
 def member_counts(ensemble: Ensemble) -> list[tuple[str, int, str]]:
     """For each status of a member: its words, how many members have it, and their share as text."""
-    counts = [(word, members_with(ensemble.status, number)) for number, word in STATUS_WORDS.items()]
+    ways = {RUN_BY_COMMAND, FAILED} if ensemble.by_command else STATUS_WORDS.keys() - {RUN_BY_COMMAND}
+    counts = [(word, members_with(ensemble.status, way)) for way, word in STATUS_WORDS.items() if way in ways]
     return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
 
 
@@ -218,16 +219,19 @@ def health_facts(run: Run) -> Iterator[tuple[str, str]]:
     """Mass errors, weights and iterations, by which the numbers are trusted or not: a name and a value each."""
     ensemble, posterior = run.ensemble, run.posterior
     solved = ensemble.status != FAILED
-    yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
+    if not ensemble.by_command:
+        yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
     yield "effective members", f"{posterior.weighting.effective_size:,.0f} of {posterior.sample.members:,}"
     yield "largest weight", percent(posterior.weighting.largest_weight)
     yield "tail of the weights, k̂", f"{fixed(posterior.weighting.pareto_k, 2)} (to be trusted below {TRUSTED_K_HAT})"
-    yield (
-        "iterations of a solved member",
-        f"{np.median(ensemble.iterations[solved]):.0f} (most {ensemble.iterations.max()})",
-    )
+    if not ensemble.by_command:
+        most = ensemble.iterations.max()
+        yield "iterations of a solved member", f"{np.median(ensemble.iterations[solved]):.0f} (most {most})"
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
-    yield "processor time", f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member"
+    yield (
+        "time of the runs" if ensemble.by_command else "processor time",
+        f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
+    )
     for name in posterior.parameters:
         low, high = posterior.marginals.bound_mass[name]
         yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"

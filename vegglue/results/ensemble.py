@@ -11,7 +11,14 @@ from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
-from vegglue.solver.status import FAILED, NOT_YET, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
+from vegglue.solver.status import (
+    FAILED,
+    NOT_YET,
+    RUN_BY_COMMAND,
+    SOLVED_BY_MARCHING,
+    SOLVED_BY_NEWTON,
+    members_with,
+)
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
@@ -59,19 +66,25 @@ class Ensemble:
     seed: int
     version: str
 
+    @property
+    def by_command(self) -> bool:
+        """Whether its members are runs of a command, of which no mass error is known."""
+        return bool(np.isnan(self.mass_error).all())
+
     def __repr__(self) -> str:
-        newton, marched, failed = (
-            members_with(self.status, how) for how in (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING, FAILED)
+        newton, marched, failed, run = (
+            members_with(self.status, how) for how in (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING, FAILED, RUN_BY_COMMAND)
         )
-        solved = f"{newton:,} solved by Newton's method, {marched:,} by marching, {failed:,} failed"
+        own = f"{newton:,} solved by Newton's method, {marched:,} by marching"
+        solved = f"{run:,} run by the command" if self.by_command else own
         worst = self.mass_error[np.isfinite(self.mass_error)].max(initial=0.0)
         return in_short(
-            f"Ensemble of {so_many(len(self.status), 'member')}: {solved}",
+            f"Ensemble of {so_many(len(self.status), 'member')}: {solved}, {failed:,} failed",
             [
                 f"parameters: {', '.join(self.parameters)}",
                 f"experiments: {', '.join(self.experiments)}",
                 stations_in_short(self.station),
-                f"largest mass error {worst:.1g} of the discharge",
+                "no mass error known" if self.by_command else f"largest mass error {worst:.1g} of the discharge",
                 f"seed {self.seed}, vegglue {self.version}",
             ],
         )

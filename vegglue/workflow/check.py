@@ -6,11 +6,13 @@ from pathlib import Path
 from vegglue.case.schema import Case
 from vegglue.checks.case_check import check_case
 from vegglue.effects.library import effects_of
+from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
 from vegglue.site.gridded_site import build_site
+from vegglue.workflow.command_model import command_tried
 from vegglue.workflow.run_folder import folder_of
 
 
@@ -27,14 +29,17 @@ class CheckedCase:
 
 @one_thread()
 def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
-    """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png.
+    """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png; try the command
+    of its `engine`, if it has one.
 
-    Errors: InputError for a file that cannot be read.
+    Errors: InputError for a file that cannot be read, or a command that fails.
     """
     observations, site = read_observations(case), build_site(case)
     picture = folder_of(runs, case) / "channel.png"
     remarks = check_case(case, site, observations)
     save_channel_figure(case, site, observations, picture)
+    if case.engine is not None:
+        remarks.append(command_tried(model_of(case, observations), picture.parent))
     table = observations.table
     return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
 

@@ -47,16 +47,17 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     with at_most(jobs):
         for number, case in enumerate(cases):
             watch(Progress(f"calibrating {case.name}", number, len(cases), "models"))
-            rungs.append(rung_of(case, runs, aside))
+            rungs.append(rung_of(case, runs, aside, watch))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
     keep_ladder(found, cases, runs)
     return found
 
 
-def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame) -> Rung:
+def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = silent) -> Rung:
     """The case where it predicts best, without the measurements set aside."""
-    return rung(calibrated(case, folder_of(runs, case), aside), validation_of(case))
+    folder = folder_of(runs, case)
+    return rung(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
 
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:

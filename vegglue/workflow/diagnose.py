@@ -16,6 +16,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
+from vegglue.workflow.command_model import with_command, with_words_on_command
 from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remember_place, validation_of
 
 
@@ -33,7 +34,9 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     if kept is not None:
         return kept
     with at_most(jobs):
-        found = diagnose_model(model_in(case), watch, validation_of(case))
+        model = with_command(model_in(case), folder, watch)
+        found = diagnose_model(model, watch, validation_of(case, folder, watch))
+        found = with_words_on_command(found, model, folder, watch)
     from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
@@ -50,7 +53,7 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     folder = folder_of(runs, case)
     path = folder / f"fingerprint_{effect.name}.png"
     watch(Progress(f"calibrating {case.name}"))
-    trace, station = fingerprint_of(case, folder, effect)
+    trace, station = fingerprint_of(case, folder, effect, watch)
     amplitude = effect.amplitude
     unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
     from vegglue.report_page.diagnosis_pictures import save_fingerprint_figure
@@ -59,11 +62,11 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     return path
 
 
-def fingerprint_of(case: Case, folder: Path, effect: Effect) -> tuple[Array, pd.DataFrame]:
+def fingerprint_of(case: Case, folder: Path, effect: Effect, watch: Watch = silent) -> tuple[Array, pd.DataFrame]:
     """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
     unit of (amplitude - off)^power: (station,) and the stations.
     """
-    base, one = calibrated(case, folder, excluded_by()), Candidate(effect)
+    base, one = calibrated(case, folder, excluded_by(), watch), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
     changed = cause_of(base.model.case, one, shapes)
     return responses(base.model, base.fitted.point, [changed])[:, 0], base.model.station

@@ -19,6 +19,7 @@ from vegglue.in_short import in_short
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.screening.candidates import Candidate
+from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.run_folder import model_in
 
 
@@ -53,6 +54,7 @@ def discover(
     found, or it only restates a listed effect. Errors: InputError for an unknown effect, when the model finds no flow,
     a station has no standard error, or a file would be replaced.
     """
+    refuse_command(case, "discover")
     known = library(case.effect_file)
     for name in without:
         if name not in known:

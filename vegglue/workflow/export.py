@@ -53,6 +53,7 @@ def export(
     folder = folder_of(runs, case)
     watch(Progress(f"solving the flow of {case.name}"))
     flows, predicted, words = _flow(case, folder)
+    words += "" if case.engine is None else ", by the built-in engine"
     if not flows:
         raise InputError(f"{shown_path(case.source)}: no experiment finds a steady flow at {words}; check the case.")
     into = folder / "export"

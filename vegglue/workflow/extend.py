@@ -17,6 +17,7 @@ from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
+from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
@@ -100,7 +101,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
     watch(Progress(f"calibrating {case.name}"))
-    parent = calibrated(case, folder_of(runs, case), aside)
+    parent = calibrated(case, folder_of(runs, case), aside, watch)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
     rungs: dict[Names, Rung] = {(): rung(parent)}
@@ -108,7 +109,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     def rung_with(names: Names) -> Rung | None:
         if names not in tried:
             watch(Progress(f"trying {' and '.join(names)}"))
-            base = tried[names] = _calibrated_with(case, [named[name] for name in names], found, aside)
+            base = tried[names] = _calibrated_with(parent.model, [named[name] for name in names], found, aside)
             if base is not None:
                 rungs[names] = rung(base)
         return rungs.get(names)
@@ -125,7 +126,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
         bases.append(base)
     # Only now are the measurements for validation looked at.
     ladder = [
-        rung(replace(base, model=replace(base.model, case=one)), validation_of(one))
+        rung(replace(base, model=replace(base.model, case=one)), validation_of(one, folder_of(runs, one), watch))
         for one, base in zip(cases, bases, strict=True)
     ]
     return StepwiseExtension(
@@ -189,14 +190,16 @@ def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bo
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 
-def _calibrated_with(parent: Case, added: Sequence[Addition], found: Diagnosis, aside: pd.DataFrame) -> Baseline | None:
+def _calibrated_with(
+    parent: Model, added: Sequence[Addition], found: Diagnosis, aside: pd.DataFrame
+) -> Baseline | None:
     """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""
-    child = with_additions(parent, added)
+    child = with_additions(parent.case, added)
     theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
     known = z_at(child, {name: np.array([theta[name]]) for name in child.parameters})[0]
     try:
-        return calibrated_anew(child, known, aside)
+        return calibrated_anew(replace(parent, case=child), known, aside)
     except InputError:  # it has run without the additions: they leave it no steady flow
         return None

@@ -5,6 +5,7 @@ from typing import Literal
 
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
@@ -14,6 +15,7 @@ from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.storage.result_files import read_ensemble, write_posterior
+from vegglue.workflow.command_model import with_command
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size
 
@@ -54,7 +56,8 @@ def infer(
         posterior = glue(ensemble, case, observations)
     else:
         with at_most(jobs):
-            posterior = refine(ensemble, case, observations, watch)
+            engine = with_command(model_of(case, observations), folder, watch).engine
+            posterior = refine(ensemble, case, observations, watch, engine)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
     median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior

@@ -78,7 +78,7 @@ def next_measurement(
     if asked:
         with at_most(jobs):
             watch(Progress(f"calibrating {case.name}"))
-            base = calibrated(case, folder_of(runs, case), excluded_by(found))
+            base = calibrated(case, folder_of(runs, case), excluded_by(found), watch)
             watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [one for _, one in asked])
         questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]

@@ -24,8 +24,10 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
+from vegglue.progress import Watch, silent
 from vegglue.storage.result_files import read_posterior, stored_hash
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
+from vegglue.workflow.command_model import unseen_with_command, with_command
 
 # Standard errors within which two ends of a fit are one place. Chosen, not measured.
 SAME_PLACE = 1.0
@@ -53,14 +55,17 @@ def model_in(case: Case) -> Model:
     return model_of(case, read_observations(case))
 
 
-def validation_of(case: Case) -> Model | None:
-    """The case at the measurements that no calibration sees, if it names any."""
+def validation_of(case: Case, folder: Path | None = None, watch: Watch = silent) -> Model | None:
+    """The case at the measurements that no calibration sees, if it names any; folder: of its results, in which runs of
+    its command are kept, if it has one.
+    """
     if case.validation is None:
         return None
     seen = {"experiments": case.validation.experiments, "observations": case.validation.observations}
     there = case.model_copy(update=seen)
     # An effect on a section or device that was calibrated to need not be in what was not.
-    return model_of(there, read_observations(there.model_copy(update={"effects": {}})))
+    unseen = model_of(there, read_observations(there.model_copy(update={"effects": {}})))
+    return unseen if folder is None else unseen_with_command(unseen, model_in(case), folder, watch)
 
 
 def known_place(case: Case, folder: Path) -> Array | None:
@@ -87,18 +92,19 @@ def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None
     write_text(folder / "best.json", text, MAKE_ROOM)
 
 
-def calibrated(case: Case, folder: Path, aside: pd.DataFrame) -> Baseline:
+def calibrated(case: Case, folder: Path, aside: pd.DataFrame, watch: Watch = silent) -> Baseline:
     """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
-    base = calibrated_anew(case, known_place(case, folder), aside)
+    model = with_command(model_in(case), folder, watch)
+    base = calibrated_anew(model, known_place(case, folder), aside)
     remember_place(case, folder, best_place(base))
     return base
 
 
-def calibrated_anew(case: Case, known: Array | None, aside: pd.DataFrame) -> Baseline:
-    """The case where it predicts best, searched from the prior, whatever ran before; from z = `known` (p,), too: where
+def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> Baseline:
+    """The model where it predicts best, searched from the prior, whatever ran before; from z = `known` (p,), too: where
     they end at different places, the one with more evidence, as the model's own error is another at each.
     """
-    model = excluding(model_in(case), aside)
+    model = excluding(model, aside)
     base = for_prediction(baseline(model, None))
     if known is None or _leads_to(base, known):
         return base

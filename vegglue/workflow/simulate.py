@@ -6,10 +6,12 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
+from vegglue.engine.command_runs import command_runs
+from vegglue.ensemble.command_ensemble import run_ensemble
 from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
-from vegglue.parallel import one_thread
+from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.storage.result_files import read_ensemble, stored_hash
@@ -27,7 +29,8 @@ def simulate(
     watch: Watch = silent,
     force: bool = False,
 ) -> Ensemble:
-    """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields).
+    """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields); or
+    run the command of the case's `engine` for each.
 
     An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
     ensemble does not depend on; one that was stopped goes on where it was. members: size of the ensemble instead of the
@@ -44,7 +47,11 @@ def simulate(
     if not is_simulated(case, runs):
         _share_one_beside(case, path)
     if not is_simulated(case, runs):
-        solve_ensemble(case, read_observations(case), path, jobs, watch)
+        if case.engine is None:
+            solve_ensemble(case, read_observations(case), path, jobs, watch)
+        else:
+            with at_most(jobs):
+                run_ensemble(case, read_observations(case), path, command_runs(case, path.parent), jobs, watch)
     remove_left_over_fields(path)
     return read_ensemble(path)
 

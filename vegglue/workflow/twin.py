@@ -13,6 +13,7 @@ from vegglue.twins.reveal import guess_in_words
 from vegglue.twins.sealed_answer import opened_answer, sealed_answer
 from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.twins.twin_files import SEAL, config_in, write_twin
+from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.run_folder import model_in
 
 
@@ -34,6 +35,7 @@ def make_twin(
     without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`; force: replace
     files there that vegglue did not write, too. Errors: InputError.
     """
+    refuse_command(case, "twin")
     model = model_in(case)
     if not case.parameters:
         raise InputError(f"{case.source}: `parameters` expected a prior or more, got none; add one.")

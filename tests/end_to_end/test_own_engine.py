@@ -1,0 +1,106 @@
+"""A command as the engine of a case, all the way: the built-in solver called as one says what it says inside."""
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import built_in, by_server, served
+from reach import COARSE, ROOT, write_reach
+from reach import vegglue as shell
+
+import vegglue
+from vegglue.case.schema import Case
+from vegglue.results.ensemble import Ensemble
+from vegglue.storage.result_files import read_ensemble
+
+PAGE = ROOT / "docs" / "own_engine.md"
+SMALL = ("members: 1024", "members: 16")
+WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
+KNOWN = "members: 16, seed: 7}\ninfer: {sigma: known}"
+# Draws of a posterior here, of the first round and worth: a run of a command is some hundredths of a second.
+FIRST, WORTH = 64, 40
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The brook, by itself and with the built-in solver as its command, both with an ensemble in `runs`."""
+
+    inside: Case
+    command: Case
+    runs: Path
+    ensembles: tuple[Ensemble, Ensemble]
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
+    folder = tmp_path_factory.mktemp("pair")
+    config = write_reach(folder, COARSE, SMALL, WITH_ERROR, ("members: 16, seed: 7}", KNOWN))
+    inside, runs = vegglue.load_case(config), folder / "runs"
+    with served(built_in(inside)) as port:
+        command = by_server(config, port)
+        ensembles = tuple(vegglue.simulate(case, runs=runs, jobs=2) for case in (inside, command))
+        yield Pair(inside, command, runs, (ensembles[0], ensembles[1]))
+
+
+def test_the_ensemble_is_the_same(pair: Pair) -> None:
+    inside, command = pair.ensembles
+    np.testing.assert_array_equal(command.parameters["n_b"], inside.parameters["n_b"])
+    np.testing.assert_allclose(command.prediction, inside.prediction, atol=3e-6)
+    assert command.by_command
+    assert not inside.by_command
+    assert "16 run by the command, 0 failed" in repr(command)
+
+
+def test_weighed_members_give_the_same_posterior(pair: Pair) -> None:
+    inside, command = (
+        vegglue.infer(case, runs=pair.runs, method="glue").marginals for case in (pair.inside, pair.command)
+    )
+    for name, median in inside.median.items():
+        assert command.median[name] == pytest.approx(median, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vegglue.inference.refine.EFFECTIVE_DRAWS", WORTH)
+    monkeypatch.setattr("vegglue.inference.importance_sampling.FIRST_DRAWS", FIRST)
+    inside, command = (vegglue.infer(case, runs=pair.runs, jobs=2) for case in (pair.inside, pair.command))
+    assert inside.refinement is not None
+    assert command.refinement is not None
+    np.testing.assert_array_equal(command.refinement.draws.drawn, inside.refinement.draws.drawn)
+    np.testing.assert_allclose(command.refinement.modes.mode_theta, inside.refinement.modes.mode_theta, rtol=1e-3)
+    for name, median in inside.marginals.median.items():
+        assert command.marginals.median[name] == pytest.approx(median, rel=2e-3)
+        np.testing.assert_allclose(np.std(command.sample.theta[name]), np.std(inside.sample.theta[name]), rtol=0.02)
+
+
+@pytest.mark.slow
+def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its config and its script, in a few members from the shell; without --trust nothing runs."""
+    monkeypatch.chdir(tmp_path)
+    write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
+    text = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
+    (tmp_path / "brook_by_command.yaml").write_text(text, encoding="utf-8")
+    shutil.copy(PAGE.parent / "examples" / "solver_as_command.py", tmp_path)
+    refused = shell(tmp_path, "check", "brook_by_command.yaml", succeed=False)
+    assert refused.returncode == 2
+    assert "which runs as code" in refused.stderr
+    assert not (tmp_path / "runs").exists()
+    checked = shell(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout
+    assert re.search(r"The command of `engine` took [\d.]+ s at the medians of the priors: velocity 0\.\d+ to", checked)
+    said = shell(tmp_path, "simulate", "brook_by_command.yaml", "--trust", "--members", 2, "--jobs", 2).stdout
+    assert "2 members, run by the command, 0 failed" in said
+    found = read_ensemble(tmp_path / "runs" / "brook_by_command" / "ensemble.h5")
+    inside = vegglue.simulate(pair.inside, runs=tmp_path / "inside", members=2, jobs=1)
+    np.testing.assert_allclose(found.prediction, inside.prediction, atol=3e-6)
+
+
+@pytest.mark.parametrize("script", sorted((PAGE.parent / "examples").glob("engine_*.py")), ids=lambda path: path.stem)
+def test_templates_can_be_read_by_python(script: Path) -> None:
+    """No more is known of them: the codes are not there."""
+    compile(script.read_text(encoding="utf-8"), script.name, "exec")
+    assert "it was never run" in script.read_text(encoding="utf-8")
+    assert script.name in PAGE.read_text(encoding="utf-8")

@@ -1,0 +1,150 @@
+"""A command as the engine of a case when something goes wrong: members that fail, kills, Ctrl-C, what is refused."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import SMOOTH, commanded
+from reach import COARSE, begin, said_to
+from reach import vegglue as shell
+
+import vegglue
+from vegglue.errors import InputError
+from vegglue.solver.status import FAILED, RUN_BY_COMMAND
+from vegglue.storage.result_files import read_ensemble
+
+MEMBERS = 8
+SMALL = ("members: 1024", f"members: {MEMBERS}")
+# Leaves a line for each run, in a file beside the config, and takes a while.
+MARKED = """
+import json, os, time
+phi = json.load(open("parameters.json"))["parameters"]["phi"]["value"]
+with open({marks!r}, "a") as file:
+    file.write(f"{{os.getpid()}} {{phi!r}}\\n")
+time.sleep({seconds})
+"""
+
+
+def slow_brook(folder: Path, seconds: float) -> Path:
+    """The brook with a command that takes so long; returns the file with a line for each run."""
+    marks = folder / "marks"
+    commanded(folder, MARKED.format(marks=str(marks), seconds=seconds) + SMOOTH, "", COARSE, SMALL)
+    return marks
+
+
+def lines_of(marks: Path) -> list[str]:
+    return marks.read_text(encoding="utf-8").splitlines() if marks.exists() else []
+
+
+def after_runs(marks: Path, count: int, process: "subprocess.Popen[str]") -> None:
+    """Waits until so many runs have begun."""
+    until = time.monotonic() + 60.0
+    while len(lines_of(marks)) < count:
+        assert process.poll() is None, process.stderr.read() if process.stderr else ""
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+def test_members_that_fail_are_counted_with_their_reason(tmp_path: Path) -> None:
+    picky = f"{SMOOTH}\nif phi > 10: raise SystemExit('dry')\n"
+    case = commanded(tmp_path, picky, "", COARSE, SMALL)
+    ensemble = vegglue.simulate(case, runs=tmp_path / "runs", jobs=2)
+    high = ensemble.parameters["phi"] > 10
+    assert 0 < high.sum() < MEMBERS
+    np.testing.assert_array_equal(ensemble.status, np.where(high, FAILED, RUN_BY_COMMAND))
+    assert set(ensemble.reason[high].astype(str)) == {"the command ended with exit code 1, and said: dry"}
+    assert np.isnan(ensemble.prediction[high]).all()
+    assert np.isfinite(ensemble.prediction[~high]).all()
+    posterior = vegglue.infer(case, ensemble, runs=tmp_path / "runs", method="glue")
+    assert posterior.sample.failed == high.sum()
+    assert f"{high.sum()} of 8 members failed" in vegglue.report(case, runs=tmp_path / "runs").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_where_all_fail_it_is_said_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commanded(tmp_path, "raise SystemExit('no licence')", "", COARSE, SMALL)
+    monkeypatch.chdir(tmp_path)
+    code, said = said_to(monkeypatch, capsys, "check", "brook.yaml", "--trust", "--quiet")
+    assert (code, said.count("\n")) == (2, 1)
+    assert (
+        "brook.yaml: the command of `engine` failed at the medians of the priors: the command ended with exit" in said
+    )
+    assert "and said: no licence; its files lie in runs/brook/engine." in said
+    printed = shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
+    assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in printed
+    for command in ("infer", "diagnose"):
+        code, said = said_to(monkeypatch, capsys, command, "brook.yaml", "--trust", "--quiet")
+        assert code == 2
+        assert "no licence" in said
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_and_repeats_no_member(tmp_path: Path) -> None:
+    marks = slow_brook(tmp_path, 0.3)
+    process = begin(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2)
+    after_runs(marks, 5, process)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    time.sleep(1.0)  # what was under way ends by itself
+    kept = len(list((tmp_path / "runs" / "brook" / "engine").glob("*.json")))
+    assert kept >= 3
+    before = len(lines_of(marks))
+    said = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2).stdout
+    assert f"{MEMBERS} members, run by the command, 0 failed" in said
+    assert len(lines_of(marks)) - before == MEMBERS - kept
+    undisturbed = tmp_path / "undisturbed"
+    undisturbed.mkdir()
+    case = commanded(undisturbed, SMOOTH, "", COARSE, SMALL)
+    wanted = vegglue.simulate(case, runs=undisturbed / "runs", jobs=1)
+    found = read_ensemble(tmp_path / "runs" / "brook" / "ensemble.h5")
+    np.testing.assert_array_equal(found.prediction, wanted.prediction)
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_what_is_under_way(tmp_path: Path) -> None:
+    marks = slow_brook(tmp_path, 60.0)
+    process = begin(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2)
+    after_runs(marks, 2, process)
+    os.kill(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Stopped; what was solved is kept" in said
+    for line in lines_of(marks):
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(line.split()[0]), 0)
+
+
+def test_jobs_give_the_same_bits(tmp_path: Path) -> None:
+    case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL)
+    one, two = (vegglue.simulate(case, runs=tmp_path / str(jobs), jobs=jobs).prediction for jobs in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_another_command_makes_another_ensemble(tmp_path: Path) -> None:
+    first = vegglue.simulate(commanded(tmp_path, SMOOTH, "", COARSE, SMALL), runs=tmp_path / "runs", jobs=2)
+    other = commanded(tmp_path, SMOOTH.replace("0.05", "0.06"), "", COARSE, SMALL)
+    assert not np.array_equal(vegglue.simulate(other, runs=tmp_path / "runs", jobs=2).prediction, first.prediction)
+
+
+def test_verbs_that_need_the_built_in_engine_say_so(tmp_path: Path) -> None:
+    case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL)
+    with pytest.raises(InputError, match="`discover` works with the built-in engine only; take `engine` out"):
+        vegglue.discover(case)
+    with pytest.raises(InputError, match="`twin` works with the built-in engine only; take `engine` out"):
+        vegglue.make_twin(case, tmp_path / "riddle", hide="nothing")
+
+
+@pytest.mark.slow
+def test_a_cluster_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    commanded(tmp_path, SMOOTH, "", COARSE, SMALL)
+    done = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--cluster", "local:1", succeed=False)
+    assert done.returncode == 2
+    assert "--cluster: brook runs the command of its `engine`, on this machine only" in done.stderr

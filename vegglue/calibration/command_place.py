@@ -1,0 +1,100 @@
+"""Where a command fits best: the built-in engine leads there, and the command is run to correct it on the way.
+
+At each place the built-in engine is corrected to the predictions and slopes of the command (`engine/corrected`) and
+calibrated; where that ends, the command is run again. A place is kept when the command itself fits better there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, baseline, places_of_prior
+from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, objective
+from vegglue.calibration.noise import Noise
+from vegglue.engine.command_runs import CommandRuns
+from vegglue.engine.corrected import Correction, corrected, correction_at
+from vegglue.engine.interface import Model, linearise
+from vegglue.errors import InputError
+from vegglue.progress import Watch, silent
+
+# Places at which the command is linearised at most, and how often a step that fits worse is halved. Chosen, not
+# measured: most cases need three places, and each costs two runs for each parameter.
+MOST_PLACES, MOST_HALVINGS = 8, 4
+
+
+@dataclass(frozen=True)
+class CommandPlace:
+    """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
+    next step would have been negligible; places: at how many the slopes of the command were taken; rough: parameters
+    whose slopes there are mostly noise.
+    """
+
+    model: Model
+    z: Array
+    settled: bool
+    places: int
+    rough: tuple[str, ...]
+
+
+def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> CommandPlace:
+    """The search, from the first place of the prior where the command runs: it hangs on nothing but the case.
+
+    Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
+    """
+    z, correction = _start(runs, model, watch)
+    here = _model_at(runs, model, correction, watch)
+    base = baseline(here)
+    for places in range(1, MOST_PLACES + 1):
+        if _is_near(base, z):
+            return CommandPlace(here, z, True, places, correction.rough)
+        lower = _lower(runs, model, here, base, z, watch)
+        if lower is None or places == MOST_PLACES:
+            break
+        z, correction = lower, correction_at(runs, model, lower, watch)
+        here = _model_at(runs, model, correction, watch)
+        base = baseline(here, z)
+    return CommandPlace(here, z, False, places, correction.rough)
+
+
+def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correction]:
+    """The middle of the prior or, where the command fails, the next of its Sobol' points."""
+    refused = InputError(f"{model.case.name}: the command has no place to start from.")
+    for z in places_of_prior(len(model.names)):
+        try:
+            correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
+            return z, correction_at(runs, model, z, watch)
+        except InputError as error:
+            refused = error
+    raise refused
+
+
+def _model_at(runs: CommandRuns, model: Model, correction: Correction, watch: Watch) -> Model:
+    return replace(model, engine=corrected(correction, runs, watch))
+
+
+def _is_near(base: Baseline, z: Array) -> bool:
+    """Whether the calibrated model lies so near z (p,) that another step would gain next to nothing."""
+    away = base.fitted.point.z - z
+    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < NEGLIGIBLE_DECREASE)
+
+
+def _lower(runs: CommandRuns, model: Model, here: Model, base: Baseline, z: Array, watch: Watch) -> Array | None:
+    """A place towards the calibrated model where the command itself fits better than at z (p,); None where there is
+    none.
+    """
+    before, step = _objective(here, base.noise, z), base.fitted.point.z - z
+    for _ in range(MOST_HALVINGS):
+        try:
+            there = correction_at(runs, model, z + step, watch, slopes=False)
+        except InputError:  # the command fails there: it may not nearer by
+            there = None
+        if there is not None and _objective(_model_at(runs, model, there, watch), base.noise, z + step) < before:
+            return np.asarray(z + step)
+        step = step / 2.0
+    return None
+
+
+def _objective(model: Model, noise: Noise, z: Array) -> float:
+    point = linearise(model, z)
+    return np.inf if point is None else objective(noise, point)

@@ -1,0 +1,145 @@
+"""The models of a case whose `engine` is a command: corrected to it where it fits best, which the next verb reads.
+
+runs/<name>/engine/place.json holds that place and the hash of the case; all runs of the command lie beside it.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.command_place import CommandPlace, command_place
+from vegglue.case.parameter_space import theta_at, z_at
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
+from vegglue.engine.command_runs import command_predictions, command_runs, ended_runs
+from vegglue.engine.corrected import corrected, correction_at, without_effects
+from vegglue.engine.interface import Model, linearise
+from vegglue.errors import InputError, shown_path
+from vegglue.in_short import so_many
+from vegglue.inference.likelihood import root_mean_square, stations_by_kind
+from vegglue.measurements.kinds import kind_of
+from vegglue.progress import Watch, silent
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.whole_files import MAKE_ROOM
+
+PLACE_FILE = "place.json"
+# Share of a standard error [-] by which the command may differ from what was reckoned with before it is a doubt.
+# Chosen, not measured: half an error hardly moves a score.
+CLOSE_ENOUGH = 0.5
+
+
+def with_command(model: Model, folder: Path, watch: Watch = silent) -> Model:
+    """The model with the engine of its command, if its case has one; folder: of the results of the case.
+
+    Errors: InputError when the command cannot be run, or fails where it fits best.
+    """
+    return model if model.case.engine is None else _place_of(model, folder, watch).model
+
+
+def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch = silent) -> Model:
+    """The model at stations that no calibration sees, with the command corrected there at the place of `model`."""
+    if model.case.engine is None:
+        return unseen
+    runs = command_runs(model.case, folder)
+    correction = correction_at(runs, unseen, _place_of(model, folder, watch).z, watch)
+    return replace(unseen, engine=corrected(correction, runs, watch))
+
+
+def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: Watch = silent) -> Diagnosis:
+    """The diagnosis with a remark, its first, on what the command said and what the built-in engine did; the command is
+    run once more for it, at the last parameters that were found.
+    """
+    if model.case.engine is None:
+        return found
+    place, runs = _place_of(model, folder, watch), command_runs(model.case, folder)
+    bare = replace(without_effects(model), engine=place.model.engine)
+    theta = {name: found.parameters.last[name][0] for name in bare.names}
+    z = z_at(bare.case, {name: np.array([value]) for name, value in theta.items()})[0]
+    reckoned = linearise(bare, z)
+    why = "running the command once more"
+    there, reasons = command_predictions(runs, bare.case, model.station, [theta], watch, why)
+    said = [
+        "Predictions and slopes are those of the command of `engine`, the slopes by central differences, "
+        f"{so_many(place.places, 'time')} two runs for each of {so_many(len(bare.names), 'parameter')}; what an effect "
+        "or a place would change, and how the flow bends away from these slopes, is what the built-in engine says "
+        "of the same site."
+    ]
+    if reasons[0] or reckoned is None:
+        said.append(f"At the parameters found last the command gives nothing to compare ({reasons[0]}).")
+    else:
+        error = found.predictions.error
+        used = np.isfinite(error)
+        off = root_mean_square((there[0] - reckoned.prediction)[used] / error[used])
+        doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
+        said.append(f"At the parameters found last it differs from what was reckoned with by {off:.2f} errors{doubt}.")
+    if place.rough:
+        said.append(
+            f"Its differences in {' and '.join(place.rough)} are mostly noise: let its flow come to rest, or set "
+            "`engine.step` larger."
+        )
+    if not place.settled:
+        said.append("The search for its best place did not settle: its predictions may be rough.")
+    verdict = replace(found.verdict, remarks=(" ".join(said), *found.verdict.remarks))
+    return replace(found, verdict=verdict)
+
+
+def command_tried(model: Model, folder: Path) -> str:
+    """What came of one run of the command, at the medians of the priors; differences are root mean squares.
+
+    Errors: InputError when it fails.
+    """
+    case, bare = model.case, without_effects(model)
+    middle = np.zeros(len(bare.names))
+    theta = {name: float(value[0]) for name, value in theta_at(bare.case, middle).items()}
+    runs = command_runs(case, folder)
+    ((_, end),) = ended_runs(runs, bare.case, model.station, [theta])
+    if end.prediction is None:
+        raise InputError(
+            f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; "
+            f"its files lie in {shown_path(runs.folder)}."
+        )
+    own = linearise(bare, middle)
+    told = []
+    for name, rows in stations_by_kind(model.station).items():
+        kind, found = kind_of(name), end.prediction[rows]
+        off = "" if own is None else f", {root_mean_square(found - own.prediction[rows]):.2g} from the built-in engine"
+        told.append(f"{kind.words} {found.min():.3g} to {found.max():.3g} {kind.unit}{off}")
+    return f"The command of `engine` took {end.seconds:.1f} s at the medians of the priors: {'; '.join(told)}."
+
+
+def refuse_command(case: Case, verb: str) -> None:
+    """Errors: InputError for a case with an `engine`, in a verb that needs the built-in one."""
+    if case.engine is not None:
+        raise InputError(
+            f"{shown_path(case.source)}: `{verb}` works with the built-in engine only; take `engine` out of the config."
+        )
+
+
+def _place_of(model: Model, folder: Path, watch: Watch) -> CommandPlace:
+    """The place where the command fits best: as an earlier verb has left it, or searched and kept."""
+    runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
+    known = _kept_place(path, wanted, len(model.names))
+    if known is not None:
+        z, settled, places = known
+        correction = correction_at(runs, model, z, watch)
+        here = replace(model, engine=corrected(correction, runs, watch))
+        return CommandPlace(here, z, settled, places, correction.rough)
+    found = command_place(runs, model, watch=watch)
+    text = json.dumps({"config_hash": wanted, "z": found.z.tolist(), "settled": found.settled, "places": found.places})
+    write_text(path, text, MAKE_ROOM)
+    return found
+
+
+def _kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int] | None:
+    try:
+        found = json.loads(read_text(path, LARGEST_JSON))
+        z = np.array(found["z"], dtype=float)
+        if found["config_hash"] == wanted and z.shape == (parameters,) and np.isfinite(z).all():
+            return z, bool(found["settled"]), int(found["places"])
+    except (InputError, ValueError, KeyError, TypeError, RecursionError):
+        pass
+    return None
