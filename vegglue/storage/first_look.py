@@ -19,8 +19,8 @@ import numpy as np
 from vegglue.errors import StorageError
 from vegglue.storage.foreign_files import why_foreign
 
-# How long the reading may take: a start, and bytes in a second. Chosen: slow network disks are twice as fast, and what is
-# healthy is read at a hundred times this rate from a local one.
+# How long the reading may take: a start, and bytes in a second. Chosen: slow network disks are twice as fast, and what
+# is healthy is read at a hundred times this rate from a local one.
 LONGEST_START, SLOWEST = 20.0, 5e6  # [s], [bytes/s]
 MEMORY = 2 << 30  # [bytes] of addresses: libraries take half of one, and values are read by blocks
 BLOCK = 1 << 26  # [bytes] of values read at once
