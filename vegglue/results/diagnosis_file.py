@@ -35,7 +35,7 @@ from vegglue.results.diagnosis import (
 )
 from vegglue.results.diagnosis_json import flat_suspect
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
-from vegglue.results.fitting import TEXT, YES_OR_NO, Read, fitting, names_of, stated_as, stations_from
+from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, table_group
 
 # Datasets of the group `stations` that are not columns of the table of stations.
@@ -45,16 +45,19 @@ SPOTS = dict.fromkeys(("x", "y", "score"), Stored(("place",)))
 FIELD_MAP = {
     "x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y")),
 }  # fmt: skip
-SUSPECT_COLUMNS = dict.fromkeys(("name", "title", "unit", "mimicked_by", "shapes"), Stored(("suspect",), type=TEXT)) | (
-    dict.fromkeys(("testable", "refitted"), Stored(("suspect",), type=YES_OR_NO))
-    | dict.fromkeys(
-        ("amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off",
-         "scale", "low95", "high95", "least", "most"), Stored(("suspect",)),
-    )
+NUMBERS_OF_SUSPECT = (
+    "amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off", "scale",
+    "low95", "high95", "least", "most",
 )  # fmt: skip
-ZONE_COLUMNS = dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=TEXT)) | dict.fromkeys(
-    ("stations", "mean", "standard_error", "chi2"), Stored(("zone_number",))
-)
+SUSPECT_COLUMNS = {
+    **dict.fromkeys(("name", "title", "unit", "mimicked_by", "shapes"), Stored(("suspect",), type=IN_WORDS)),
+    **dict.fromkeys(("testable", "refitted"), Stored(("suspect",), type=YES_OR_NO)),
+    **dict.fromkeys(NUMBERS_OF_SUSPECT, Stored(("suspect",))),
+}
+ZONE_COLUMNS = {
+    **dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=IN_WORDS)),
+    **dict.fromkeys(("stations", "mean", "standard_error", "chi2"), Stored(("zone_number",))),
+}
 # Units of smooth fields, by their term.
 FIELD_UNITS = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
@@ -193,7 +196,7 @@ def _instruments_from(text: str) -> tuple[FaultyInstrument, ...]:
     return instruments
 
 
-def _first_screening_from(alike: Read, attributes: Mapping[str, Any]) -> FirstScreening:
+def _first_screening_from(alike: ReadGroup, attributes: Mapping[str, Any]) -> FirstScreening:
     compared = names_of(alike, "name")
     both = dict.fromkeys(("name", "other"), len(compared))
     return FirstScreening(
@@ -204,7 +207,7 @@ def _first_screening_from(alike: Read, attributes: Mapping[str, Any]) -> FirstSc
     )
 
 
-def _table_from(group: Read, dim: str, columns: Mapping[str, Stored]) -> pd.DataFrame:
+def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd.DataFrame:
     """A table without rows has no columns either."""
     there = fitting(group, columns if len(group) > 1 else {})
     return pd.DataFrame({name: there[name] for name in there if name != dim})

@@ -10,7 +10,7 @@ import pandas as pd
 from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
-from vegglue.results.fitting import TEXT, fitting, names_of, stated_as, stations_from
+from vegglue.results.fitting import IN_WORDS, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
 from vegglue.solver.status import (
     FAILED,
@@ -86,7 +86,7 @@ class Ensemble:
 
 
 ROWS = stored_fields(Ensemble)  # what is stored of each member
-AT_SECTIONS = {"section": Stored(("section",), type=TEXT), "section_x": Stored(("section",), "m")}
+AT_SECTIONS = {"section": Stored(("section",), type=IN_WORDS), "section_x": Stored(("section",), "m")}
 
 
 def unsolved(header: Header) -> dict[str, Group]:

@@ -14,15 +14,15 @@ from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import STATION_COLUMNS
 from vegglue.results.layout import Stored
 
-Read = Mapping[str, np.ndarray]
-TEXT, WHOLE, YES_OR_NO = object, np.int64, bool  # types of what is no floating-point number
+ReadGroup = Mapping[str, np.ndarray]
+IN_WORDS, WHOLE_NUMBERS, YES_OR_NO = object, np.int64, bool  # types of what is no floating-point number
 # Columns of a table of stations that are no floating-point numbers.
-STATION_TYPES = dict.fromkeys(("experiment", "kind", "section", "reason", "device"), TEXT) | {"used": YES_OR_NO}
+STATION_TYPES = dict.fromkeys(("experiment", "kind", "section", "reason", "device"), IN_WORDS) | {"used": YES_OR_NO}
 # Kinds of numpy's types that hold values of a type.
 _KINDS = {"O": "O", "S": "O", "f": "fiu", "i": "iu", "b": "b"}
 
 
-def fitting(group: Read, stored: Mapping[str, Stored], sizes: Mapping[str, int] | None = None) -> Read:
+def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, int] | None = None) -> ReadGroup:
     """The group, where each variable is there with its type and the size of each of its dimensions.
 
     sizes: of dimensions that are known already. Errors: KeyError for a missing one, ValueError for one that does not
@@ -58,15 +58,15 @@ def stated_as(kind: type, stated: Mapping[str, Any], name: str) -> Any:
     return kind(value)
 
 
-def names_of(group: Read, dim: str) -> tuple[str, ...]:
+def names_of(group: ReadGroup, dim: str) -> tuple[str, ...]:
     """The names along a dimension. Errors: KeyError; ValueError where these are no names, or two are the same."""
-    names = tuple(fitting(group, {dim: Stored((dim,), type=TEXT)})[dim])
+    names = tuple(fitting(group, {dim: Stored((dim,), type=IN_WORDS)})[dim])
     if len(set(names)) < len(names):
         raise ValueError(f"two of {dim} have the same name")
     return names
 
 
-def stations_from(group: Read, *others: str) -> pd.DataFrame:
+def stations_from(group: ReadGroup, *others: str) -> pd.DataFrame:
     """The table of stations of a group; others: what else stands there. Errors: KeyError, ValueError."""
     columns = {name: Stored(("station",), type=STATION_TYPES.get(name, float)) for name in STATION_COLUMNS}
     table = pd.DataFrame({name: values for name, values in fitting(group, columns).items() if name not in others})

@@ -12,7 +12,7 @@ import pandas as pd
 from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
-from vegglue.results.fitting import TEXT, WHOLE, YES_OR_NO
+from vegglue.results.fitting import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO
 from vegglue.results.layout import Stored
 from vegglue.results.refinement import OWN_UNIT, Refinement
 
@@ -47,7 +47,7 @@ class WeightedSample:
     members: int
     failed: int
     best: int  # member that fits best
-    unit: Annotated[dict[str, str], Stored(("parameter",), type=TEXT)]
+    unit: Annotated[dict[str, str], Stored(("parameter",), type=IN_WORDS)]
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
     weights: Annotated[np.ndarray, Stored(("member",))]  # sum 1
     efficiency: Annotated[np.ndarray, Stored(("member",))]  # Nash-Sutcliffe
@@ -106,7 +106,7 @@ class PredictiveDistribution:
 
     model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # spread of the members alone
     total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # with the residual error
-    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE)]  # member indices, equal weights
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]  # member indices, equal weights
     predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]  # draws with residual error
 
 
@@ -138,7 +138,7 @@ class Transfer:
     gain: float  # by which chi2 falls when every experiment has its own parameters [-]
     more: int  # how many parameters more these are
     p_all: float  # chance of such a gain by errors alone [-]
-    experiments: Annotated[np.ndarray, Stored(("experiment",), type=TEXT)]
+    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     chi2: Annotated[np.ndarray, Stored(("parameter",))]
@@ -146,7 +146,7 @@ class Transfer:
     p: Annotated[np.ndarray, Stored(("parameter",))]
     misfit_together: Annotated[np.ndarray, Stored(("experiment",))]
     misfit_alone: Annotated[np.ndarray, Stored(("experiment",))]
-    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE)]
+    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from vegglue.results.fitting import TEXT, WHOLE, YES_OR_NO
+from vegglue.results.fitting import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO
 from vegglue.results.layout import Stored
 
 OWN_UNIT = "that of the parameter, see `unit`"
@@ -39,7 +39,7 @@ class PosteriorModes:
 class ImportanceDraws:
     """How the members were drawn, and as many draws from the prior to compare them with."""
 
-    drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE)]  # members after each round
+    drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]  # members after each round
     worth: Annotated[np.ndarray, Stored(("round",))]  # effective members after each round
     log_density: Annotated[np.ndarray, Stored(("member",))]  # of the posterior up to a constant; -inf failed
     prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
@@ -74,8 +74,8 @@ class MisfitTest:
 class GroupsLeftOut:
     """Each section, and each experiment, predicted from all other stations."""
 
-    left_out: Annotated[np.ndarray, Stored(("group",), type=TEXT)]  # sections and experiments left out in turn
-    left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE)]
+    left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]  # sections and experiments left out in turn
+    left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE_NUMBERS)]
     left_out_score: Annotated[np.ndarray, Stored(("group",))]  # log predictive density of them together
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
 

@@ -21,9 +21,9 @@ from vegglue.storage.foreign_files import why_foreign
 
 # How long the reading may take: a start, and bytes in a second. Chosen: slow network disks are twice as fast, and what
 # is healthy is read at a hundred times this rate from a local one.
-LONGEST_START, SLOWEST = 20.0, 5e6  # [s], [bytes/s]
+LONGEST_START, FEWEST_BYTES = 20.0, 5e6  # [s], [bytes/s]
 MEMORY = 2 << 30  # [bytes] of addresses: libraries take half of one, and values are read by blocks
-BLOCK = 1 << 26  # [bytes] of values read at once
+AT_ONCE = 1 << 26  # [bytes] of values read at once
 CHILD = "import sys; sys.path.append(sys.argv[1]); from vegglue.storage.first_look import look; look(sys.argv[2])"
 
 
@@ -33,7 +33,7 @@ def why_unreadable(path: Path, size: int, *state: int) -> str | None:
 
     state: looked at once for each, however often the file is opened. Errors: StorageError when no process can be begun.
     """
-    longest = LONGEST_START + size / SLOWEST
+    longest = LONGEST_START + size / FEWEST_BYTES
     command = [sys.executable, "-P", "-c", CHILD, str(Path(__file__).parents[2]), str(path)]
     try:
         done = subprocess.run(
@@ -89,6 +89,6 @@ def _blocks(dataset: h5py.Dataset) -> Iterator[slice | tuple[()]]:
         yield ()
         return
     row = max(dataset.dtype.itemsize * int(np.prod(dataset.shape[1:], dtype=object)), 1)
-    step = max(BLOCK // row, 1)
+    step = max(AT_ONCE // row, 1)
     for start in range(0, dataset.shape[0], step):
         yield slice(start, start + step)
