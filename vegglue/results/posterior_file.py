@@ -12,12 +12,14 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 from vegglue.measurements.kinds import KINDS
+from vegglue.measurements.observations import LARGEST_READING
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.fitting import fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
 from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Transfer
 from vegglue.results.refinement import Refinement
 
+ROUNDING = 1e-6  # of a sum of a million weights
 PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
 
 
@@ -49,14 +51,18 @@ def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping
         name: kind(**_fields_from(kind, read[name], stated, f"{name}_")) for name, kind in PARTS.items() if name in read
     }
     posterior = Posterior(**_fields_from(Posterior, read["members"], stated), station=station, **parts)
-    _refuse_no_members(posterior)
+    _refuse_what_cannot_be(posterior)
     return posterior
 
 
-def _refuse_no_members(posterior: Posterior) -> None:
-    """Errors: ValueError where the best member or a draw is none, or a kind of observation is unknown."""
-    drawn, members = posterior.predicted.draws, posterior.sample.members
-    if not 0 <= posterior.sample.best < members or drawn.min() < 0 or drawn.max() >= members:
+def _refuse_what_cannot_be(posterior: Posterior) -> None:
+    """Errors: ValueError where parameters or weights are none, a draw is no member, or a kind is unknown."""
+    drawn, sample = posterior.predicted.draws, posterior.sample
+    if not all((np.abs(values) <= LARGEST_READING).all() for values in sample.theta.values()):
+        raise ValueError("theta holds what no parameter can be")
+    if not (sample.weights >= 0.0).all() or abs(sample.weights.sum() - 1.0) > ROUNDING:
+        raise ValueError("weights do not sum to 1")
+    if not 0 <= sample.best < sample.members or drawn.min() < 0 or drawn.max() >= sample.members:
         raise ValueError("a draw is no member")
     if not set(posterior.fit.sigma) <= set(KINDS):
         raise ValueError("an error is of no kind of observation")
