@@ -12,7 +12,6 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 from vegglue.measurements.kinds import KINDS
-from vegglue.measurements.observations import LARGEST_READING
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.fitting import fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
@@ -20,6 +19,7 @@ from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, Corrected
 from vegglue.results.refinement import Refinement
 
 ROUNDING = 1e-6  # of a sum of a million weights
+LARGEST_PARAMETER = 1e100  # its square is still a number
 PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
 
 
@@ -58,7 +58,7 @@ def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping
 def _refuse_what_cannot_be(posterior: Posterior) -> None:
     """Errors: ValueError where parameters or weights are none, a draw is no member, or a kind is unknown."""
     drawn, sample = posterior.predicted.draws, posterior.sample
-    if not all((np.abs(values) <= LARGEST_READING).all() for values in sample.theta.values()):
+    if not all((np.abs(values) <= LARGEST_PARAMETER).all() for values in sample.theta.values()):
         raise ValueError("theta holds what no parameter can be")
     if not (sample.weights >= 0.0).all() or abs(sample.weights.sum() - 1.0) > ROUNDING:
         raise ValueError("weights do not sum to 1")
