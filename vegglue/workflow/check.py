@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vegglue.case.schema import Case
-from vegglue.checks.case_check import check_case
+from vegglue.checks.case_check import check_case, doubts_about
 from vegglue.effects.library import effects_of
 from vegglue.errors import InputError
 from vegglue.figures.channel import save_channel_figure
@@ -37,6 +37,15 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
     save_channel_figure(case, site, observations, picture)
     table = observations.table
     return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
+
+
+@one_thread()
+def doubts_of(case: Case) -> list[str]:
+    """What would mislead all that is computed with the measurements of a case, one sentence each; none for sound ones.
+
+    Errors: InputError for a file that cannot be read.
+    """
+    return doubts_about(case, build_site(case), read_observations(case))
 
 
 @one_thread()
