@@ -43,7 +43,10 @@ COMMANDS: Commands = (
     ("extend", "brook.yaml", "--auto", "--jobs", "1"),
     ("compare", "brook.yaml", "brook+streamlining.yaml", "--jobs", "1"),
     ("next", "brook.yaml", "--jobs", "1"),
+    ("export", "brook.yaml"),
+    ("new", "mill"),
     ("run", "brook.yaml", "--jobs", "1"),
+    ("simulate", "brook.yaml", "--members", "512", "--jobs", "2"),
 )
 # Kills of the slowest command.
 FEWEST = 4
@@ -61,7 +64,8 @@ class Step:
 
     @property
     def name(self) -> str:
-        return " ".join([self.command[0], *(word for word in self.command if word in ("--add", "--auto"))])
+        jobs = " --jobs 2" if self.command[-2:] == ("--jobs", "2") else ""
+        return " ".join([self.command[0], *(word for word in self.command if word in ("--add", "--auto"))]) + jobs
 
 
 def prepared(folder: Path) -> None:
