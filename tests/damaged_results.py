@@ -128,3 +128,17 @@ def _put(group: h5py.Group, name: str, new: Any, marks: dict[str, Any]) -> None:
 def without_digest(path: Path) -> bytes:
     """The bytes of a whole file, but for the line behind its end."""
     return path.read_bytes()[:-LENGTH]
+
+
+def damaged(content: bytes, edits: list[tuple[float, str]]) -> bytes:
+    """The bytes with some places spoilt: how far in each is, as a share, and what becomes of what stands there."""
+    new = bytearray(content)
+    for part, how in edits:
+        place = int(part * len(new))
+        if how == "cut":
+            del new[place:]
+        elif how == "bit" and new:
+            new[place] ^= 1 << place % 8
+        else:
+            new[place : place + 64] = (b"\0" if how == "zeros" else b"\xff") * len(new[place : place + 64])
+    return bytes(new)

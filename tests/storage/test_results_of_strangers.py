@@ -8,7 +8,17 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from damaged_results import OF_VALUES, OF_WORDS, RESULTS, Kept, change_content, places_in, sentence_of, without_digest
+from damaged_results import (
+    OF_VALUES,
+    OF_WORDS,
+    RESULTS,
+    Kept,
+    change_content,
+    damaged,
+    places_in,
+    sentence_of,
+    without_digest,
+)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from stored import ALL, HASH, a_header, append, assert_whole, write_chunks
@@ -45,19 +55,6 @@ def change_somewhere(path: Path, change: tuple[int, str, int]) -> None:
     where, values, words = change
     places = places_in(path)
     change_content(path, places[where % len(places)], OF_VALUES[values], OF_WORDS[words])
-
-
-def damaged(content: bytes, edits: list[tuple[float, str]]) -> bytes:
-    new = bytearray(content)
-    for part, how in edits:
-        place = int(part * len(new))
-        if how == "cut":
-            del new[place:]
-        elif how == "bit" and new:
-            new[place] ^= 1 << place % 8
-        else:
-            new[place : place + 64] = (b"\0" if how == "zeros" else b"\xff") * len(new[place : place + 64])
-    return bytes(new)
 
 
 @pytest.fixture(scope="module")

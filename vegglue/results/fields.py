@@ -111,7 +111,7 @@ def fields_group(window: FieldWindow, experiments: tuple[str, ...], values: Sing
 def fields_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Fields:
     """The fields whose file has these groups and attributes."""
     stored = fitting(groups["fields"], stored_fields(Fields) | {"x": Stored(("x",)), "y": Stored(("y",))})
-    west, east = np.asarray(attributes["range"], np.float64)
+    west, east = fitting({"range": np.asarray(attributes["range"])}, {"range": Stored(("end",))}, {"end": 2})["range"]
     return Fields(
         **{name: stored[name] for name in QUANTITIES},
         experiments=names_of(stored, "experiment"),
