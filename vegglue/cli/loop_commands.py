@@ -77,6 +77,7 @@ def discover_command(
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -85,7 +86,7 @@ def discover_command(
 ) -> None:
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
     case = opened_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch, force=force)
     tell(case, runs, found, as_object)
 
@@ -101,6 +102,7 @@ def extend_command(
     ] = False,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -113,7 +115,7 @@ def extend_command(
         raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
     case = opened_case(config, trust) if auto else vegglue.load_case(config, trust)
     if auto:
-        with heard(quiet, as_object) as watch:
+        with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
             extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
         tell(case, runs, extension, as_object)
         return
@@ -160,6 +162,7 @@ def next_command(
     config: Config,
     between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -167,6 +170,6 @@ def next_command(
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
     case = opened_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(case, between=between or [], runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
