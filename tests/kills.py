@@ -43,7 +43,10 @@ COMMANDS: Commands = (
     ("extend", "brook.yaml", "--auto", "--jobs", "1"),
     ("compare", "brook.yaml", "brook+streamlining.yaml", "--jobs", "1"),
     ("next", "brook.yaml", "--jobs", "1"),
+    ("export", "brook.yaml"),
+    ("new", "mill"),
     ("run", "brook.yaml", "--jobs", "1"),
+    ("simulate", "brook.yaml", "--members", "512", "--jobs", "2"),
 )
 # Kills of the slowest command.
 FEWEST = 4
@@ -61,7 +64,8 @@ class Step:
 
     @property
     def name(self) -> str:
-        return " ".join([self.command[0], *(word for word in self.command if word in ("--add", "--auto"))])
+        jobs = " --jobs 2" if self.command[-2:] == ("--jobs", "2") else ""
+        return " ".join([self.command[0], *(word for word in self.command if word in ("--add", "--auto"))]) + jobs
 
 
 def prepared(folder: Path) -> None:
@@ -190,13 +194,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kills", type=int, nargs="?", default=208)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="*", default=[], help="as the table names them; the others keep theirs")
     asked = parser.parse_args()
     random, table = np.random.default_rng(asked.seed), {}
+    if asked.only:
+        table = json.loads(OUTCOME.read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory() as name:
         work = Path(name) / "work"
         load_all(Path(name) / "loaded")
         undisturbed = steps(work, Path(name))
-        for step, kills in zip(undisturbed, shared_out(asked.kills, undisturbed), strict=True):
+        tried = [step for step in undisturbed if not asked.only or step.name in asked.only]
+        for step, kills in zip(tried, shared_out(asked.kills, tried), strict=True):
             in_time = sum(disturbed(step, work, float(share)) for share in random.uniform(0.0, 1.0, kills))
             table[step.name] = {"kills": kills, "in_time": in_time}
             print(f"{step.name}: {in_time} of {kills} in time", flush=True)

@@ -14,6 +14,7 @@ from workers import Workers, workers_in
 
 import vegglue
 from vegglue import cluster
+from vegglue.cli.main import main
 from vegglue.cluster import on_cluster
 from vegglue.errors import InputError
 from vegglue.parallel import as_finished, side_by_side
@@ -78,6 +79,27 @@ def test_jobs_and_workers_give_the_same_bits(tmp_path: Path, case, two: Workers)
     the_same(alone, all_of(tmp_path / "two", jobs=2), "ensemble", "posterior", "diagnosis")
     with on_cluster(two.address):
         the_same(alone, all_of(tmp_path / "workers"), "ensemble", "posterior", "diagnosis")
+
+
+@pytest.mark.slow
+def test_workers_refit_for_an_extension_to_the_same_words(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    case,  # type: ignore[no-untyped-def]
+    two: Workers,
+) -> None:
+    said = []
+    for runs, who in (("here", ["--jobs", "1"]), ("there", ["--cluster", two.address])):
+        monkeypatch.setattr(
+            sys, "argv", ["vegglue", "extend", "--auto", str(case.source), "--json", "--runs", runs, *who]
+        )
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert not ended.value.code
+        said.append(capsys.readouterr().out.replace(f"{runs}/", ""))
+    assert said[0] == said[1] != ""
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ HOMES = {
         "calibration", "checks", "diagnosis", "engine", "figures", "flow", "inference", "measurements", "report_page",
         "results", "screening", "twins", "workflow",
     },
-    "pydantic": {"case", "importers"},
+    "pydantic": {"case", "importers", "results"},
     "rich": {"cli"},
     "threadpoolctl": {"parallel"},
     "typer": {"cli"},

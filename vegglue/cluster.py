@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, one_thread_for_good, taken
+from vegglue.parallel import at_most, keep_folder_out, one_thread_for_good, taken
 from vegglue.version import VERSION
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def _processes_here(count: int) -> "LocalCluster":
     """A cluster of processes with one thread each; no limit of memory and no page, as without a cluster."""
     from distributed import LocalCluster
 
+    keep_folder_out()
     return LocalCluster(
         n_workers=count,
         threads_per_worker=1,

@@ -164,7 +164,15 @@ def one_thread_for_good() -> None:
     threadpool_limits(1)
 
 
+def keep_folder_out() -> None:
+    """Processes begun from here on import nothing from the folder the user stands in: it may be a stranger's, with a
+    `numpy.py` of its own.
+    """
+    os.environ["PYTHONSAFEPATH"] = "1"
+
+
 def _pool(jobs: int, order: str) -> Parallel:
+    keep_folder_out()
     return Parallel(n_jobs=jobs, return_as=order, pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve)
 
 

@@ -32,7 +32,9 @@ def model() -> Model:
 
 
 def flagging(model: Model, *rows: int) -> Diagnosis:
-    return a_diagnosis(predictions={"station": model.station}, errors={"flagged": rows})
+    nothing = np.full(len(model.station), np.nan)
+    predictions = {"station": model.station, "first": nothing, "last": nothing, "error": nothing}
+    return a_diagnosis(predictions=predictions, errors={"flagged": rows})
 
 
 def test_flagged_measurements_are_not_used_and_all_others_are(model: Model) -> None:

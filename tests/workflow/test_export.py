@@ -128,3 +128,16 @@ def test_a_bend_lies_on_the_map_where_it_bends(tmp_path: Path) -> None:
     assert last["east [m]"].mean() == pytest.approx(15.0 + 9.549, abs=0.1)
     assert last["north [m]"].mean() == pytest.approx(9.549, abs=0.8)
     assert (last["north_velocity [m/s]"] > 3.0 * last["east_velocity [m/s]"].abs()).all()
+
+
+def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path: Path) -> None:
+    """The folder of a run may come from others, and a kill leaves no half of a file under its name."""
+    case, victim = load_case(write_reach(tmp_path, COARSE)), tmp_path / "thesis.tex"
+    victim.write_text("my thesis", encoding="utf-8")
+    into = tmp_path / "runs/brook/export"
+    into.mkdir(parents=True)
+    for name in ("flow.nc", "u-june.tif", "flow-june.csv"):
+        (into / name).symlink_to(victim)
+    found = export(case, runs=tmp_path / "runs")
+    assert victim.read_text(encoding="utf-8") == "my thesis"
+    assert not any(path.is_symlink() for path in found.files)

@@ -10,7 +10,7 @@ import vegglue
 from vegglue.checks.case_check import check_case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
-from vegglue.errors import InputError
+from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow.new import Reach
@@ -61,3 +61,25 @@ def test_senseless_numbers_are_refused(
     assert code == 2
     assert said in error
     assert not (tmp_path / "brook").exists()
+
+
+def test_what_a_killed_command_left_is_taken_away(tmp_path: Path) -> None:
+    """Nothing of it lies under the name of the folder, which appears when it is whole."""
+    left = tmp_path / ".brook.new"
+    left.mkdir()
+    for name in ("case.yaml", "velocities.csv.new"):
+        (left / name).write_text("half", encoding="utf-8")
+    vegglue.new("brook", folder=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["brook"]
+    (tmp_path / ".mill.new").mkdir()
+    (tmp_path / ".mill.new" / "thesis.tex").write_text("mine", encoding="utf-8")
+    with pytest.raises(StorageError, match=r"\.mill\.new: cannot be written .* take it away"):
+        vegglue.new("mill", folder=tmp_path)
+    assert (tmp_path / ".mill.new" / "thesis.tex").read_text() == "mine"
+
+
+def test_numbers_without_a_flow_leave_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vegglue.workflow.new.solve_flow", lambda case, theta: {})
+    with pytest.raises(InputError, match="no steady flow is found"):
+        vegglue.new("brook", folder=tmp_path)
+    assert list(tmp_path.iterdir()) == []

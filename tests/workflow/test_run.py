@@ -23,6 +23,12 @@ def test_a_hidden_effect_is_named_added_and_the_error_falls(tmp_path: Path) -> N
     rungs = json.loads(vegglue(tmp_path, "compare", "hidden/hidden.yaml", child, "--json").stdout)["rungs"]
     assert rungs[1]["held_out_sections"] < rungs[0]["held_out_sections"]
     assert rungs[1]["chi2"] < 0.8 * rungs[0]["chi2"]
+    by_hand = f"extends: hidden.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
+    child.write_text(by_hand, encoding="utf-8")
+    again = vegglue(tmp_path, "extend", "hidden/hidden.yaml", "--auto", succeed=False)
+    assert (again.returncode, len(again.stderr.splitlines())) == (2, 1)
+    assert "--force" in again.stderr
+    assert child.read_text(encoding="utf-8") == by_hand, "what was written by hand is not replaced"
 
 
 @pytest.mark.slow

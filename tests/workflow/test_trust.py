@@ -66,9 +66,13 @@ def test_the_folder_of_a_run_lies_in_runs(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_nothing_that_is_read_can_hold_code() -> None:
-    """No pickle, eval or shell anywhere; one file starts a program, the command of `engine`, which needs --trust."""
-    banned = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "subprocess"}
+    """No pickle, eval or shell anywhere but in what speaks to workers of a cluster, which the user names. Two files begin
+    a process: a Python of its own words, which reads a result file before the command does, and the command of `engine`,
+    which needs --trust.
+    """
+    never = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "subprocess"}
     for path in FILES:
+        banned = never - {"subprocess"} if path.name == "first_look.py" else never
         tree = ast.parse(path.read_text(encoding="utf-8"))
         imported = {
             alias.name.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names

@@ -22,15 +22,18 @@ PATHS = ("file", "raster", "points", "effect_file")
 NAMED_PATHS = "files"
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
+COMPILER_SETTINGS = ".numba_config.yaml"
 
 
 def load_case(path: Path | str, trust: bool = False) -> Case:
     """The case in a YAML file, with all it extends.
 
-    trust: whether a Python file or a command that the case names may be run. Errors: InputError, which says what is
-    wrong, where, and what to do.
+    trust: whether a Python file or a command that the case names may be run, and settings of the folder may say where
+    compiled code lies. Errors: InputError, which says what is wrong, where, and what to do.
     """
     path = Path(path)
+    if not trust:
+        _refuse_settings_of_folder()
     layers = _layers(path, ())
     tree: Tree = {}
     for _, layer in reversed(layers):
@@ -54,6 +57,17 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     if refusal is not None:
         raise _input_error(layers, refusal)
     return case
+
+
+def _refuse_settings_of_folder() -> None:
+    """The compiler takes settings from the folder the user stands in, which may be a stranger's, and runs what lies
+    where they say. Errors: InputError when there are any.
+    """
+    if Path(COMPILER_SETTINGS).exists():
+        raise InputError(
+            f"{COMPILER_SETTINGS}: can make numba run code that lies where it says: remove it, or add --trust if you "
+            "trust it."
+        )
 
 
 def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:

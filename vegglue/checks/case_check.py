@@ -19,6 +19,11 @@ from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
 
 
+def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
+    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values."""
+    return [*remarks_on_absurd_values(case, site, observations), *remarks_on_directions(case, observations)]
+
+
 def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
     remarks = (

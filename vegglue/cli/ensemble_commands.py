@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import vegglue
+from vegglue.cli.doubts import opened_case
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
@@ -34,7 +35,7 @@ def simulate_command(
     force: Force = False,
 ) -> None:
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
-    case = vegglue.load_case(config, trust)
+    case = opened_case(config, trust)
     from vegglue.workflow.run_folder import of_size
     from vegglue.workflow.simulate import is_simulated
 
@@ -67,7 +68,7 @@ def infer_command(
     trust: Trust = False,
 ) -> None:
     """Infer the parameters from the measurements and say what was found."""
-    case = vegglue.load_case(config, trust)
+    case = opened_case(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         posterior = vegglue.infer(case, runs=runs, method=method, members=members, jobs=jobs, watch=watch)
     tell(case, runs, posterior, as_object)
@@ -82,7 +83,7 @@ def report_command(
     trust: Trust = False,
 ) -> None:
     """Make the page and the figures of a run."""
-    case = vegglue.load_case(config, trust)
+    case = opened_case(config, trust)
     with heard(quiet, as_object) as watch:
         page = vegglue.report(case, runs=runs, members=members, watch=watch)
     tell(case, runs, page, as_object)
@@ -100,7 +101,7 @@ def run_command(
     force: Force = False,
 ) -> None:
     """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report before and after."""
-    case, results = vegglue.load_case(config, trust), list[tuple[Any, Any]]()
+    case, results = opened_case(config, trust), list[tuple[Any, Any]]()
 
     def show(of: Any, result: Any) -> None:
         results.append((of, result))

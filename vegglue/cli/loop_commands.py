@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import vegglue
+from vegglue.cli.doubts import opened_case, opened_cases
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import print_object
@@ -63,7 +64,7 @@ def diagnose_command(
     trust: Trust = False,
 ) -> None:
     """Say where the model fails, which effect is missing, and how sure that is."""
-    case = vegglue.load_case(config, trust)
+    case = opened_case(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
@@ -76,6 +77,7 @@ def discover_command(
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -83,8 +85,8 @@ def discover_command(
     force: Force = False,
 ) -> None:
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
-    case = vegglue.load_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    case = opened_case(config, trust)
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch, force=force)
     tell(case, runs, found, as_object)
 
@@ -100,6 +102,7 @@ def extend_command(
     ] = False,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
@@ -110,9 +113,9 @@ def extend_command(
     shapes = dict(number_given(text) for text in shape or [])
     if auto == bool(add):
         raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
-    case = vegglue.load_case(config, trust)
+    case = opened_case(config, trust) if auto else vegglue.load_case(config, trust)
     if auto:
-        with heard(quiet, as_object) as watch:
+        with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
             extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
         tell(case, runs, extension, as_object)
         return
@@ -135,7 +138,7 @@ def compare_command(
     trust: Trust = False,
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
-    cases = [vegglue.load_case(config, trust) for config in configs]
+    cases = opened_cases(configs, trust)
     with heard(quiet, as_object) as watch:
         found = vegglue.compare(cases, runs=runs, jobs=jobs, watch=watch)
     tell(cases[-1], runs, found, as_object)
@@ -159,13 +162,14 @@ def next_command(
     config: Config,
     between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,
     jobs: Jobs = -1,
+    cluster: Cluster = None,
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
-    case = vegglue.load_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    case = opened_case(config, trust)
+    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(case, between=between or [], runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)

@@ -6,7 +6,8 @@ same values become CSS variables, which the page sets for light and for dark.
 
 import html
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import wraps
 from io import BytesIO, StringIO
@@ -94,8 +95,13 @@ def _settings() -> dict[str, Any]:
     }
 
 
-def _styled_context() -> Any:
-    return matplotlib.rc_context(_settings())  # type: ignore[arg-type]  # its keys are a literal type of 300 names
+@contextmanager
+def _styled_context() -> Iterator[None]:
+    """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_settings())  # type: ignore[arg-type]  # its keys are a literal type of 300 names
+        yield
 
 
 def styled(draw: Callable[Drawing, Figure]) -> Callable[Drawing, Figure]:

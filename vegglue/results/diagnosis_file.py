@@ -6,10 +6,11 @@ Lists and values of several parts are attributes as well, as JSON.
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from pydantic import TypeAdapter
 
 from vegglue.results.diagnosis import (
     AmplitudeEstimate,
@@ -34,11 +35,29 @@ from vegglue.results.diagnosis import (
 )
 from vegglue.results.diagnosis_json import flat_suspect
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
-from vegglue.results.layout import Group, Variable, table_group
+from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
+from vegglue.results.layout import Group, Stored, Variable, table_group
 
-T = TypeVar("T")
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")
+STATION_VALUES = dict.fromkeys(AT_STATIONS, Stored(("station",)))
+SPOTS = dict.fromkeys(("x", "y", "score"), Stored(("place",)))
+FIELD_MAP = {
+    "x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y")),
+}  # fmt: skip
+NUMBERS_OF_SUSPECT = (
+    "amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off", "scale",
+    "low95", "high95", "least", "most",
+)  # fmt: skip
+SUSPECT_COLUMNS = {
+    **dict.fromkeys(("name", "title", "unit", "mimicked_by", "shapes"), Stored(("suspect",), type=IN_WORDS)),
+    **dict.fromkeys(("testable", "refitted"), Stored(("suspect",), type=YES_OR_NO)),
+    **dict.fromkeys(NUMBERS_OF_SUSPECT, Stored(("suspect",))),
+}
+ZONE_COLUMNS = {
+    **dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=IN_WORDS)),
+    **dict.fromkeys(("stations", "mean", "standard_error", "chi2"), Stored(("zone_number",))),
+}
 # Units of smooth fields, by their term.
 FIELD_UNITS = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
@@ -117,84 +136,81 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[str, Any]) -> Diagnosis:
     """The diagnosis whose file has these groups and attributes."""
-    stations, places = groups["stations"], groups["places"]
+    stations, places = fitting(groups["stations"], STATION_VALUES), fitting(groups["places"], SPOTS)
+    suspects = _table_from(groups["suspects"], "suspect", SUSPECT_COLUMNS)
     return Diagnosis(
-        name=str(attributes["name"]),
-        version=str(attributes["version"]),
+        name=stated_as(str, attributes, "name"),
+        version=stated_as(str, attributes, "version"),
         verdict=_verdict_from(attributes),
-        suspects=tuple(_suspect_from(row) for row in _table_from(groups["suspects"], "suspect").to_dict("records")),
-        steps=tuple(_step_from(step) for step in json.loads(attributes["steps"])),
+        suspects=tuple(_suspect_from(row) for row in suspects.to_dict("records")),
+        steps=_parsed(tuple[Step, ...], attributes["steps"]),
         misfit=Misfit(
-            chi2_first=float(attributes["chi2_first"]),
-            chi2=float(attributes["chi2"]),
-            freedom=int(attributes["freedom"]),
-            p=float(attributes["p_misfit"]),
-            zones=_table_from(groups["zones"], "zone_number"),
+            chi2_first=stated_as(float, attributes, "chi2_first"),
+            chi2=stated_as(float, attributes, "chi2"),
+            freedom=stated_as(int, attributes, "freedom"),
+            p=stated_as(float, attributes, "p_misfit"),
+            zones=_table_from(groups["zones"], "zone_number", ZONE_COLUMNS),
         ),
         errors=EstimatedErrors(
-            **{name: float(attributes[name]) for name in ("correlation", "scale", "grid_error")},
-            flagged=tuple(json.loads(attributes["flagged"])),
+            **{name: stated_as(float, attributes, name) for name in ("correlation", "scale", "grid_error")},
+            flagged=_parsed(tuple[int, ...], attributes["flagged"]),
         ),
         first_screening=_first_screening_from(groups["alike"], attributes),
         parameters=ParameterEstimates(
-            first=json.loads(attributes["first_parameters"]),
-            last={name: tuple(values) for name, values in json.loads(attributes["parameters"]).items()},
+            first=_parsed(dict[str, float], attributes["first_parameters"]),
+            last=_parsed(dict[str, tuple[float, float, float]], attributes["parameters"]),
         ),
-        predictions=Predictions(
-            _table_from(stations, "station", *AT_STATIONS), *(stations[name] for name in AT_STATIONS)
-        ),
-        place_map=PlaceMap(str(attributes["mapped_term"]), places["x"], places["y"], places["score"]),
-        places=tuple(_location_from(one) for one in json.loads(attributes["locations"])),
-        instruments=tuple(_instrument_from(one) for one in json.loads(attributes["instruments"])),
-        field=_optional(FieldFound, json.loads(attributes["field"])),
-        model_error=_optional(ModelErrorUsed, json.loads(attributes["model_error"])),
-        field_map=_optional(FieldMapKept, groups.get("field")),
+        predictions=Predictions(stations_from(stations, *AT_STATIONS), *(stations[name] for name in AT_STATIONS)),
+        place_map=PlaceMap(stated_as(str, attributes, "mapped_term"), places["x"], places["y"], places["score"]),
+        places=_parsed(tuple[Location, ...], attributes["locations"]),
+        instruments=_instruments_from(attributes["instruments"]),
+        field=_parsed(FieldFound | None, attributes["field"]),
+        model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
+        field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
     )
 
 
-def _optional(kind: type[T], tree: Mapping[str, Any] | None) -> T | None:
-    return None if tree is None else kind(**tree)
+def _parsed(kind: Any, text: str) -> Any:
+    """A value of this kind from JSON. Errors: ValueError where it is none."""
+    return TypeAdapter(kind).validate_json(text)
 
 
 def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
-    where = json.loads(attributes["where"])
-    location = None if where is None else _location_from(where)
+    kind: VerdictKind = TypeAdapter(VerdictKind).validate_python(attributes["verdict"])
     return Verdict(
-        kind=cast(VerdictKind, str(attributes["verdict"])),
-        sentence=str(attributes["sentence"]),
-        remarks=tuple(json.loads(attributes["remarks"])),
-        location=location,
-        not_excluded=tuple(tuple(group) for group in json.loads(attributes["not_excluded"])),
+        kind=kind,
+        sentence=stated_as(str, attributes, "sentence"),
+        remarks=_parsed(tuple[str, ...], attributes["remarks"]),
+        location=_parsed(Location | None, attributes["where"]),
+        not_excluded=_parsed(tuple[tuple[str, ...], ...], attributes["not_excluded"]),
     )
 
 
-def _location_from(tree: Mapping[str, Any]) -> Location:
-    lists = {name: tuple(tree[name]) for name in ("interval95", "experiments")}
-    return Location(**{**tree, **lists})
+def _instruments_from(text: str) -> tuple[FaultyInstrument, ...]:
+    """Several stations have no place: null."""
+    nowhere = {"x": float("nan"), "y": float("nan")}
+    known = [{name: value for name, value in tree.items() if value is not None} for tree in json.loads(text)]
+    instruments: tuple[FaultyInstrument, ...] = TypeAdapter(tuple[FaultyInstrument, ...]).validate_python(
+        [nowhere | tree for tree in known]
+    )
+    return instruments
 
 
-def _instrument_from(tree: Mapping[str, Any]) -> FaultyInstrument:
-    place = {name: float("nan") if tree[name] is None else tree[name] for name in ("x", "y")}
-    lists = {name: tuple(tree[name]) for name in ("stations", "interval95")}
-    return FaultyInstrument(**{**tree, **place, **lists})
-
-
-def _first_screening_from(alike: Mapping[str, Any], attributes: Mapping[str, Any]) -> FirstScreening:
+def _first_screening_from(alike: ReadGroup, attributes: Mapping[str, Any]) -> FirstScreening:
+    compared = names_of(alike, "name")
+    both = dict.fromkeys(("name", "other"), len(compared))
     return FirstScreening(
-        threshold=float(attributes["threshold"]),
-        scores=json.loads(attributes["first_scores"]),
-        compared=tuple(alike["name"]),
-        cosine=alike["cosine"],
+        threshold=stated_as(float, attributes, "threshold"),
+        scores=_parsed(dict[str, float], attributes["first_scores"]),
+        compared=compared,
+        cosine=fitting(alike, {"cosine": Stored(("name", "other"))}, both)["cosine"],
     )
 
 
-def _table_from(group: Mapping[str, Any], *others: str) -> pd.DataFrame:
-    return pd.DataFrame({name: values for name, values in group.items() if name not in others})
-
-
-def _step_from(step: dict[str, Any]) -> Step:
-    lists = {name: tuple(step[name]) for name in ("rivals", "chances")}
-    return Step(**step | lists | {"groups": tuple(tuple(group) for group in step["groups"])})
+def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd.DataFrame:
+    """A table without rows has no columns either."""
+    there = fitting(group, columns if len(group) > 1 else {})
+    return pd.DataFrame({name: there[name] for name in there if name != dim})
 
 
 def _row(suspect: Suspect) -> dict[str, Any]:
@@ -207,7 +223,7 @@ def _suspect_from(row: Mapping[str, Any]) -> Suspect:
     return Suspect(
         name=row["name"],
         title=row["title"],
-        shapes=json.loads(row["shapes"]),
+        shapes=_parsed(dict[str, float], row["shapes"]),
         amplitude=AmplitudeEstimate(
             value=row["amplitude"],
             interval95=(row["low95"], row["high95"]),

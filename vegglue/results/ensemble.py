@@ -10,6 +10,7 @@ import pandas as pd
 from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
+from vegglue.results.fitting import IN_WORDS, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
 from vegglue.solver.status import (
     FAILED,
@@ -17,6 +18,7 @@ from vegglue.solver.status import (
     RUN_BY_COMMAND,
     SOLVED_BY_MARCHING,
     SOLVED_BY_NEWTON,
+    STATUS_WORDS,
     members_with,
 )
 
@@ -91,6 +93,7 @@ class Ensemble:
 
 
 ROWS = stored_fields(Ensemble)  # what is stored of each member
+AT_SECTIONS = {"section": Stored(("section",), type=IN_WORDS), "section_x": Stored(("section",), "m")}
 
 
 def unsolved(header: Header) -> dict[str, Group]:
@@ -125,15 +128,21 @@ def _filled(row: Stored, sizes: Mapping[str, int]) -> Variable:
 
 def ensemble_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Ensemble:
     """The ensemble whose file has these groups and attributes."""
-    rows = groups["members"]
+    parameters = {name: values for name, values in groups["parameters"].items() if name != "member"}
+    station, experiments = stations_from(groups["stations"]), names_of(groups["members"], "experiment")
+    sizes = {"station": len(station), "experiment": len(experiments)}
+    rows = fitting(groups["members"], ROWS | AT_SECTIONS, sizes)
+    fitting(parameters, dict.fromkeys(parameters, Stored(("member",))), {"member": len(rows["status"])})
+    if not np.isin(rows["status"], (NOT_YET, *STATUS_WORDS)).all():
+        raise ValueError("status holds what is none")
     return Ensemble(
-        parameters={name: values for name, values in groups["parameters"].items() if name != "member"},
+        parameters=parameters,
         **{name: rows[name] for name in ROWS},
-        station=pd.DataFrame({name: values for name, values in groups["stations"].items() if name != "station"}),
-        experiments=tuple(rows["experiment"]),
+        station=station,
+        experiments=experiments,
         sections=tuple(zip(rows["section"].tolist(), rows["section_x"].tolist(), strict=True)),
-        config=str(attributes["config"]),
-        config_hash=str(attributes["config_hash"]),
-        seed=int(attributes["seed"]),
-        version=str(attributes["version"]),
+        config=stated_as(str, attributes, "config"),
+        config_hash=stated_as(str, attributes, "config_hash"),
+        seed=stated_as(int, attributes, "seed"),
+        version=stated_as(str, attributes, "version"),
     )

@@ -10,6 +10,7 @@ from vegglue.arrays import Array, Single
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
 from vegglue.flow.readers import between
+from vegglue.results.fitting import fitting, names_of
 from vegglue.results.layout import Group, Stored, Variable, stored_fields
 from vegglue.site.grid import Grid
 
@@ -109,11 +110,11 @@ def fields_group(window: FieldWindow, experiments: tuple[str, ...], values: Sing
 
 def fields_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Fields:
     """The fields whose file has these groups and attributes."""
-    stored = groups["fields"]
-    west, east = attributes["range"]
+    stored = fitting(groups["fields"], stored_fields(Fields) | {"x": Stored(("x",)), "y": Stored(("y",))})
+    west, east = fitting({"range": np.asarray(attributes["range"])}, {"range": Stored(("end",))}, {"end": 2})["range"]
     return Fields(
         **{name: stored[name] for name in QUANTITIES},
-        experiments=tuple(stored["experiment"]),
+        experiments=names_of(stored, "experiment"),
         x=stored["x"],
         y=stored["y"],
         range=(float(west), float(east)),

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from vegglue.flow.sensor import FlowFields
-from vegglue.results.layout import Group, Variable
+from vegglue.results.fitting import fitting, names_of
+from vegglue.results.layout import Group, Stored, Variable
 
 # Fields at cell centres, in units of FlowFields.
 FIELD_UNITS_KEPT = {"bed": "m", "depth": "m", "level": "m", "u": "m/s", "v": "m/s"}
@@ -31,8 +32,9 @@ def flow_attributes(theta: Mapping[str, float]) -> dict[str, str]:
 
 def flow_from(groups: Mapping[str, Mapping[str, Any]]) -> dict[str, FlowFields]:
     """The fields by experiment of a file with these groups."""
-    kept = groups["flow"]
+    at_cells = dict.fromkeys(FIELD_UNITS_KEPT, Stored(("experiment", "x", "y")))
+    kept = fitting(groups["flow"], at_cells | {"x": Stored(("x",)), "y": Stored(("y",))})
     return {
-        str(experiment): FlowFields(kept["x"], kept["y"], **{name: kept[name][place] for name in FIELD_UNITS_KEPT})
-        for place, experiment in enumerate(kept["experiment"])
+        experiment: FlowFields(kept["x"], kept["y"], **{name: kept[name][place] for name in FIELD_UNITS_KEPT})
+        for place, experiment in enumerate(names_of(kept, "experiment"))
     }

@@ -12,6 +12,7 @@ import pandas as pd
 from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
+from vegglue.results.fitting import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO
 from vegglue.results.layout import Stored
 from vegglue.results.refinement import OWN_UNIT, Refinement
 
@@ -46,7 +47,7 @@ class WeightedSample:
     members: int
     failed: int
     best: int  # member that fits best
-    unit: Annotated[dict[str, str], Stored(("parameter",))]
+    unit: Annotated[dict[str, str], Stored(("parameter",), type=IN_WORDS)]
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
     weights: Annotated[np.ndarray, Stored(("member",))]  # sum 1
     efficiency: Annotated[np.ndarray, Stored(("member",))]  # Nash-Sutcliffe
@@ -79,10 +80,10 @@ class Marginals:
     log10_sd: ByLogParameter
     correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]
     width_ratio: Annotated[dict[str, float], Stored(("parameter",))]  # 95 % range, posterior over prior
-    identified: Annotated[dict[str, bool], Stored(("parameter",))]
+    identified: Annotated[dict[str, bool], Stored(("parameter",), type=YES_OR_NO)]
     bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]  # of the prior, maybe infinite
     bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]  # within 2 % of the range of a bound
-    bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]  # whether it presses against it
+    bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), type=YES_OR_NO)]  # it presses against it
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class PredictiveDistribution:
 
     model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # spread of the members alone
     total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # with the residual error
-    draws: Annotated[np.ndarray, Stored(("chain", "draw"))]  # member indices, equal weights
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]  # member indices, equal weights
     predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]  # draws with residual error
 
 
@@ -137,7 +138,7 @@ class Transfer:
     gain: float  # by which chi2 falls when every experiment has its own parameters [-]
     more: int  # how many parameters more these are
     p_all: float  # chance of such a gain by errors alone [-]
-    experiments: Annotated[np.ndarray, Stored(("experiment",))]
+    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     chi2: Annotated[np.ndarray, Stored(("parameter",))]
@@ -145,7 +146,7 @@ class Transfer:
     p: Annotated[np.ndarray, Stored(("parameter",))]
     misfit_together: Annotated[np.ndarray, Stored(("experiment",))]
     misfit_alone: Annotated[np.ndarray, Stored(("experiment",))]
-    stations: Annotated[np.ndarray, Stored(("experiment",))]
+    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,16 @@ from dataclasses import is_dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
-import pandas as pd
 
+from vegglue.measurements.kinds import KINDS
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
+from vegglue.results.fitting import fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
 from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Transfer
 from vegglue.results.refinement import Refinement
 
+ROUNDING = 1e-6  # of a sum of a million weights
+LARGEST_PARAMETER = 1e100  # its square is still a number
 PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
 
 
@@ -38,11 +41,31 @@ def posterior_attributes(posterior: Posterior) -> dict[str, Any]:
 
 def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]) -> Posterior:
     """The posterior whose file has these groups and attributes."""
-    station = pd.DataFrame({name: values for name, values in read["stations"].items() if name != "station"})
+    station, parameters = stations_from(read["stations"]), names_of(read["members"], "parameter")
+    sizes = {"member": stated_as(int, stated, "members"), "station": len(station), "level": len(LEVELS), "side": 2}
+    sizes |= {"parameter": len(parameters), "other_parameter": len(parameters)}
+    there = {name: kind for name, kind in ({"members": Posterior} | PARTS).items() if name in read}
+    for name, kind in there.items():
+        fitting(read[name], _all_stored(kind), sizes)
     parts: dict[str, Any] = dict.fromkeys(PARTS) | {
         name: kind(**_fields_from(kind, read[name], stated, f"{name}_")) for name, kind in PARTS.items() if name in read
     }
-    return Posterior(**_fields_from(Posterior, read["members"], stated), station=station, **parts)
+    posterior = Posterior(**_fields_from(Posterior, read["members"], stated), station=station, **parts)
+    _refuse_what_cannot_be(posterior)
+    return posterior
+
+
+def _refuse_what_cannot_be(posterior: Posterior) -> None:
+    """Errors: ValueError where parameters or weights are none, a draw is no member, or a kind is unknown."""
+    drawn, sample = posterior.predicted.draws, posterior.sample
+    if not all((np.abs(values) <= LARGEST_PARAMETER).all() for values in sample.theta.values()):
+        raise ValueError("theta holds what no parameter can be")
+    if not (sample.weights >= 0.0).all() or abs(sample.weights.sum() - 1.0) > ROUNDING:
+        raise ValueError("weights do not sum to 1")
+    if not 0 <= sample.best < sample.members or drawn.min() < 0 or drawn.max() >= sample.members:
+        raise ValueError("a draw is no member")
+    if not set(posterior.fit.sigma) <= set(KINDS):
+        raise ValueError("an error is of no kind of observation")
 
 
 def _parts(posterior: Posterior) -> dict[str, Any]:
@@ -53,6 +76,12 @@ def _parts(posterior: Posterior) -> dict[str, Any]:
 def _values_in(kind: type) -> dict[str, type]:
     """Fields that are values with fields of their own."""
     return {name: hint for name, hint in get_type_hints(kind).items() if isinstance(hint, type) and is_dataclass(hint)}
+
+
+def _all_stored(kind: type) -> dict[str, Stored]:
+    """Arrays of a value and of the values in it, by name."""
+    inner = [_all_stored(each) for each in _values_in(kind).values()]
+    return stored_fields(kind) | {name: one for each in inner for name, one in each.items()}
 
 
 def _plain(kind: type) -> dict[str, type]:
@@ -79,7 +108,7 @@ def _variables(value: Any) -> dict[str, Variable]:
 def _fields_from(kind: type, group: Mapping[str, np.ndarray], stated: Mapping[str, Any], prefix: str = "") -> Any:
     """Arguments that make a value of this kind again, but for those that are no field of the group or attribute."""
     hints = get_type_hints(kind)
-    own = {name: hint(stated[prefix + name]) for name, hint in _plain(kind).items()}
+    own = {name: stated_as(hint, stated, prefix + name) for name, hint in _plain(kind).items()}
     own |= {name: _array(group, name, stored, hints[name]) for name, stored in stored_fields(kind).items()}
     return own | {name: inner(**_fields_from(inner, group, stated, prefix)) for name, inner in _values_in(kind).items()}
 
@@ -101,7 +130,7 @@ def _array(group: Mapping[str, np.ndarray], name: str, stored: Stored, hint: Any
         return group[name]
     entry = get_args(hint)[1]
     convert = entry if entry in (str, float, bool) else np.asarray
-    return {key: convert(value) for key, value in zip(group[stored.dims[0]], group[name], strict=True)}
+    return {key: convert(value) for key, value in zip(names_of(group, stored.dims[0]), group[name], strict=True)}
 
 
 def _named_coordinates(posterior: Posterior) -> dict[str, np.ndarray]:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
+from vegglue.results.fitting import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO
 from vegglue.results.layout import Stored
 
 OWN_UNIT = "that of the parameter, see `unit`"
@@ -38,7 +39,7 @@ class PosteriorModes:
 class ImportanceDraws:
     """How the members were drawn, and as many draws from the prior to compare them with."""
 
-    drawn: Annotated[np.ndarray, Stored(("round",))]  # members after each round
+    drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]  # members after each round
     worth: Annotated[np.ndarray, Stored(("round",))]  # effective members after each round
     log_density: Annotated[np.ndarray, Stored(("member",))]  # of the posterior up to a constant; -inf failed
     prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
@@ -66,15 +67,15 @@ class MisfitTest:
     freedom: int
     p_misfit: float  # chance of a chi2 as large under errors alone [-]
     surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
-    outlier: Annotated[np.ndarray, Stored(("station",))]  # whether one such among all stations is no chance
+    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]  # one such among all is no chance
 
 
 @dataclass(frozen=True)
 class GroupsLeftOut:
     """Each section, and each experiment, predicted from all other stations."""
 
-    left_out: Annotated[np.ndarray, Stored(("group",))]  # sections and experiments left out in turn
-    left_out_stations: Annotated[np.ndarray, Stored(("group",))]
+    left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]  # sections and experiments left out in turn
+    left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE_NUMBERS)]
     left_out_score: Annotated[np.ndarray, Stored(("group",))]  # log predictive density of them together
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
 

@@ -33,20 +33,23 @@ def append_digest(path: Path) -> None:
         os.fsync(file.fileno())
 
 
-def is_unchanged(path: Path) -> bool:
-    """Whether a file has the digest that stands behind it, or states none. Errors: OSError."""
+def state_of(path: Path) -> tuple[Path, int, int, int]:
+    """What is another as soon as a file is: its place, size [bytes], inode and time. Errors: OSError."""
     now = path.stat()
     if not stat.S_ISREG(now.st_mode):  # opening a pipe would wait
         raise OSError("it is not a file")
-    return _is_unchanged(path.resolve(), now.st_ino, now.st_size, now.st_mtime_ns)
+    return path.resolve(), now.st_size, now.st_ino, now.st_mtime_ns
 
 
 @lru_cache(maxsize=64)
-def _is_unchanged(path: Path, *state: int) -> bool:
-    """Looked at once for each state of a file, however often it is opened."""
+def is_unchanged(path: Path, *state: int) -> bool | None:
+    """Whether a file has the digest that stands behind it; None where none does. Errors: OSError.
+
+    state: looked at once for each, however often the file is opened.
+    """
     with path.open("rb") as file:
         stated = _stated(file)
-        return stated is None or stated == _digest_of(file, os.fstat(file.fileno()).st_size - LENGTH)
+        return None if stated is None else stated == _digest_of(file, os.fstat(file.fileno()).st_size - LENGTH)
 
 
 def _line(digest: str) -> bytes:

@@ -17,7 +17,7 @@ LARGEST_RATIO = 1100
 
 def why_foreign(file: h5py.File) -> str | None:
     """What of an open file cannot be of vegglue, in words; None when all may be. Nothing is read, no link followed."""
-    room = LARGEST_RATIO * max(file.id.get_filesize(), 1)
+    room = LARGEST_RATIO * max(file.id.get_filesize(), 1)  # for all together: one dataset may have many names
     for name in file:
         if not _is_hard(file, name):
             return f"{name} is a link"
@@ -27,9 +27,15 @@ def why_foreign(file: h5py.File) -> str | None:
         if not isinstance(group, h5py.Group):
             return f"{name} is neither group nor dataset"
         for key in group:
-            found = f"{name}/{key} is a link" if not _is_hard(group, key) else _why_not(group[key], room)
+            if not _is_hard(group, key):
+                return f"{name}/{key} is a link"
+            dataset = group[key]
+            found = _why_not(dataset)
             if found:
-                return found.replace("it ", f"{name}/{key} ", 1)
+                return f"{name}/{key} {found}"
+            room -= int(np.prod(dataset.shape or (), dtype=object)) * dataset.dtype.itemsize
+            if room < 0:
+                return f"{name}/{key} claims more numbers than the file can hold"
     return None
 
 
@@ -37,16 +43,14 @@ def _is_hard(group: h5py.Group, name: str) -> bool:
     return isinstance(group.get(name, getlink=True), h5py.HardLink)
 
 
-def _why_not(dataset: h5py.Dataset | h5py.Group, room: int) -> str | None:
+def _why_not(dataset: h5py.Dataset | h5py.Group) -> str | None:
     if not isinstance(dataset, h5py.Dataset):
-        return "it is no dataset"
+        return "is no dataset"
     made = dataset.id.get_create_plist()
     if made.get_layout() == h5d.VIRTUAL:
-        return "it is put together from other files"
+        return "is put together from other files"
     if made.get_external_count():
-        return "it lies in other files"
+        return "lies in other files"
     if {made.get_filter(number)[0] for number in range(made.get_nfilters())} - FILTERS:
-        return "it is packed in a way that vegglue does not use"
-    if int(np.prod(dataset.shape or (), dtype=object)) * dataset.dtype.itemsize > room:
-        return "it claims more numbers than the file can hold"
+        return "is packed in a way that vegglue does not use"
     return None

@@ -1,14 +1,16 @@
 """Fields as GeoTIFF: one value a cell, placed on the map by the frame of the model, however that is turned."""
 
 import re
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.frame import Frame
-from vegglue.errors import InputError, StorageError
+from vegglue.errors import InputError
 from vegglue.site.grid import Grid
+from vegglue.whole_files import MAKE_ROOM, write_file
 
 # Tags of GeoTIFF 1.1 (OGC 19-008): the affine way from pixels to the map, and the coordinate system; and that of GDAL
 # for what marks no data.
@@ -38,10 +40,9 @@ def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) ->
         (MARKS_NO_DATA, "s", 0, f"{NO_LEVEL_THERE:g}", True),
     ]
     north_up = np.where(np.isnan(values), NO_LEVEL_THERE, values).T[::-1]
-    try:
-        tifffile.imwrite(path, np.ascontiguousarray(north_up), extratags=tags, metadata=None, compression=None)
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written ({error.strerror}); make room and run it again.") from None
+    content = BytesIO()
+    tifffile.imwrite(content, np.ascontiguousarray(north_up), extratags=tags, metadata=None, compression=None)
+    write_file(path, content.getvalue(), MAKE_ROOM)
 
 
 def _affine(grid: Grid, frame: Frame | None) -> tuple[float, ...]:

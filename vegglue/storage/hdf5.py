@@ -15,12 +15,14 @@ import numpy as np
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.layout import Group
-from vegglue.storage.digest import is_unchanged, with_digest
+from vegglue.storage.digest import is_unchanged, state_of, with_digest
+from vegglue.storage.first_look import why_unreadable
 from vegglue.storage.foreign_files import why_foreign
 from vegglue.whole_files import write_file
 
 # What reading a damaged file may raise, of Python or of the HDF5 library.
 UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
+AGAIN = "remove it and run the step that makes it again"
 WRITTEN_STAYS = "what was written before is whole: make room, then run the same command again"
 
 
@@ -55,24 +57,36 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
     of its folder and may be looked at. Errors: StorageError when it cannot be opened, has changed since it was written,
     or holds what leads out of it.
     """
-    again = "remove it and run the step that makes it again"
     try:
-        if mode == "r" and not is_unchanged(path):
-            refuse_in_use(path)
-            raise StorageError(f"{path}: is broken, it has changed since it was written; {again}.")
+        if mode == "r":
+            _refuse_damaged(path)
         file = _without_locks(path, mode)
     except StorageError:
         raise
     except UNREADABLE as error:
-        raise StorageError(f"{path}: cannot be opened ({error}); {again}.") from error
+        raise StorageError(f"{path}: cannot be opened ({error}); {AGAIN}.") from error
     with file:
         try:
             foreign = why_foreign(file)
         except UNREADABLE as error:
-            raise StorageError(f"{path}: is broken ({error}); {again}.") from error
+            raise StorageError(f"{path}: is broken ({error}); {AGAIN}.") from error
         if foreign:
-            raise StorageError(f"{path}: {foreign}, which vegglue never writes, and is not read; {again}.")
+            raise StorageError(f"{path}: {foreign}, which vegglue never writes, and is not read; {AGAIN}.")
         yield file
+
+
+def _refuse_damaged(path: Path) -> None:
+    """Errors: StorageError when a file is not what was written, or states no digest and cannot be read to its end."""
+    state = state_of(path)
+    unchanged = is_unchanged(*state)
+    if unchanged is None:
+        why = why_unreadable(*state)
+        if why is not None:
+            refuse_in_use(path)
+            raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
+    elif not unchanged:
+        refuse_in_use(path)
+        raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
 
 
 def refuse_in_use(path: Path) -> None:

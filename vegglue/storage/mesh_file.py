@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,12 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.frame import Frame
 from vegglue.case.text_files import case_name
-from vegglue.errors import StorageError
 from vegglue.flow.sensor import FlowFields
 from vegglue.site.centreline import heading_at, on_map
 from vegglue.site.grid import Grid
 from vegglue.storage.geotiff import epsg_code
 from vegglue.storage.labelled_arrays import ENGINE, extra_library
+from vegglue.whole_files import MAKE_ROOM, failed_writes_told, write_file
 
 # Quantities of a flow at cell centres: what they are called in words, and their unit.
 QUANTITIES_OF_FLOW = {
@@ -69,10 +70,11 @@ def write_mesh(
             told = {"long_name": f"{words}, {experiment}", "units": unit, **at_faces}
             variables[f"{name}_{case_name(experiment)}"] = ("face", values.ravel(), told)
     dataset = xarray.Dataset(variables, attrs={"Conventions": "CF-1.8 UGRID-1.0", **attributes})
-    try:
-        dataset.to_netcdf(path, engine=ENGINE)
-    except OSError as error:
-        raise StorageError(f"{path}: cannot be written ({error.strerror}); make room and run it again.") from None
+    with failed_writes_told(path, MAKE_ROOM), TemporaryDirectory() as folder:  # the library writes to a name only
+        whole = Path(folder) / path.name
+        dataset.to_netcdf(whole, engine=ENGINE)
+        content = whole.read_bytes()
+    write_file(path, content, MAKE_ROOM)
 
 
 def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:

@@ -104,13 +104,15 @@ def _read(path: Path, expected_hash: str | None, step: str, understand: Callable
     if not path.exists():
         raise InputError(f"{path}: expected the result of an earlier step, found no file; {remedy}.")
     with open_hdf5(path, "r") as file:
-        found = str(file.attrs.get("config_hash", "none"))
-        if expected_hash is not None and found != expected_hash:
-            raise InputError(
-                f"{path}: expected config hash {expected_hash[:12]}, found {found[:12]}: the config, a data file "
-                f"or vegglue changed since this was made; {remedy} again."
-            )
         try:
-            return understand(read_groups(file), dict(file.attrs))
+            stated = dict(file.attrs)
+            found = str(stated.get("config_hash", "none"))
+            wanted = found if expected_hash is None else expected_hash
+            if found == wanted:
+                return understand(read_groups(file), stated)
         except UNREADABLE as error:
             raise StorageError(f"{path}: is broken or of another version ({error}); remove it and {remedy}.") from error
+    raise InputError(
+        f"{path}: expected config hash {wanted[:12]}, found {found[:12]}: the config, a data file or vegglue changed "
+        f"since this was made; {remedy} again."
+    )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vegglue.case.schema import Case
-from vegglue.checks.case_check import check_case
+from vegglue.checks.case_check import check_case, doubts_about
 from vegglue.effects.library import effects_of
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
@@ -42,6 +42,15 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
         remarks.append(command_tried(model_of(case, observations), picture.parent))
     table = observations.table
     return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
+
+
+@one_thread()
+def doubts_of(case: Case) -> list[str]:
+    """What would mislead all that is computed with the measurements of a case, one sentence each; none for sound ones.
+
+    Errors: InputError for a file that cannot be read.
+    """
+    return doubts_about(case, build_site(case), read_observations(case))
 
 
 @one_thread()

@@ -11,11 +11,13 @@ from vegglue.case.text_files import case_name, write_text
 from vegglue.ensemble.solve_ensemble import solve_flow
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
+from vegglue.whole_files import failed_writes_told
 from vegglue.workflow.new_texts import CASE, README
 
 # What the examples were made with, and their errors: the first draws of one seed, so that each time they are the same.
 TRUTH = {"n_b": 0.04, "phi": 6.0}
 VELOCITY_ERROR, LEVEL_ERROR_OF_EXAMPLE, SEED = 0.01, 0.002, 1
+OWN_FILES, ELSEWHERE = ("case.yaml", "velocities.csv", "levels.csv", "README.md"), "give another place by --folder"
 # Cells across the floor: as many as a first look needs.
 CELLS_OF_FLOOR = 8
 
@@ -37,8 +39,9 @@ class Reach:
 def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> Case:
     """Make <folder>/<name>/ with case.yaml, velocities.csv, levels.csv and README.md; returns the case.
 
-    The measurements are computed with TRUTH and errors, and say so; your own take their place. Errors: InputError
-    when there is such a folder already, or no water flows with these numbers; StorageError.
+    The measurements are computed with TRUTH and errors, and say so; your own take their place. The folder appears when
+    it is whole. Errors: InputError when there is such a folder already, or no water flows with these numbers;
+    StorageError.
     """
     reach = reach or Reach()
     into = Path(folder) / name
@@ -46,16 +49,33 @@ def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> C
         raise InputError(f"{shown_path(into)}: expected a name that is free, got one in use; take another.")
     _refuse_senseless(reach)
     words = {"name": case_name(Path(name).name), **_numbers(reach)}
-    write_text(into / "case.yaml", _case_text(reach, words), "give another place by --folder")
+    growing = into.with_name(f".{into.name}.new")
+    _clear(growing)
+    write_text(growing / "case.yaml", _case_text(reach, words), ELSEWHERE)
     for file, heading in (("velocities.csv", "section,x,y,u,u_se"), ("levels.csv", "x,y,level,level_se")):
-        write_text(into / file, f"{heading}\n", "give another place by --folder")
-    case = load_case(into / "case.yaml")
+        write_text(growing / file, f"{heading}\n", ELSEWHERE)
+    case = load_case(growing / "case.yaml")
     flow = solve_flow(case, {name: TRUTH[name] for name in case.parameters}).get("first")
     if flow is None:
+        _clear(growing)
         raise InputError(f"{shown_path(into)}: no steady flow is found with these numbers; try a greater --depth.")
-    _write_measurements(into, flow, reach)
-    write_text(into / "README.md", README.format(**words), "give another place by --folder")
-    return case
+    _write_measurements(growing, flow, reach)
+    write_text(growing / "README.md", README.format(**words), ELSEWHERE)
+    with failed_writes_told(into, ELSEWHERE):
+        growing.rename(into)
+    return load_case(into / "case.yaml")
+
+
+def _clear(growing: Path) -> None:
+    """Take away what a killed command left. Errors: StorageError where anything else lies there."""
+    with failed_writes_told(growing, "take it away"):
+        if growing.is_symlink():
+            growing.unlink()
+        elif growing.exists():
+            for name in OWN_FILES:
+                for file in (growing / name, growing / f"{name}.new"):
+                    file.unlink(missing_ok=True)
+            growing.rmdir()
 
 
 def _refuse_senseless(reach: Reach) -> None:
