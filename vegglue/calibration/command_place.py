@@ -42,19 +42,24 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> Com
 
     Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
     """
-    z, correction = _start(runs, model, watch)
+    z, correction = _start(runs, model, _named(watch, "place 1"))
     here = _model_at(runs, model, correction, watch)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
         if _is_near(base, z):
             return CommandPlace(here, z, True, places, correction.rough)
-        lower = _lower(runs, model, here, base, z, watch)
+        lower = _lower(runs, model, here, base, z, _named(watch, f"on the way to place {places + 1}"))
         if lower is None or places == MOST_PLACES:
             break
-        z, correction = lower, correction_at(runs, model, lower, watch)
+        z, correction = lower, correction_at(runs, model, lower, _named(watch, f"place {places + 1}"))
         here = _model_at(runs, model, correction, watch)
         base = baseline(here, z)
     return CommandPlace(here, z, False, places, correction.rough)
+
+
+def _named(watch: Watch, words: str) -> Watch:
+    """The same, told as a phase of its own, so that the time that is left is that of its runs."""
+    return lambda now: watch(replace(now, phase=f"{now.phase}, {words}"))
 
 
 def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correction]:
