@@ -26,8 +26,9 @@ from vegglue.solver.wet_band import chord_in_band, widen
 DIFFERENCE_STEP = 1e-3
 # Relative residual at which a tangent is solved [-]. Chosen, not measured: far below the 15 % error of a fingerprint.
 TANGENT_TOLERANCE = 1e-5
-# Members solved side by side from one point: more need more memory. Chosen, not measured; no result depends on it.
-LANES_FROM_A_POINT = 16
+# Members solved side by side from one point: on 9,600 cells 384 draws take 5.1 s with 32, 5.3 s with 24 and 6.2 s with
+# 16; more need more memory. No result depends on it but in the last digits.
+LANES_FROM_A_POINT = 32
 
 
 @dataclass(frozen=True)

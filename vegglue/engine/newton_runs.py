@@ -18,7 +18,7 @@ from vegglue.solver.march import fall_back
 from vegglue.solver.status import FAILED
 
 # Points solved together: as many as fit the lanes of chord steps from one point.
-RUNS_TOGETHER = 16
+RUNS_TOGETHER = 32
 
 PredictNear = Callable[[Model, Point, Array], Array]
 
