@@ -86,6 +86,7 @@ confluence: $(READY)  # the numbers of docs/confluence.md, from the published se
 
 fuzz: $(READY)  # files from strangers, bred towards lines not yet reached, for MINUTES
 	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES)
+	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES) --results
 
 clean:  # remove the environment and all runs
 	rm -rf $(VENV) build dist *.egg-info runs/*/

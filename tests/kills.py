@@ -27,6 +27,7 @@ OF_THE_CLOCK = ("seconds",)
 WITH_ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 # So many members that there are four chunks of them, and a kill may come between.
 CHANGES = (COARSE, ("members: 1024", "members: 256"), WITH_ERRORS)
+TWO = ("--jobs", "2")
 # In this order, each on what those before have left; what each writes among the user's files is part of the outcome.
 Commands = Sequence[tuple[str, ...]]
 COMMANDS: Commands = (
@@ -46,7 +47,7 @@ COMMANDS: Commands = (
     ("export", "brook.yaml"),
     ("new", "mill"),
     ("run", "brook.yaml", "--jobs", "1"),
-    ("simulate", "brook.yaml", "--members", "512", "--jobs", "2"),
+    ("simulate", "brook.yaml", "--members", "512", *TWO),
 )
 # Kills of the slowest command.
 FEWEST = 4
@@ -64,7 +65,7 @@ class Step:
 
     @property
     def name(self) -> str:
-        jobs = " --jobs 2" if self.command[-2:] == ("--jobs", "2") else ""
+        jobs = f" {' '.join(TWO)}" if self.command[-2:] == TWO else ""
         return " ".join([self.command[0], *(word for word in self.command if word in ("--add", "--auto"))]) + jobs
 
 
@@ -111,6 +112,8 @@ def load_all(folder: Path, commands: Commands = COMMANDS) -> None:
     here = Path.cwd()
     os.chdir(folder)
     for command in commands:
+        if command[-2:] == TWO:  # processes of this one would be no use to those forked from it
+            continue
         sys.argv = ["vegglue", *command]
         with suppress(SystemExit):
             main()
@@ -147,7 +150,8 @@ def disturbed(step: Step, work: Path, share: float) -> bool:
     time.sleep(share * step.seconds)
     os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
-    finish(work, step.command, heard)
+    if step.command[0] != "new" or unlike(work, step.after):  # which refuses a folder that is there, as it should
+        finish(work, step.command, heard)
     differences = unlike(work, step.after)
     assert not differences, f"{' '.join(step.command)}, killed after {share:.2f} of its time: {differences}"
     return os.WIFSIGNALED(status)

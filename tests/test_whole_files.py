@@ -9,7 +9,7 @@ import pytest
 
 from vegglue import whole_files
 from vegglue.errors import StorageError
-from vegglue.whole_files import MAKE_ROOM, write_file
+from vegglue.whole_files import MAKE_ROOM, folder_within, write_file
 
 
 @pytest.mark.parametrize("name", ["result.h5", "result.h5.new"])
@@ -78,3 +78,16 @@ def test_a_name_that_is_taken_by_a_folder_or_too_long_is_told(tmp_path: Path) ->
     for name in ("a", "b" * 300):
         with pytest.raises(StorageError, match="cannot be written"):
             write_file(tmp_path / name, b"new", MAKE_ROOM)
+
+
+def test_a_folder_that_is_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
+    thesis, run = tmp_path / "thesis", tmp_path / "run"
+    thesis.mkdir()
+    run.mkdir()
+    (run / "figures").symlink_to(thesis)
+    for _ in range(2):
+        assert folder_within(run, "figures") == run / "figures"
+        write_file(run / "figures" / "u.svg", b"<svg/>", MAKE_ROOM)
+    assert not (run / "figures").is_symlink()
+    assert [path.name for path in (run / "figures").iterdir()] == ["u.svg"]
+    assert list(thesis.iterdir()) == []

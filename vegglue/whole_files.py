@@ -40,6 +40,15 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
             raise
 
 
+def folder_within(folder: Path, name: str) -> Path:
+    """The place of a folder in another; a link there is taken away, not followed. Errors: StorageError."""
+    within = folder / name
+    if within.is_symlink():
+        with failed_writes_told(within, MAKE_ROOM):
+            within.unlink()
+    return within
+
+
 def write_file(path: Path, content: bytes, advice: str) -> None:
     """Write a file whole or not at all. Errors: StorageError, which ends with the advice."""
     with failed_writes_told(path, advice), whole_file(path) as file:

@@ -178,10 +178,10 @@ def test_one_section_of_an_experiment_is_read_once():
 
 
 def test_velocities_are_read_as_they_are(tmp_path):
-    text = "experiment,section,x,y,u,u_se\nD3a,S1,36.0,-2.4,0.1732,0.012\nD3a,S1,36.0,-2.1,0.2591,0\n"
+    text = "experiment,section,x,y,u,u_se\nD3a,S1,36.0,-1.4,0.1732,0.012\nD3a,S1,36.0,-1.1,0.2591,0\n"
     observations = read_observations(with_file(tmp_path, text, "velocity"))
     first = observations.table.iloc[0]
-    assert (first["x"], first["y"], first["value"], first["standard_error"]) == (336.0, -2.4, 0.1732, 0.012)
+    assert (first["x"], first["y"], first["value"], first["standard_error"]) == (336.0, -1.4, 0.1732, 0.012)
     assert first["kind"] == "velocity"
     assert np.isnan(observations.table.loc[1, "standard_error"])
     assert observations.table["used"].all()

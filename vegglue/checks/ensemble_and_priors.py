@@ -9,7 +9,7 @@ from vegglue.case.messages import KeyPath
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.checks.stations import station_in_words
-from vegglue.measurements.observations import Observations
+from vegglue.measurements.observations import OUTSIDE, Observations
 from vegglue.results.fields import excess
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
@@ -44,7 +44,7 @@ def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]
     for name in case.experiments:
         if not (used["experiment"] == name).any():
             yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."
-    for row in table[~table["used"].astype(bool)].to_dict("records"):
+    for row in table[~table["used"].astype(bool) & (table["reason"] != OUTSIDE)].to_dict("records"):
         yield f"The {station_in_words(row)} is not used: {row['reason']}."
 
 

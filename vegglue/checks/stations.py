@@ -7,7 +7,7 @@ import numpy as np
 
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import kind_of, velocity_rows
-from vegglue.measurements.observations import Observations
+from vegglue.measurements.observations import OUTSIDE, Observations
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.gridded_site import Site, in_experiment
@@ -19,10 +19,9 @@ ON_THE_EDGE = 0.02
 
 def remarks_on_stations(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     """Stations outside the grid or above the expected water."""
-    (west, east), (south, north) = case.grid.x, case.grid.y
     for row in observations.table.to_dict("records"):
-        if not (west <= row["x"] <= east and south <= row["y"] <= north):
-            yield f"The {station_in_words(row)} is outside the grid."
+        if row["reason"] == OUTSIDE:
+            yield f"The {station_in_words(row)} is outside the grid, and not used."
             continue
         if not kind_of(row["kind"]).at_point:
             continue

@@ -31,6 +31,7 @@ STATION_COLUMNS = (
     "depth",
     "device",
 )
+OUTSIDE = "it is outside the grid"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
 # the squares of such numbers leave no digits of the others.
 SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9
@@ -95,7 +96,7 @@ def read_observations(case: Case) -> Observations:
             f"{shown_path(case.source)}: expected at most {MOST_STATIONS:,} stations, got {number:,}: average "
             "those that lie close together, or leave some out."
         )
-    table = _joined(stations)
+    table = _within_the_grid(case, _joined(stations))
     _refuse_unknown_limits(case, table)
     return Observations(
         table=table,
@@ -105,6 +106,17 @@ def read_observations(case: Case) -> Observations:
         neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
     )
+
+
+def _within_the_grid(case: Case, table: pd.DataFrame) -> pd.DataFrame:
+    """Stations with those outside the grid not used: the model knows nothing there. A discharge has no y of its own."""
+    if not len(table):
+        return table
+    (west, east), (south, north) = case.grid.x, case.grid.y
+    at_point = np.array([kind_of(name).at_point for name in table["kind"]])
+    inside = table["x"].between(west, east) & (table["y"].between(south, north) | ~at_point)
+    lost = table["used"].astype(bool) & ~inside
+    return table.assign(used=table["used"].astype(bool) & inside, reason=table["reason"].mask(lost, OUTSIDE))
 
 
 def _refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:

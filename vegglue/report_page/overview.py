@@ -13,6 +13,7 @@ from vegglue.report_page.answer_words import headline
 from vegglue.report_page.key_numbers import as_power, symbol
 from vegglue.report_page.page_file import rendered, write_page
 from vegglue.report_page.run import Run, file_name
+from vegglue.whole_files import folder_within
 
 # How methods are called in a table.
 METHODS = {"glue": "members weighed (GLUE)", "refine": "draws around the best"}
@@ -121,7 +122,9 @@ def _side_by_side(folder: Path, name: str, runs: Sequence[Run]) -> Picture:
     svg = draw_interval_rows(rows, powers, f"{name} in {len(runs)} runs")
     of_what = f": {html.escape(meaning)}" if meaning else ""
     caption = f"{symbol(runs[0].case, name)}{f' [{unit}]' if unit else ''}{of_what}"
-    return publish_text(svg, folder / "figures", f"parameter-{file_name(name)}", caption, f"{name}. {told}.")
+    return publish_text(
+        svg, folder_within(folder, "figures"), f"parameter-{file_name(name)}", caption, f"{name}. {told}."
+    )
 
 
 def _words(run: Run) -> str:

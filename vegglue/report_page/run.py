@@ -23,6 +23,7 @@ from vegglue.results.open_questions import OpenQuestion
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
+from vegglue.whole_files import folder_within
 
 SYNTHETIC = "synthetic record"  # stamped on every figure of one
 
@@ -73,12 +74,12 @@ def is_synthetic(case: Case) -> bool:
 
 def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
     """The figure as a file of the run and as a part of its page."""
-    return publish(figure, run.folder / "figures", file_name(name), caption, alt, stamp(run.case))
+    return publish(figure, folder_within(run.folder, "figures"), file_name(name), caption, alt, stamp(run.case))
 
 
 def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Picture:
     """A picture that is SVG text already, as a file of the run and as a part of its page."""
-    return publish_text(svg, run.folder / "figures", file_name(name), caption, alt)
+    return publish_text(svg, folder_within(run.folder, "figures"), file_name(name), caption, alt)
 
 
 def file_name(words: str) -> str:

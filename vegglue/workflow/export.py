@@ -24,6 +24,7 @@ from vegglue.storage.mesh_file import quantities, write_mesh
 from vegglue.storage.point_tables import write_field_table, write_station_table
 from vegglue.storage.result_files import read_posterior, stored_hash
 from vegglue.version import VERSION
+from vegglue.whole_files import folder_within
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, known_place
 
@@ -56,8 +57,7 @@ def export(
     words += "" if case.engine is None else ", by the built-in engine"
     if not flows:
         raise InputError(f"{shown_path(case.source)}: no experiment finds a steady flow at {words}; check the case.")
-    into = folder / "export"
-    into.mkdir(exist_ok=True)
+    into = folder_within(folder, "export")
     write = {"csv": _csv, "geotiff": _geotiff, "netcdf": _netcdf}
     files = [path for form in forms for path in write[form](case, flows, predicted, into, words)]
     return Exported(tuple(files), words)
