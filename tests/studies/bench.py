@@ -8,6 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import loop
 import numpy as np
 import scale
 import startup
@@ -59,6 +60,7 @@ def main() -> None:
     whole(on_grid(case, (300.0, 471.0), (0.5, 0.375)))
     sizes(case)
     cores(case)
+    loop.main()
     scale.spread()
 
 
