@@ -1,6 +1,6 @@
 """One run of a command: started in a folder of its own, watched, stopped when it takes too long, and its files read.
 
-The only place of the package that starts a program.
+The only place of the package that starts a program which a config names.
 """
 
 import os

@@ -10,7 +10,7 @@ Source: first-order correction of one model by another (Alexandrov and Lewis 200
 checked against it).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,10 +20,9 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import FURTHEST, theta_at
 from vegglue.engine.command_runs import CommandRuns, command_predictions, own_parameters
-from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point
+from vegglue.engine.interface import Cause, Engine, Model, Point
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
-from vegglue.flow.local_changes import Term
 from vegglue.progress import Watch, silent
 
 # Share of a difference [-] that is bend or noise, above which a slope is told to be rough: root mean square over
@@ -58,8 +57,8 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) 
         linearise=partial(_linearised, correction),
         predict=partial(_predicted, runs, watch),
         responses=partial(_responses, correction),
-        responses_to_cells=_responses_to_cells,
-        flow_at_centres=_flow_at_centres,
+        responses_to_cells=NEWTON.responses_to_cells,
+        flow_at_centres=NEWTON.flow_at_centres,
     )
 
 
@@ -142,11 +141,11 @@ def _correction_in(correction: Correction, model: Model, z: Array) -> tuple[Arra
     """What is added to predictions (n,) and slopes (n, p) of the built-in engine at z (p,)."""
     known = {key: row for row, key in enumerate(correction.station[SAME_STATION].itertuples(index=False, name=None))}
     keys = model.station[SAME_STATION].itertuples(index=False, name=None)
-    rows = np.array([known.get(key, len(known)) for key in keys], dtype=np.int64)
+    rows = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
     columns = [model.names.index(name) for name in correction.names]
     nothing = np.zeros((1, len(columns)))
-    of_stations = np.vstack([correction.slope, nothing])[np.where(rows == len(known), -1, rows)]
-    value = np.append(correction.value, 0.0)[np.where(rows == len(known), -1, rows)]
+    of_stations = np.vstack([correction.slope, nothing])[rows]
+    value = np.append(correction.value, 0.0)[rows]
     slope = np.zeros((rows.size, z.size))
     slope[:, columns] = of_stations
     return value + of_stations @ (z[columns] - correction.z), slope
@@ -179,11 +178,3 @@ def _predicted(runs: CommandRuns, watch: Watch, model: Model, points: Sequence[P
 def _responses(correction: Correction, model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     value, _ = _correction_in(correction, model, point.z)
     return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
-
-
-def _responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:
-    return NEWTON.responses_to_cells(model, point, experiment, terms)
-
-
-def _flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
-    return NEWTON.flow_at_centres(model, point, experiment)

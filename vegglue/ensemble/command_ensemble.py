@@ -12,7 +12,14 @@ from vegglue.case.parameter_space import PriorSample, sample_of, sobol_sample
 from vegglue.case.schema import Case
 from vegglue.engine.command_run import CommandEnd
 from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
-from vegglue.ensemble.solve_ensemble import Rows, make_header, refuse_too_many, section_positions, solved_members
+from vegglue.ensemble.solve_ensemble import (
+    Rows,
+    left_to_do,
+    make_header,
+    refuse_too_many,
+    section_positions,
+    solved_members,
+)
 from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch, silent
 from vegglue.solver.status import FAILED, RUN_BY_COMMAND
@@ -31,10 +38,7 @@ def run_ensemble(
     sample, names = sobol_sample(case), own_parameters(case)
     chunks = [np.array([member]) for member in range(case.simulate.members)]  # a run costs more than to write it down
     with ensemble_writer(path, make_header(case, observations, sample.theta, chunks, None)) as writer:
-        if writer.set_aside is not None:
-            watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
-        writer.reopen_damaged(chunks)
-        todo = [index for index in range(len(chunks)) if index not in writer.done]
+        todo = left_to_do(writer, case, chunks, watch)
         resumed, failed, phase = len(chunks) - len(todo), 0, f"running the command of {case.name}"
         watch(Progress(phase, resumed, len(chunks), "members", failed, resumed))
         added = _added_by_effects(case, observations, sample, names, jobs)  # of all: chunks decide their last digits
