@@ -39,3 +39,11 @@ def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
     coarse: Case = case.model_copy(update={"grid": case.grid.model_copy(update={"cell": cell})})
     on_coarse = build_site(coarse)
     return None if any(ranges_without_cells(coarse, on_coarse.grid)) else (coarse, on_coarse)
+
+
+def ever_coarser(case: Case, site: Site) -> list[tuple[Case, Site]]:
+    """The case on its grid and on ever coarser ones, the coarsest first."""
+    grids = [(case, site)]
+    while (coarse := coarser_grid(*grids[0])) is not None:
+        grids.insert(0, coarse)
+    return grids

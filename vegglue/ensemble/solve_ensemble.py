@@ -16,7 +16,7 @@ from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, 
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_PREDICTIONS
-from vegglue.engine.model import coarser_grid
+from vegglue.engine.model import ever_coarser
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.problem import Problem, take
 from vegglue.flow.problem_setup import build_problem
@@ -35,16 +35,16 @@ from vegglue.solver.nested_grids import GridProblem, solve_nested
 from vegglue.solver.parameter_metric import clusters, parameter_metric
 from vegglue.solver.reference_member import LinearisedMember, linearised_median
 from vegglue.solver.status import FAILED, members_with
-from vegglue.storage.resume import ensemble_writer
+from vegglue.storage.resume import EnsembleWriter, ensemble_writer
 from vegglue.version import VERSION
 
 # Members of a chunk at most, to share what leads to the first of them, and chunks at least, to share the cores [-].
 # Chosen, not measured: smaller chunks share the work more evenly and lose less when a run is killed, larger ones reach
 # fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
-# Members [-] up to which each is solved on coarser cells first. Of 64 on 9,600 cells that takes half the time, of 256
-# as long as neighbours alone (DECISIONS). Chunks then hold SPARSE_CHUNK at most: of 16 they share less, 64 leave a core
-# idle.
+# Members [-] up to which each is solved on coarser cells first. Of 64 on 9,600 cells that takes two thirds of the time
+# of one core, of 256 as long as neighbours alone (DECISIONS). Chunks then hold SPARSE_CHUNK at most: of 16 they share
+# less, 64 leave a core idle.
 SPARSE_MEMBERS, SPARSE_CHUNK = 128, 32
 # Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
 READ_TOGETHER = 16
@@ -67,10 +67,7 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
-        if writer.set_aside is not None:
-            watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
-        writer.reopen_damaged(chunks)
-        todo = [index for index in range(len(chunks)) if index not in writer.done]
+        todo = left_to_do(writer, case, chunks, watch)
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed, phase = resumed, 0, f"solving {case.name}"
         watch(Progress(phase, solved, header.members, "members", failed, resumed))
@@ -79,6 +76,14 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
             writer.append(index, chunks[index], rows, fields)
             solved, failed = solved + chunks[index].size, failed + members_with(rows["status"], FAILED)
             watch(Progress(phase, solved, header.members, "members", failed, resumed))
+
+
+def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
+    """Chunks that an earlier run has not finished, or that are damaged since; what was set aside is told."""
+    if writer.set_aside is not None:
+        watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
+    writer.reopen_damaged(chunks)
+    return [index for index in range(len(chunks)) if index not in writer.done]
 
 
 def refuse_too_many(case: Case, observations: Observations) -> None:
@@ -155,10 +160,11 @@ def solve_chunk(
     if not given.
     """
     rows = _no_rows(case, site, observations, len(sample.points))
+    coarse = [] if start_from else ever_coarser(case, site)[:-1]
     for experiment in case.experiments:
         began = time.perf_counter()
         problem = build_problem(case, site, experiment, sample.theta)
-        solved = _solved_in(case, site, experiment, sample, problem, start_from)
+        solved = _solved_in(case, site, experiment, sample, problem, start_from, coarse)
         _read_all(case, site, observations, experiment, problem, solved, rows)
         rows["status"] = np.maximum(rows["status"], solved.status.astype(np.int8))
         rows["iterations"] += solved.iterations.astype(np.int32)
@@ -193,14 +199,23 @@ def _kept_columns(window: FieldWindow | None) -> slice:
 
 
 def _solved_in(
-    case: Case, site: Site, experiment: str, sample: PriorSample, problem: Problem, start_from: StartFrom | None
+    case: Case,
+    site: Site,
+    experiment: str,
+    sample: PriorSample,
+    problem: Problem,
+    start_from: StartFrom | None,
+    coarse: list[tuple[Case, Site]],
 ) -> SolvedMembers:
-    """The members in one experiment, from a member they all come from, or from coarser cells."""
+    """The members in one experiment, from a member they all come from, or from coarser cells, the coarsest first."""
     build, tolerance = partial(_problem_at, case, site, experiment), case.numerics.tolerance
     if start_from:
         return solve_members(problem, sample.points, build, tolerance, start_from[experiment], _fall_back(case))
-    grids = [*_coarser_grids(case, site, experiment, sample), GridProblem(problem, build)]
-    return solve_nested(grids, sample.points, tolerance, _fall_back(case))
+    grids = [
+        GridProblem(build_problem(*place, experiment, sample.theta), partial(_problem_at, *place, experiment))
+        for place in coarse
+    ]
+    return solve_nested([*grids, GridProblem(problem, build)], sample.points, tolerance, _fall_back(case))
 
 
 def _read_all(
@@ -228,17 +243,6 @@ def _read_all(
         rows["section_flow"][few, number] = readings.section_flow
         rows["fields"][few, number] = readings.fields
         rows["mass_error"][few] = np.maximum(rows["mass_error"][few], readings.mass_error)
-
-
-def _coarser_grids(case: Case, site: Site, experiment: str, sample: PriorSample) -> list[GridProblem]:
-    """The members on coarser grids, the coarsest first."""
-    found: list[GridProblem] = []
-    coarse = coarser_grid(case, site)
-    while coarse is not None:
-        problem = build_problem(*coarse, experiment, sample.theta)
-        found.insert(0, GridProblem(problem, partial(_problem_at, *coarse, experiment)))
-        coarse = coarser_grid(*coarse)
-    return found
 
 
 def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:

@@ -17,7 +17,7 @@ from vegglue.calibration.fit import MapEstimate, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error
 from vegglue.case.parameter_space import z_at
 from vegglue.engine.interface import Model, Point, linearise
-from vegglue.engine.model import coarser
+from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
 from vegglue.parallel import side_by_side
@@ -28,8 +28,8 @@ from vegglue.screening.residual_screening import screen
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
 # prior]. Chosen, not measured: more starts find more modes and each costs a fit.
 MOST_STARTS, BEST_MEMBERS, START_DISTANCE = 4, 64, 0.7
-# Grids that fits go through: chosen. On the third a run costs a fifth (the search for modes of the demo takes 24 s of
-# one core, not 31); a fourth hardly resolves a section.
+# Grids that fits go through: chosen. With the third the search for modes of the demo takes 24 s of one core, not 31; a
+# fourth hardly resolves a section.
 MOST_GRIDS = 3
 # Rise of the objective [-] above that of the best mode from which a mode is left out: its weight is below exp(-15).
 NEGLIGIBLE_MODE = 30.0
@@ -49,21 +49,14 @@ def find_modes(model: Model, noise: Noise, ensemble: Ensemble, watch: Watch = si
     Errors: InputError when no steady flow is found from any of the members.
     """
     starts = starting_points(noise, z_at(model.case, ensemble.parameters), ensemble.prediction)
-    grids = _grids_of(model)
+    places = ever_coarser(model.case, model.site)[-MOST_GRIDS:]
+    grids = [replace(model, case=case, site=site) for case, site in places]
     ends = _apart(_fit_all(grids[0], noise, starts, watch))
     for coarse, finer in pairwise(grids):
         ends = distinct_modes(_refine_all(finer, coarse, noise, ends, watch))
     if not ends:
         raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
     return FoundModes(tuple(ends), len(starts))
-
-
-def _grids_of(model: Model) -> list[Model]:
-    """The model on cells of up to four times the size, the coarsest first, and on its own."""
-    grids = [model]
-    while len(grids) < MOST_GRIDS and (coarse := coarser(grids[0])) is not None:
-        grids.insert(0, coarse)
-    return grids
 
 
 def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:

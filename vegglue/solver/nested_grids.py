@@ -15,20 +15,26 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.flow.problem import Problem, crop, take
-from vegglue.solver.batch import MEMBER_LANES, SPLINE_MEMBERS, SolvedMembers, none_solved, solve_members
+from vegglue.solver.batch import (
+    MEMBER_LANES,
+    SPLINE_MEMBERS,
+    STRIDE_TOLERANCE,
+    SolvedMembers,
+    blend,
+    none_solved,
+    solve_members,
+)
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.march import FallBack
 from vegglue.solver.parameter_metric import metric_of_flows, nearest_members, squared_distances
 from vegglue.solver.prolongation import on_grid
-from vegglue.solver.reference_member import ProblemOf, marched, settled
+from vegglue.solver.reference_member import ProblemOf, solve_alone
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import overflows, rows_inside, widen
 
 # Steps after which a member waits for a nearer reference: of 15, 20, 30 and 40 the last was the fastest for 64 members
 # of a site of 9,600 cells whose priors span three decades.
 MOST_NESTED_STEPS = 40
-# The correction [m, m/s] to which members are solved on coarser cells: chosen, not measured. They only lead on.
-COARSE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,7 +70,7 @@ def solve_nested(grids: Sequence[GridProblem], points: Array, tolerance: float, 
     """Steady states of all members on the last grid, the finest, each of twice as many cells as the one before along
     one axis or both; points (m, d): where they are in the unit cube.
     """
-    loose = max(tolerance, COARSE_TOLERANCE)
+    loose = max(tolerance, STRIDE_TOLERANCE)
     coarsest, *finer = grids
     solved = solve_members(coarsest.problem, points, coarsest.problem_of, loose if finer else tolerance, how=how)
     coordinates = metric_of_flows(points, solved.state).coordinates
@@ -91,30 +97,24 @@ def _solve_level(level: _Level, tolerance: float, how: FallBack) -> None:
 
 def _solve_around(level: _Level, member: int, pending: np.ndarray, tolerance: float, how: FallBack) -> None:
     """A member by itself, and those pending that its factors lead to, the nearest first."""
-    solved, rows, alone = level.solved, level.problem.shape[1], np.array([member])
-    problem = take(level.problem, alone)
+    solved, alone = level.solved, np.array([member])
     warm = _starts(level, alone) if level.known[member] else None
-    for start in [warm, None] if warm is not None else [None]:
-        end, shared, band = settled(problem, start, tolerance)
-        solved.iterations[member] += int(end.iterations[0])
-        if shared is not None:
-            break
-    else:
-        found = marched(problem, 0, tolerance, how)
-        solved.status[member], solved.reason[member] = found.status, found.reason
-        solved.iterations[member] += found.iterations
-        solved.state[..., member] = found.state[..., 0]
+    reference = solve_alone(take(level.problem, alone), warm, tolerance, how)
+    solved.iterations[member] += reference.iterations
+    if reference.factors is None:
+        solved.status[member], solved.reason[member] = reference.status, reference.reason
+        solved.state[..., member] = reference.state[..., 0]
         return
-    level.keep(alone, widen(end.state, rows, band))
+    level.keep(alone, reference.state)
     near = squared_distances(level.coordinates[pending], level.coordinates[member])
     queue = pending[np.argsort(near, kind="stable")]
-    queue, part = queue[level.known[queue]], crop(level.problem, *band)
+    queue, part = queue[level.known[queue]], crop(level.problem, *reference.band)
 
     def starts_of(members: np.ndarray) -> Array:
-        return rows_inside(_starts(level, members), band)
+        return rows_inside(_starts(level, members), reference.band)
 
-    deliver = partial(_delivered, level, part, band)
-    stream(part, queue, starts_of, shared, tolerance, MOST_NESTED_STEPS, MEMBER_LANES, deliver)
+    deliver = partial(_delivered, level, part, reference.band)
+    stream(part, queue, starts_of, reference.factors, tolerance, MOST_NESTED_STEPS, MEMBER_LANES, deliver)
 
 
 def _delivered(level: _Level, part: Problem, band: tuple[int, int], members: np.ndarray, ended: ChordSolution) -> None:
@@ -138,4 +138,4 @@ def _starts(level: _Level, members: np.ndarray) -> Array:
     near = nearest_members(coordinates, done, coordinates[members].mean(axis=0), SPLINE_MEMBERS)
     kernel, degree = ("cubic", 1) if near.size >= 3 * (coordinates.shape[1] + 1) else ("linear", 0)
     spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel=kernel, degree=degree)
-    return start + np.tensordot(level.changed[near], spline(coordinates[members]), axes=(0, 1))
+    return start + blend(level.changed, near, spline(coordinates[members]), 0, start.shape[2])

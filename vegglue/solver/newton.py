@@ -36,11 +36,8 @@ def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, tim
     nowhere = np.zeros(start.shape[2], dtype=bool)
     for iteration in range(1, most + 1):
         slope = slope_of_friction(problem, state)
-        rates, columns_far, stored = (
-            eased(problem, state, slope, nowhere),
-            jacobian(problem, state),
-            _stored(problem, state),
-        )
+        rates, columns_far = eased(problem, state, slope, nowhere), jacobian(problem, state)
+        stored = _stored(problem, state)
         step, time_step = _bounded_step(rates, columns_far, stored, time_step)
         size = float(np.abs(step).max())
         if not size < LONGEST_CORRECTION:

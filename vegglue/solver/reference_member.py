@@ -46,8 +46,8 @@ class LinearisedMember:
 
 @dataclass(frozen=True)
 class ReferenceMember:
-    """A member that others lean on: its state (nx, 3, ny, 1) and, unless it had to be marched, its tangents and the
-    factors in its band of rows.
+    """A member that others lean on: its state (nx, 3, ny, 1) and, unless it had to be marched, the factors in its band
+    of rows and, where they were asked for, its tangents.
     """
 
     state: Array
@@ -70,25 +70,31 @@ def linearised_median(
 def solve_reference(
     problem_of: ProblemOf, problem: Problem, point: Array, warm: Array | None, tolerance: float, how: FallBack
 ) -> ReferenceMember:
-    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching.
+    """A member solved alone, with its tangents. problem: of the one member at the point."""
+    alone = solve_alone(problem, warm, tolerance, how)
+    return alone if alone.factors is None else _with_tangents(problem_of, problem, point, alone)
 
-    problem: of the one member at the point.
+
+def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: FallBack) -> ReferenceMember:
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching. Without
+    tangents.
     """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
         solution, shared, band = settled(problem, start, tolerance)
         spent += int(solution.iterations[0])
-        if shared is None:
-            continue
-        return _reference(problem_of, problem, point, band, solution.state, shared, spent)
-    return marched(problem, spent, tolerance, how)
+        if shared is not None:
+            state = widen(solution.state, problem.shape[1], band)
+            return ReferenceMember(state, SOLVED_BY_NEWTON, "", spent, None, shared, band)
+    return _marched(problem, spent, tolerance, how)
 
 
 def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
     """A member already solved, its state (nx, 3, ny, 1), as a reference."""
     band = wet_band(problem, state)
-    near = rows_inside(state, band)
-    return _reference(problem_of, problem, point, band, near, factors(crop(problem, *band), near), 0)
+    shared = factors(crop(problem, *band), rows_inside(state, band))
+    solved = ReferenceMember(state, SOLVED_BY_NEWTON, "", 0, None, shared, band)
+    return _with_tangents(problem_of, problem, point, solved)
 
 
 def reference_beside(
@@ -159,19 +165,13 @@ def _checked(
     return solution, shared, band
 
 
-def _reference(
-    problem_of: ProblemOf,
-    problem: Problem,
-    point: Array,
-    band: tuple[int, int],
-    state: Array,
-    shared: Factors,
-    spent: int,
-) -> ReferenceMember:
-    part, ny = crop(problem, *band), problem.shape[1]
-    slopes = tuple(widen(slope, ny, band) for slope in _tangents(problem_of, point, part, band, state, shared))
-    wide = widen(state, ny, band)
-    return ReferenceMember(wide, SOLVED_BY_NEWTON, "", spent, LinearisedMember(point, wide, slopes), shared, band)
+def _with_tangents(problem_of: ProblemOf, problem: Problem, point: Array, solved: ReferenceMember) -> ReferenceMember:
+    """A reference with factors, and its tangents at the point."""
+    assert solved.factors is not None
+    part, near = crop(problem, *solved.band), rows_inside(solved.state, solved.band)
+    slopes = _tangents(problem_of, point, part, solved.band, near, solved.factors)
+    wide = tuple(widen(slope, problem.shape[1], solved.band) for slope in slopes)
+    return replace(solved, linearised=LinearisedMember(point, solved.state, wide))
 
 
 def _tangents(
@@ -186,7 +186,7 @@ def _tangents(
     return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
 
 
-def marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
+def _marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
     """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
     start = backwater(problem)
     marched = march_to_rest(problem, start, tolerance, how)
