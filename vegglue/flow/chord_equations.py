@@ -60,12 +60,12 @@ def carry_thin(
     problem: Problem, values: Array, state: Array, thin: NDArray[np.bool_], thick: Array, back: bool = False
 ) -> None:
     """Velocities (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
-    thin_water.stretch(values, state, thin, *problem.wetting, thick, back)
+    thin_water.stretch(values, state, thin, *problem.wetting, thick, np.inf, back)
 
 
 def weigh_thin(problem: Problem, rates: Array, state: Array, thin: NDArray[np.bool_], thick: Array) -> None:
-    """Rows of momentum (nx, 3, ny, m) of thin faces weighed by rho at the levels of a state, in place."""
-    thin_water.weigh(rates, state, thin, *problem.wetting, thick)
+    """Rows of momentum (nx, 3, ny, m) of thin faces times rho, those across at most times one, in place."""
+    thin_water.stretch(rates, state, thin, *problem.wetting, thick, 1.0, False)
 
 
 def largest_correction(problem: Problem, step: Single, state: Array, thin: NDArray[np.bool_], thick: Array) -> Array:

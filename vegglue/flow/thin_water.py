@@ -148,9 +148,9 @@ def _rho(h: float, reference: float, per_thin: float) -> float:
 
 
 @compiled
-def stretch(values, state, faces, bed, rise, half_range, film, thick, back):
-    """Velocities of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place; values (nx,
-    3, ny, m).
+def stretch(values, state, faces, bed, rise, half_range, film, thick, most_across, back):
+    """Velocities or rows of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place;
+    across the channel by at most `most_across`. values (nx, 3, ny, m).
     """
     nx, _, ny, m = state.shape
     per_thin = 1.0 / (THIN * film)
@@ -164,27 +164,9 @@ def stretch(values, state, faces, bed, rise, half_range, film, thick, back):
                 for k in range(m):
                     h = wet_depth(_above(state, bed, rise, i, j, a, b, k), wide, film)
                     rho = _rho(h, reference, per_thin)
+                    if e == 1:
+                        rho = min(rho, most_across)
                     values[i, e, j, k] *= 1.0 / rho if back else rho
-
-
-@compiled
-def weigh(rates, state, faces, bed, rise, half_range, film, thick):
-    """Rows of momentum of some faces (nx, 3, ny) times rho at the levels of a state, in place, those across the channel
-    at most times one; rates (nx, 3, ny, m).
-    """
-    nx, _, ny, m = state.shape
-    per_thin = 1.0 / (THIN * film)
-    for i in range(nx):
-        for e in (1, 2):
-            for j in range(ny):
-                if not faces[i, e, j]:
-                    continue
-                a, b = _beyond(i, e, j)
-                wide, reference = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j]
-                for k in range(m):
-                    h = wet_depth(_above(state, bed, rise, i, j, a, b, k), wide, film)
-                    rho = _rho(h, reference, per_thin)
-                    rates[i, e, j, k] *= min(rho, 1.0) if e == 1 else rho
 
 
 @compiled
