@@ -105,10 +105,33 @@ def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
 def test_what_nobody_said_is_told(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "site", eddy_viscosity=0.02, holdout={})
     assert assumptions_of(folder) == [
-        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01.",
+        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01, to within a factor of 2.",
         "site.json: taken as notes, and not read: eddy_viscosity.",
         "holdout.csv is not read: site.json names no experiment under `holdout`.",
     ]
     bare = field_folder(tmp_path / "bare", patches=[])
     assert "no plants" in assumptions_of(bare)[0]
     assert assumptions_of(field_folder(tmp_path / "whole", eddy_viscosity_m2_s=0.01)) == []
+
+
+@pytest.mark.parametrize(
+    ("said", "value", "median", "log_sd"),
+    [
+        ({}, "eddy_viscosity", 0.01, 0.6931),
+        ({"eddy_viscosity_m2_s": 0.02}, 0.02, None, None),
+        ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 3}, "eddy_viscosity", 0.02, 1.0986),
+        ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 1}, 0.02, None, None),
+    ],
+)
+def test_a_viscosity_that_is_not_surely_known_is_calibrated(
+    said: dict[str, float], value: float | str, median: float | None, log_sd: float | None, tmp_path: Path
+) -> None:
+    case = import_folder(field_folder(tmp_path / "site", **said), tmp_path / "site.yaml")
+    prior = case.parameters.get("eddy_viscosity")
+    assert case.eddy_viscosity == value
+    assert (prior.median, prior.log_sd) == (median, log_sd) if prior else median is None
+
+
+def test_a_factor_below_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="eddy_viscosity_factor"):
+        import_folder(field_folder(tmp_path / "site", eddy_viscosity_factor=0.5), tmp_path / "site.yaml")

@@ -1,5 +1,6 @@
 """What configs made of folders have in common: priors, tables of measurements, and the settings of a first look."""
 
+import math
 from typing import Any
 
 from vegglue.case.resolved_config import Tree
@@ -10,6 +11,10 @@ MANNING_BED = {"law": "manning", "n": "n_b"}
 # laws or one patch of stones and the next, the bed by what a levelled survey is off. Chosen before the sets that it is
 # judged by; the diagnosis says how much of it is needed.
 MODEL_ERROR: Tree = {"model_error": {"friction": 0.05, "bed": 0.01}}
+# Name of the eddy viscosity among the parameters, and the factor by which one that nobody knows is off at one standard
+# deviation: transverse mixing is 0.1 to 0.2 h u* in straight flumes and 0.3 to 0.9 h u* in streams (Fischer et al.
+# 1979, Mixing in inland and coastal waters, chapter 5; not checked against it).
+VISCOSITY, VISCOSITY_FACTOR = "eddy_viscosity", 2.0
 # 256 members show within a minute or two what a case is like; all errors are those stated with the data.
 FIRST_LOOK: Tree = {"simulate": {"members": 256, "seed": 1}, "infer": {"sigma": "known"}, **MODEL_ERROR}
 
@@ -32,6 +37,12 @@ def lognormal_prior(median: float, log_sd: float, unit: str, symbol: str, meanin
 def bed_prior(low: float, high: float) -> Tree:
     """The prior of n_b of MANNING_BED [s m^(-1/3)]."""
     return loguniform_prior(low, high, "s m^(-1/3)", "n_b", "Manning coefficient of the bed")
+
+
+def viscosity_prior(stated: float, factor: float) -> Tree:
+    """The prior of an eddy viscosity [m2/s] that is known to within a factor."""
+    log_sd = round(math.log(factor), 4)
+    return lognormal_prior(stated, log_sd, "m2/s", "ν", f"eddy viscosity, known to within a factor of {factor:g}")
 
 
 def observed(kind: str, file: str, experiment: str | None = None) -> Tree:

@@ -2,8 +2,9 @@
 
 site.json or site.yaml says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at
 x = 0, y = 0 on the axis) or bed (a survey; see surveyed_bed.py), patches (x, y, stems_per_m2, or a file of polygons),
-canopy_height_guess_m, eddy_viscosity_m2_s, experiments (discharge_m3_s, downstream_level_m), and, where needed, frame
-(site_file.py) and files (file_words.py). What is not said there is left at the defaults below.
+canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to, experiments (discharge_m3_s,
+downstream_level_m), and, where needed, frame (site_file.py) and files (file_words.py). What is not said there is left
+at the defaults below.
 """
 
 import math
@@ -17,12 +18,14 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MANNING_BED,
+    VISCOSITY,
     bed_prior,
     even,
     loguniform_prior,
     normal_prior,
     observed,
     validated,
+    viscosity_prior,
 )
 from vegglue.importers.measured_files import MeasuredFiles, measured_files, named_from
 from vegglue.importers.polygon_files import read_polygons
@@ -56,9 +59,9 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         **_ground(folder, target, site, frame, measured),
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
-        "eddy_viscosity": site.eddy_viscosity_m2_s,
+        "eddy_viscosity": VISCOSITY if site.viscosity_factor > 1 else site.eddy_viscosity_m2_s,
         "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
-        "parameters": dict(PARAMETERS),
+        "parameters": PARAMETERS | _viscosity(site),
         "observations": measured.observations,
         **FIRST_LOOK,
     }
@@ -112,6 +115,12 @@ PARAMETERS: Tree = {
     "k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks"),
 }
 PHI = loguniform_prior(0.02, 100.0, "-", "φ", "drag of the densest patches")
+
+
+def _viscosity(site: FieldSite) -> Tree:
+    """The prior of the eddy viscosity by its name; none where it is taken for right."""
+    stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
+    return {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
 
 
 def _canopy(guess: float) -> Tree:

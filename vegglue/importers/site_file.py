@@ -15,6 +15,7 @@ from vegglue.case.parts import Interval, Number, Polygon, Positive
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.config_parts import VISCOSITY_FACTOR
 from vegglue.importers.unit_words import UNITS, in_si
 
 
@@ -164,6 +165,14 @@ class FieldSite(_Said):
     patches: Annotated[tuple[PlantedPatch, ...], BeforeValidator(_as_list)] = ()
     canopy_height_guess_m: Annotated[Number, Field(ge=0.01, le=100)] = 0.8
     eddy_viscosity_m2_s: Annotated[Number, Field(gt=0, le=1e3)] = 0.01
+    eddy_viscosity_factor: Annotated[Number, Field(ge=1, le=100)] | None = None
+
+    @property
+    def viscosity_factor(self) -> float:
+        """To within which factor the eddy viscosity is known; one that is stated alone is taken for right."""
+        if self.eddy_viscosity_factor is not None:
+            return self.eddy_viscosity_factor
+        return 1.0 if "eddy_viscosity_m2_s" in self.model_fields_set else VISCOSITY_FACTOR
 
     @model_validator(mode="before")
     @classmethod
@@ -217,7 +226,8 @@ def left_open(folder: Path) -> list[str]:
     site, given = read_site(path), read_tree(path) if path.suffix == ".yaml" else _of_json(path)
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
-        assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}")
+        within = f", to within a factor of {site.viscosity_factor:g}" if site.viscosity_factor > 1 else ""
+        assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}{within}")
     if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
         assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
     if site.patches and not any("stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None):
