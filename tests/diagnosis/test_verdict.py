@@ -90,24 +90,25 @@ def test_an_instrument_alone_is_named_only_where_silence_is_earned(why: str) -> 
     assert "Nothing else is missing" in sentence
 
 
-def test_silence_is_not_earned_where_errors_of_the_site_blur_the_flow() -> None:
-    kind, sentence, _ = said(grounds(blur=1.5))
+def test_silence_is_not_earned_where_the_model_may_miss_between_the_sections() -> None:
+    kind, sentence, _ = said(grounds(between=1.5))
     assert kind == "cannot-tell"
-    assert "blur its velocities to 1.5 times the errors of the data" in sentence
-    assert said(grounds(blur=1.2))[0] == "nothing-missing"
+    assert "the model may miss by as much as 1.5 times the errors of the data" in sentence
+    assert said(grounds(between=1.2))[0] == "nothing-missing"
+    assert said(grounds(between=float("nan")))[0] == "nothing-missing"
 
 
-def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_blurred() -> None:
+def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_unsure() -> None:
     """0.1 m/s is clear with a standard error of 0.010 m/s; with 0.026 it is 3.9 of them. It is told all the same."""
     clear, faint = an_instrument(), an_instrument(interval95=(0.05, 0.15))
-    kind, sentence, _ = said(grounds(instruments=(clear,), blur=1.5))
+    kind, sentence, _ = said(grounds(instruments=(clear,), between=1.5))
     assert kind == "instrument"
-    assert "it was set aside. Nothing else stands out, but errors of the model" in sentence
-    kind, sentence, remarks = said(grounds(instruments=(faint,), blur=1.5))
+    assert "it was set aside. Nothing else stands out, but where nobody measured" in sentence
+    kind, sentence, remarks = said(grounds(instruments=(faint,), between=1.5))
     assert kind == "cannot-tell"
     assert "it was set aside" not in sentence
     assert "is off by 0.1 m/s (0.05 to 0.15); it was set aside." in remarks
-    assert said(grounds(instruments=(clear, faint), blur=1.5))[0] == "cannot-tell"
+    assert said(grounds(instruments=(clear, faint), between=1.5))[0] == "cannot-tell"
 
 
 def test_an_instrument_that_is_off_a_little_is_no_verdict() -> None:

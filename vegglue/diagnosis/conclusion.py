@@ -7,6 +7,7 @@ import scipy.stats
 
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, interval95
+from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.competition import LEAST_ODDS, tempering
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
@@ -16,7 +17,6 @@ from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged
 from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
-from vegglue.measurements.kinds import STREAMWISE
 from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
@@ -40,9 +40,6 @@ COMPARED = 12
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
-# ln of the likelihood ratio up to which a share is not rejected: one side of 95 % of chi2 with one degree of freedom.
-NOT_REJECTED = 1.35
-
 
 def concluded(
     first: Screening, last: Screening, found: Findings, suspects: Mapping[str, Suspect], unseen: Model | None
@@ -50,7 +47,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit, errors = _misfit(first, last, found), _errors(last, found)
-    model_error, possible_share = _model_error(last)
+    model_error = _model_error(last)
     field, field_map = _field(first, last, found, misfit)
     silent = not (found.steps or found.places or found.undecided)
     grounds = Grounds(
@@ -63,7 +60,7 @@ def concluded(
         unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),
-        blur=_blur(last, possible_share),
+        between=largest_error_between(last.base) if silent else 1.0,
     )
     base, before = last.base, first.base
     return Diagnosis(
@@ -122,37 +119,19 @@ def _errors(screening: Screening, found: Findings) -> EstimatedErrors:
     return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid_error), flagged)
 
 
-def _model_error(screening: Screening) -> tuple[ModelErrorUsed | None, float]:
-    """By how much the model may be wrong, the share of it that the residual makes likeliest, None where none is
-    allowed; and the largest share up to all that is allowed, or needed, that the residual does not reject.
+def _model_error(screening: Screening) -> ModelErrorUsed | None:
+    """By how much the model may be wrong, and the share of it that the residual makes likeliest; None where none is
+    allowed.
     """
     search, allowed = screening.search, screening.base.model.case.model_error
     noise = search.noise
     if not noise.model_error.any():
-        return None, 0.0
+        return None
     whole, residual = free_of_prior(search)
     logs = [log_density_of_residual(whole + (share**2 - 1.0) * noise.model_error, residual) for share in ERROR_SHARES]
     best = int(np.argmax(logs))
     gained = float(logs[best] - logs[ERROR_SHARES.index(1.0)])
-    needed = ERROR_SHARES[best]
-    possible = [
-        share
-        for share, log in zip(ERROR_SHARES, logs, strict=True)
-        if log > logs[best] - NOT_REJECTED and share <= max(1.0, needed)
-    ]
-    return ModelErrorUsed(allowed.friction, allowed.bed, needed, gained), max(possible)
-
-
-def _blur(screening: Screening, share: float) -> float:
-    """((s^2 + a^2 m^2) / s^2)^(1/2) over velocities: s their errors, m the model's own error where they stand, a the
-    share of it that counts.
-    """
-    noise = screening.base.noise
-    velocity = screening.base.model.station["kind"].to_numpy()[noise.rows] == STREAMWISE
-    if not velocity.any():
-        return 1.0
-    own = np.diag(noise.model_error)[velocity].mean() / np.mean(noise.data_error[velocity] ** 2)
-    return float(np.sqrt(1.0 + share**2 * own))
+    return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
 
 
 def _field(

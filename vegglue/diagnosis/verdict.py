@@ -62,8 +62,7 @@ AT_BOUND = 0.01
 class Grounds:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
     neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
-    far; blur: errors of predicted velocities over those of the data [-], with as much of the model's own error as the
-    residual does not reject.
+    far; between: errors between the sections that were measured, over those of the data [-], at most.
     """
 
     errors: EstimatedErrors
@@ -75,7 +74,7 @@ class Grounds:
     unseen: float
     neighbours: bool
     strained: tuple[str, float]
-    blur: float = 1.0
+    between: float = 1.0
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
@@ -163,8 +162,8 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
     unearned = _unearned(grounds)
     if unearned:
         return "cannot-tell", f"Nothing stands out ({_told(misfit)}), but {unearned}."
-    if grounds.blur > UNSEEN_RATIO:
-        return _blurred(grounds)
+    if grounds.between > UNSEEN_RATIO:
+        return _unsure_between(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
         return (
             "cannot-tell",
@@ -181,16 +180,17 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
     return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
 
 
-def _blurred(grounds: Grounds) -> tuple[VerdictKind, str]:
-    """Silence, or an instrument, where the model's own error may blur velocities by more than UNSEEN_RATIO."""
+def _unsure_between(grounds: Grounds) -> tuple[VerdictKind, str]:
+    """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
     instruments = grounds.findings.instruments
-    blurred = (
-        "errors of the model and of what is told of its site, as they are allowed and not ruled out, blur its "
-        f"velocities to {grounds.blur:.1f} times the errors of the data: a missing effect may hide in them"
+    unsure = (
+        "where nobody measured, halfway between the sections, the model may miss by as much as "
+        f"{grounds.between:.1f} times the errors of the data, by its own errors, those of its site and its parameters, "
+        "as far as these data know them: a missing effect may hide in that"
     )
     if instruments and all(_is_clear(one) for one in instruments):
-        return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {blurred}."
-    return "cannot-tell", f"Nothing stands out ({_told(grounds.misfit)}), but {blurred}."
+        return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {unsure}."
+    return "cannot-tell", f"Nothing stands out ({_told(grounds.misfit)}), but {unsure}."
 
 
 def _is_clear(instrument: FaultyInstrument) -> bool:
@@ -250,7 +250,7 @@ def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     one = "one more effect hide beside it" if something_named else "exactly one effect hide here"
     said = (
-        f"Should {one}, of about three standard errors, nine times of ten it is one of these, "
+        f"Should {one}, of about three standard errors, it is most likely one of these, "
         f"the likeliest first: {', '.join(names[:NAMES_SHOWN])}{more}; what is smaller may be any."
     )
     return [said] if names else []

@@ -1,0 +1,82 @@
+"""Errors where nobody measured: those told are the largest of 95 in 100 models drawn as the assumptions have it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.noise import with_model_error
+from vegglue.diagnosis.between_sections import halfway, largest_error_between
+from vegglue.engine.interface import Model, Point
+
+SECTIONS, POINTS, PARAMETERS, COLUMNS, ERROR = ("A",), 12, 3, 5, 0.01
+STATION = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Slopes (station, p) and columns of the model's error (station, k), of stations and of those between sections."""
+
+    slope: Array
+    columns: Array
+
+
+def linear(seed: int, error_of_model: float) -> Linear:
+    random = np.random.default_rng((seed, 1))
+    return Linear(
+        0.05 * random.standard_normal((2 * len(STATION), PARAMETERS)),
+        error_of_model * random.standard_normal((2 * len(STATION), COLUMNS)),
+    )
+
+
+def calibrated(one: Linear, truth: Array, random: np.random.Generator) -> Baseline:
+    """A model calibrated to measurements of a truth (2 station,), with the errors that it is allowed."""
+    count = len(STATION)
+    measured = truth[:count] + ERROR * random.standard_normal(count)
+    base = at_best(CASE_OF_TWINS, STATION, measured, one.slope[:count])
+    noise = with_model_error(base.noise, one.columns[:count])
+    white, value = noise.whiten(one.slope[:count]), noise.whiten(measured)
+    z = np.linalg.solve(white.T @ white + np.eye(PARAMETERS), white.T @ value)
+    point = Point(z, one.slope[:count] @ z, one.slope[:count], {})
+    return replace(base, noise=noise, fitted=replace(base.fitted, point=point))
+
+
+def told_and_true(one: Linear, seed: int, patched: pytest.MonkeyPatch) -> tuple[float, float]:
+    random = np.random.default_rng((seed, 2))
+    truth = one.slope @ random.standard_normal(PARAMETERS) + one.columns @ random.standard_normal(COLUMNS)
+    base = calibrated(one, truth, random)
+
+    def linearised(model: Model, z: Array, _: Point) -> Point:
+        assert len(model.station) == 2 * len(STATION)
+        return Point(z, one.slope @ z, one.slope, {})
+
+    patched.setattr("vegglue.diagnosis.between_sections.linearise", linearised)
+    patched.setattr("vegglue.diagnosis.between_sections.model_error_columns", lambda *_: one.columns)
+    error = (truth - one.slope @ base.fitted.point.z)[len(STATION) :]
+    return largest_error_between(base), float(np.sqrt(1.0 + np.mean(error**2) / ERROR**2))
+
+
+@pytest.mark.parametrize("error_of_model", [0.0, 0.01, 0.03])
+def test_of_a_hundred_models_some_five_err_by_more_than_is_told(
+    error_of_model: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = linear(1, error_of_model)
+    pairs = [told_and_true(one, seed, monkeypatch) for seed in range(200)]
+    beyond = sum(true > told for told, true in pairs)
+    assert 3 <= beyond <= 20  # of 200, 10 are meant: 99 % of binomial draws
+
+
+def test_a_model_that_is_known_does_not_err(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = Linear(np.zeros((2 * len(STATION), PARAMETERS)), np.zeros((2 * len(STATION), COLUMNS)))
+    assert told_and_true(one, 1, monkeypatch)[0] == pytest.approx(1.0)
+
+
+def test_stations_move_halfway_to_the_next_section_and_to_the_end() -> None:
+    kinds = ["velocity", "velocity", "level"]
+    station = pd.DataFrame({"kind": kinds, "x": [2.0, 6.0, 9.0], "used": [True, True, True]})
+    assert halfway(station, 10.0)["x"].tolist() == [4.0, 8.0]
+    assert halfway(station.assign(used=[True, False, True]), 10.0)["x"].tolist() == [6.0]
