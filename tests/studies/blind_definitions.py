@@ -14,9 +14,6 @@ SAID = ("identified", "one-of", "none-of-these", "instrument")
 # A place further off points at something else [m].
 NEAR = 1.5
 FEW = 3
-# Named rightly where eddy viscosity is off: itself, and those that stand in for it, each by its own law.
-STAND_INS = ("elder", "smagorinsky", "mixing_length", "coherent_structures")
-EDDIES = ("viscosity", *STAND_INS)
 ORACLE_SHARE, MISSED_SHARE = 1.1, 1.3
 SENSORS = {effect.name for effect in sensor.EFFECTS}
 
@@ -36,12 +33,6 @@ def truths(record: Record) -> set[str]:
     sizes = record.get("sizes", {})
     also = {name for name, size in record["also_true"].items() if size * sizes.get(name, size) > 0.0}
     return hidden_names(record) | also
-
-
-def is_so(record: Record, name: str) -> bool:
-    """It is hidden, or an imperfection itself: the eddies that stand in for a viscosity that is off are not."""
-    stands_in = "viscosity" in record["also_true"] and name in STAND_INS
-    return name in truths(record) and (name in hidden_names(record) or not stands_in)
 
 
 def is_true_step(record: Record, step: Thing) -> bool:

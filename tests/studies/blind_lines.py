@@ -133,7 +133,7 @@ def shares_that_reach(records: Sequence[Record]) -> tuple[int, int, int]:
 def chances_told(records: Sequence[Record]) -> list[Told]:
     """What first steps told, by bins of the chance, where one listed effect is hidden and nothing else."""
     pairs = [
-        (chance, what.is_so(record, name))
+        (chance, name in what.truths(record))
         for record in records
         if record["steps"] and [one["kind"] for one in record["hidden"]] == ["listed"]
         for name, chance in zip(record["steps"][0]["rivals"], record["steps"][0]["chances"], strict=True)

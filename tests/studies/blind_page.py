@@ -209,8 +209,9 @@ model. On a site with imperfections they are drawn anew in each set:
 Another law of plants altogether would be a missing effect, and no imperfection. Everything that the stranger hides is
 hidden on such a site; sets with nothing hidden are made on both. The model is allowed errors (`model_error`) as
 `vegglue import` writes them (friction 5 %, bed 1 cm), and of its site as whoever measured there may state them: edges
-of patches 5 cm, probes 2 cm, discharges 1 %. These were chosen after sets of this kind, with other seeds. Without them
-the diagnosis names more that is not there.
+of patches 5 cm, probes 2 cm, discharges 1 %, stems 12 %. These were chosen after sets of this kind, with other seeds.
+Without them the diagnosis names more that is not there. The eddy viscosity is calibrated, with a prior as `vegglue
+import` writes it: stated to within a factor of two.
 
 Where such an imperfection has a name in the list, a diagnosis may rightly say it, with its sign: the name counts as
 true, though it is not what was hidden. No site has an imperfection of the kind that is hidden in it. Errors are new in

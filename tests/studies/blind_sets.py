@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from blind_truth import Numbers, Site, perfect_site, site_of_nature, true_values
+from site_reach import EDDY_VISCOSITY
 
 from vegglue.arrays import Array
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_grid_error, with_model_error
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
-from vegglue.case.schema import Case, ModelError
+from vegglue.case.schema import Case, ModelError, Parameter
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
-from vegglue.importers.config_parts import MODEL_ERROR
+from vegglue.importers.config_parts import MODEL_ERROR, VISCOSITY, VISCOSITY_FACTOR, viscosity_prior
 from vegglue.twins.hidden_effect import BAD, TwinBase, candidate_of, case_hiding, chosen_effect, visible_length
 from vegglue.twins.sealed_answer import UNLISTED, Hidden
 from vegglue.twins.twin import errors_named, finer, true_place
@@ -29,7 +30,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 # True places of the prior, each seen by the model once.
 PLACES = 8
 # Errors of the site as whoever measured there would state them, see `blind_truth` for those that it has.
-SITE_ERROR = {"edges": 0.05, "probes": 0.02, "discharge": 0.01}
+SITE_ERROR = {"edges": 0.05, "probes": 0.02, "discharge": 0.01, "stems": 0.12}
 # Every fifth set without a hidden effect has understated errors, two of five correlated ones.
 NULL_NOISE = ("white", "ar1:0.5", "white", "ar1:0.5", "understated:1.5")
 OBJECTS = {"pier": "drag", "fallen_tree": "drag", "sink": "drag", "jet": "drag", "scour_hole": "bed"}
@@ -39,8 +40,8 @@ PAIRS = (
     ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
-# Sets of the parts before were seen when the errors of a site were chosen.
-EDITION = "second edition, part five: "
+# Sets of the editions before were seen when the errors of a site and the prior of viscosity were chosen.
+EDITION = "third edition: "
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,18 @@ class DataSet:
 
 @lru_cache
 def model_of(study: str) -> Model:
-    """The model with the error of its own that an imported case has, and errors of its site."""
+    """The model with the error of its own and the prior of viscosity that an imported case has, and errors of its
+    site.
+    """
     model = model_in(load_case(CONFIGS / f"{study}.yaml"))
-    case: Case = model.case.model_copy(update={"model_error": ModelError(**MODEL_ERROR["model_error"], **SITE_ERROR)})
+    free = Parameter(**viscosity_prior(EDDY_VISCOSITY, VISCOSITY_FACTOR))
+    case: Case = model.case.model_copy(
+        update={
+            "model_error": ModelError(**MODEL_ERROR["model_error"], **SITE_ERROR),
+            "eddy_viscosity": VISCOSITY,
+            "parameters": {**model.case.parameters, VISCOSITY: free},
+        }
+    )
     return replace(model, case=case)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import second_effects as effects
-from blind_definitions import EDDIES
 from second_channel import PAPER, SHORT, Channel, lie_of
 from second_kernels import GRAVITY, KARMAN
 from second_laws import Formulation
@@ -49,7 +48,7 @@ def perfect_site(case: Case, study: str, theta: Numbers, stations: int) -> Site:
     channel = CHANNELS[study]
     truth = Truth(
         theta["n_b"], theta["k_s"], theta["phi"], theta["canopy_height"], {}, stems=(1.0,) * len(channel.patches),
-        channel=channel,
+        nu=theta["eddy_viscosity"], channel=channel,
     )  # fmt: skip
     return Site(truth, dict.fromkeys(case.experiments, 1.0), np.zeros(stations), {})
 
@@ -78,7 +77,7 @@ def site_of_nature(perfect: Site, case: Case, seed: int, hide: Sequence[str] = (
         for name, size in sizes.items()
         if abs(size) > (NAMED_STEMS if name.startswith("patch") else NAMED_DISCHARGE)
     }
-    named |= dict.fromkeys(EDDIES, viscosity - 1.0) if abs(viscosity - 1.0) > NAMED_VISCOSITY else {}
+    named |= {"viscosity": viscosity - 1.0} if abs(viscosity - 1.0) > NAMED_VISCOSITY else {}
     named |= {"emergent_part": emergent} if emergent else {}
     return Site(
         replace(

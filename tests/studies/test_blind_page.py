@@ -66,13 +66,6 @@ def test_imperfections_of_the_site_are_true() -> None:
     assert what.false_named(nothing("identified", step("viscosity")))
 
 
-def test_chances_of_stand_ins_do_not_come_true() -> None:
-    off = NAMED | {"also_true": {"viscosity": 0.8, "elder": 0.8, "patch_density[p1]": 0.1}}
-    assert [what.is_so(off, name) for name in ("eddies", "viscosity", "patch_density[p1]")] == [True, True, True]
-    assert [what.is_so(off, name) for name in ("elder", "wind")] == [False, False]
-    assert what.is_so(record("listed6", "identified", step("elder"), hidden=[listed("elder")]), "elder")
-
-
 def test_what_is_named() -> None:
     assert [what.named(one) for one in (NAMED, SILENT, MANY)] == [True, False, False]
     assert not what.named(nothing("cannot-tell", places=[HERE])), "what cannot be told is no name"
