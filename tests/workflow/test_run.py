@@ -2,11 +2,20 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from diagnoses import a_diagnosis
 from reach import vegglue
 
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.workflow import run as whole_way
+
 ROOT = Path(__file__).parents[2]
+TWIN = load_case(ROOT / "configs" / "twin.yaml")
+WITH_LAW = TWIN.model_copy(update={"name": "twin-law", "source": TWIN.source.with_name("twin+law.yaml")})
 
 
 @pytest.mark.slow
@@ -49,3 +58,45 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> N
     again = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
     assert "up to date" in again
     assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}
+
+
+def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch) -> tuple[list[str], list[str]]:
+    """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
+    found = a_diagnosis(verdict={"kind": kind})
+    found = SimpleNamespace(verdict=found.verdict, places=found.places[:1] * places)
+    rungs = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
+    alone = SimpleNamespace(rungs=())
+    made, shown = list[str](), list[str]()
+
+    def has_posterior(case: Case, *_: Any) -> bool:
+        made.append(case.name)
+        return False
+
+    fakes: dict[str, Any] = {
+        "refuse_to_shrink": lambda *_: None,
+        "diagnose": lambda case, **_: found,
+        "extend_stepwise": lambda case, **_: SimpleNamespace(cases=(TWIN,), comparison=alone),
+        "discover": lambda case, **_: SimpleNamespace(child=WITH_LAW, law=True),
+        "compare": lambda cases, **_: SimpleNamespace(rungs=[one.name for one in cases]),
+        "held_out_rmse": lambda rung: rungs[rung],
+        "next_measurement": lambda case, **_: [],
+        "draw_ladder_of": lambda *_: Path("ladder.png"),
+        "_has_posterior": has_posterior,
+    }
+    for name, fake in fakes.items():
+        patched.setattr(whole_way, name, fake)
+    whole_way.run(TWIN, show=lambda _, result: shown.append("law" if hasattr(result, "law") else ""))
+    return made, [one for one in shown if one]
+
+
+def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert gone("none-of-these", 0, 0.01, monkeypatch) == (["twin", "twin-law"], ["law"])
+
+
+def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert gone("none-of-these", 0, 0.03, monkeypatch) == (["twin"], ["law"])
+
+
+@pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("nothing-missing", 0), ("cannot-tell", 0)])
+def test_no_law_is_searched_for_a_place_or_in_silence(kind: str, places: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert gone(kind, places, 0.01, monkeypatch) == (["twin"], [])

@@ -51,8 +51,8 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
 
 
 def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
-    """What `run` found, in the order it came: diagnosis, extension and questions; then, of each case by name, its
-    ensemble, posterior and report, and what was up to date in `notes`.
+    """What `run` found, in the order it came: diagnosis, extension, discovery and comparison with its law, questions;
+    then, of each case by name, its ensemble, posterior and report, and what was up to date in `notes`.
     """
     told: Told = {"cases": {}}
     for case, result in results:
@@ -62,6 +62,10 @@ def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
                 told["diagnosis"] = object_of(case, runs, result)
             case StepwiseExtension():
                 told["extension"] = object_of(case, runs, result)
+            case DiscoveredCase():
+                told["discovery"] = object_of(case, runs, result)
+            case Comparison():
+                told["comparison"] = object_of(case, runs, result)
             case list():
                 told |= object_of(case, runs, result)
             case Ensemble():

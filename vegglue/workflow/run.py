@@ -6,11 +6,14 @@ from typing import Any
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
+from vegglue.diagnosis.comparison import held_out_rmse
 from vegglue.errors import InputError
 from vegglue.progress import Watch, silent
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.result_files import stored_hash
-from vegglue.workflow.compare import draw_ladder_of
+from vegglue.workflow.compare import Comparison, compare, draw_ladder_of
 from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.discover import discover
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 from vegglue.workflow.infer import infer
 from vegglue.workflow.next_measurement import next_measurement
@@ -35,23 +38,28 @@ def run(
     force: bool = False,
 ) -> StepwiseExtension:
     """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then ensemble,
-    posterior and report of the case and of its last child. What is up to date is not made again. members: size of the
-    ensembles instead of the case's; force: replace a child that was edited by hand and a larger ensemble, too.
+    posterior and report of the case and of its last child. What is up to date is not made again. Where none of the
+    known effects explains the misfit, and it is not at a place, a law is searched that does, and kept where errors
+    fall with it. members: size of the ensembles instead of the case's; force: replace a child that was edited by hand
+    and a larger ensemble, too.
 
-    show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, list of Question, Ensemble,
-    Posterior, the Path of a page, or a sentence.
+    show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, DiscoveredCase and Comparison,
+    list of Question, Ensemble, Posterior, the Path of a page, or a sentence.
     """
     refuse_to_shrink(of_size(case, members), runs, force)
-    show(case, diagnose(case, runs=runs, jobs=jobs, watch=watch))
+    found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
+    show(case, found)
     extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, extension)
-    last = extension.cases[-1]
+    last, comparison = extension.cases[-1], extension.comparison
+    if last.source == case.source and _acts_all_over(found) and case.engine is None:
+        last, comparison = _with_a_law(case, comparison, runs, jobs, watch, show, force)
     if last.source != case.source:
         show(last, diagnose(last, runs=runs, jobs=jobs, watch=watch))
     both = {one.source: one for one in (case, last)}.values()
     for each in both:
         show(each, next_measurement(each, runs=runs, jobs=jobs, watch=watch))
-    picture = draw_ladder_of(extension.comparison, last, runs)
+    picture = draw_ladder_of(comparison, last, runs)
     show(last, f"Ladder drawn in {picture}; last config: {last.source}")
     from vegglue.workflow.report import report
 
@@ -59,6 +67,27 @@ def run(
     for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show, force)]:
         show(each, report(each, runs=runs, members=members, watch=watch))
     return extension
+
+
+def _acts_all_over(found: Diagnosis) -> bool:
+    """Whether none of the known effects explains the misfit, and it is not at a place."""
+    return found.verdict.kind == "none-of-these" and not found.places
+
+
+def _with_a_law(
+    case: Case, alone: Comparison, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
+) -> tuple[Case, Comparison]:
+    """The case with a law that is in no list, and both side by side, where one is found and errors at held-out sections
+    are less with it; else the case `alone`.
+    """
+    law = discover(case, jobs=jobs, watch=watch, force=force)
+    show(case, law)
+    if law.child is None:
+        return case, alone
+    both = compare([case, law.child], runs=runs, jobs=jobs, watch=watch)
+    show(law.child, both)
+    before, after = (held_out_rmse(one) for one in both.rungs)
+    return (law.child, both) if after < before else (case, alone)
 
 
 def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool) -> bool:
