@@ -24,13 +24,13 @@ from vegglue.measurements.kinds import STREAMWISE
 
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
 # is known to half a per cent of the share.
-SURE, DRAWS = 0.95, 2000
+SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
 # Added to the diagonal of a covariance, over its mean, so that it can be factored.
-RIDGE = 1e-9
+DIAGONAL_ADDED = 1e-9
 
 
 def largest_error_between(base: Baseline) -> float:
-    """The root mean square of e and the errors of the data, over that of those alone [-]: with SURE it is less. NaN
+    """The root mean square of e and the errors of the data, over that of those alone [-]: with SHARE_BELOW it is less. NaN
     where there are no velocities, or the flow is not found.
     """
     search = search_model(base)
@@ -40,10 +40,10 @@ def largest_error_between(base: Baseline) -> float:
         return float("nan")
     mean, covariance = found
     variance = np.diag(covariance)
-    lower = np.linalg.cholesky(covariance + RIDGE * max(float(variance.mean()), 1e-300) * np.eye(mean.size))
-    drawn = mean + np.random.default_rng(1).standard_normal((DRAWS, mean.size)) @ lower.T
+    lower = np.linalg.cholesky(covariance + DIAGONAL_ADDED * max(float(variance.mean()), 1e-300) * np.eye(mean.size))
+    drawn = mean + np.random.default_rng(1).standard_normal((DRAWN_ERRORS, mean.size)) @ lower.T
     squares = (drawn**2).mean(axis=1) / float(np.mean(base.noise.data_error[seen] ** 2))
-    return float(np.sqrt(1.0 + np.quantile(squares, SURE)))
+    return float(np.sqrt(1.0 + np.quantile(squares, SHARE_BELOW)))
 
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
