@@ -205,8 +205,9 @@ def test_directions_with_speeds_become_components(tmp_path: Path) -> None:
     """A speed that heads east-north-east, 58 degrees from north, runs along a channel at 32 degrees from east."""
     (tmp_path / "a.csv").write_text("easting;northing;speed;direction\n683130;247480;50;58\n", encoding="utf-8")
     from vegglue.importers.measured_rows import in_the_channel
+    from vegglue.importers.placement import Placement
 
     words = file_words({"units": {"speed": "cm/s"}}, "a")
-    taken = in_the_channel(read_rows(tmp_path / "a.csv", words), FRAME, words)
+    taken = in_the_channel(read_rows(tmp_path / "a.csv", words), Placement(FRAME), words)
     assert taken.numbers["u"][0] == pytest.approx(0.5)
     assert taken.numbers["v"][0] == pytest.approx(0.0, abs=1e-9)

@@ -11,6 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.terrain_files import read_geotiff, read_terrain
 from vegglue.site.gridded_site import build_site
@@ -65,7 +66,7 @@ def write_xyz(path: Path) -> None:
 )
 def test_a_bed_on_the_map_is_read_along_the_channel(tmp_path: Path, name: str, write, words: FileWords) -> None:
     write(tmp_path / name)
-    terrain = read_terrain(tmp_path / name, FRAME, words, sections=False)
+    terrain = read_terrain(tmp_path / name, Placement(FRAME), words, sections=False)
     x, y = np.array([1.0, 20.0, 39.0]), np.array([-4.0, 0.3, 4.0])
     assert np.allclose(terrain.level(x, y), plane(x, y), atol=1e-6)
     assert np.isnan(terrain.level(np.array([500.0]), np.array([0.0]))).all()
@@ -87,7 +88,7 @@ def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> N
     for x, lowest in ((0.0, 2.0), (20.0, -2.0)):
         rows += [f"{x},{y},{z}" for y, z in ((-5, 1.0 - x / 100), (lowest, -x / 100), (5, 1.0 - x / 100))]
     (tmp_path / "sections.csv").write_text("\n".join(rows), encoding="utf-8")
-    terrain = read_terrain(tmp_path / "sections.csv", None, FileWords(), sections=True)
+    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileWords(), sections=True)
     assert terrain.level(np.array([0.0, 20.0]), np.array([2.0, -2.0])) == pytest.approx([0.0, -0.2])
     assert terrain.level(np.array([10.0, 10.0]), np.array([-5.0, 5.0])) == pytest.approx([0.9, 0.9])
     left, middle, right = terrain.level(np.full(3, 10.0), np.array([-2.0, 0.0, 2.0]))

@@ -3,8 +3,8 @@
 site.json or site.yaml says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at
 x = 0, y = 0 on the axis) or bed (a survey; see surveyed_bed.py), patches (x, y, stems_per_m2, or a file of polygons),
 canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to, experiments (discharge_m3_s,
-downstream_level_m), and, where needed, frame (site_file.py) and files (file_words.py). What is not said there is left
-at the defaults below.
+downstream_level_m), and, where needed, frame and grid (site_file.py), its centreline (drawn_centreline.py) and files
+(file_words.py). What is not said there is left at the defaults below.
 """
 
 import math
@@ -27,9 +27,20 @@ from vegglue.importers.config_parts import (
     validated,
     viscosity_prior,
 )
-from vegglue.importers.measured_files import MeasuredFiles, measured_files, named_from
+from vegglue.importers.drawn_centreline import drawn_centreline
+from vegglue.importers.measured_files import MeasuredFiles, measured_files, named_from, record
+from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.site_file import Channel, FieldSite, MeasuredFlow, PlantedPatch, read_site, site_file
+from vegglue.importers.site_file import (
+    Channel,
+    FieldSite,
+    FileOfSite,
+    MeasuredFlow,
+    PlantedPatch,
+    SiteGrid,
+    read_site,
+    site_file,
+)
 from vegglue.importers.surveyed_bed import surveyed_bed
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
@@ -50,13 +61,17 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     """
     site = read_site(site_file(folder))
     frame = site.frame.frame if site.frame is not None else None
+    given = site.grid.centreline if site.grid is not None else None
+    drawn = drawn_centreline(folder, given, frame) if given is not None else None
+    place = Placement(frame, drawn.line if drawn is not None else None)
     patches = _patches(folder, site.patches, frame)
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
-    measured = measured_files(folder, target, site, frame, used)
+    used += [given.file] if isinstance(given, FileOfSite) else []
+    measured = measured_files(folder, target, site, place, used)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
-        **_ground(folder, target, site, frame, measured),
+        **_ground(folder, target, site, place, measured),
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
         "eddy_viscosity": VISCOSITY if site.viscosity_factor > 1 else site.eddy_viscosity_m2_s,
@@ -70,6 +85,11 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     if site.holdout and (folder / "holdout.csv").is_file():
         held_out = {name: _experiment(given) for name, given in site.holdout.items()}
         tree |= validated(held_out, [observed("velocity", named_from(folder / "holdout.csv", target))])
+    if drawn is not None:
+        tree["grid"]["centreline"] = drawn.shape
+        said = folder / given.file if isinstance(given, FileOfSite) else site_file(folder)
+        words = {"columns": drawn.columns, "units": drawn.units}
+        measured.imported.insert(0, record(said, None, drawn.taken) | words)
     if patches:
         tree["plants"] = _plants(patches)
         tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
@@ -77,15 +97,16 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     return tree | kept | ({"imported": measured.imported} if measured.imported else {})
 
 
-def _ground(folder: Path, target: Path, site: FieldSite, frame: Frame | None, measured: MeasuredFiles) -> Tree:
-    """Grid, bed and friction: of a survey, or of a straight channel by its numbers."""
+def _ground(folder: Path, target: Path, site: FieldSite, place: Placement, measured: MeasuredFiles) -> Tree:
+    """Grid, bed and friction: of a survey, or of a channel by its numbers."""
     if site.bed is not None or site.channel is None:
-        ground = surveyed_bed(folder, target, site, frame)
+        ground = surveyed_bed(folder, target, site, place)
         measured.imported.extend(ground.imported)
         return ground.tree
+    grid = _grid(site.channel, site.experiments, site.grid or SiteGrid(), place)
     return {
-        "grid": _grid(site.channel, site.experiments),
-        "bed": [{"trapezoid": _trapezoid(site.channel)}],
+        "grid": grid,
+        "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}],
         "friction": {
             "classes": {"bed": MANNING_BED, "bank": {"law": "keulegan", "k_s": "k_s"}},
             "default": "bed",
@@ -130,28 +151,34 @@ def _canopy(guess: float) -> Tree:
     )  # fmt: skip
 
 
-def _trapezoid(channel: Channel) -> Tree:
+def _trapezoid(channel: Channel, upstream: float) -> Tree:
+    """With z = 0 on the floor at x = 0, wherever the grid begins [m]."""
     return {
         "axis": 0.0,
         "bottom_width": channel.bottom_width_m,
         "bank_slope": round(channel.bank_slope_v_per_h, 6),
         "bed_slope": channel.bed_slope,
-        "level": 0.0,
+        "level": 0.0 - channel.bed_slope * upstream,
     }
 
 
-def _grid(channel: Channel, experiments: Mapping[str, MeasuredFlow]) -> Tree:
-    """Cells that fit the floor, as wide as the water can get."""
-    length, width = channel.length_m, channel.bottom_width_m
+def _grid(channel: Channel, experiments: Mapping[str, MeasuredFlow], given: SiteGrid, place: Placement) -> Tree:
+    """What the site file says, else cells that fit the floor, as wide as the water can get."""
+    along = float(place.line.s[-1]) if place.line is not None else 0.0
+    x = list(given.x or (0.0, round(along, 4) if channel.length_m is None else channel.length_m))
+    length, width = x[1] - x[0], channel.bottom_width_m
     fall = channel.bed_slope * length
     highest = max(given.downstream_level_m for given in experiments.values())
     # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
     beside = math.ceil(depth / channel.bank_slope_v_per_h / dy / 2) * 2
-    columns = max(even(length / (dy * LENGTHENED)), FEWEST_COLUMNS)
     half = round(0.5 * width + beside * dy, 6)
-    return {"x": [0.0, length], "y": [-half, half], "cell": [length / columns, dy]}
+    y = list(given.y or (-half, half))
+    if given.y is not None:
+        dy = (y[1] - y[0]) / max(even((y[1] - y[0]) / dy), FEWEST_COLUMNS)
+    columns = max(even(length / (dy * LENGTHENED)), FEWEST_COLUMNS)
+    return {"x": x, "y": y, "cell": list(given.cell or (length / columns, dy))}
 
 
 def _experiment(given: MeasuredFlow) -> Tree:

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
@@ -20,6 +19,7 @@ from vegglue.importers.file_words import FileWords, file_words
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words
+from vegglue.importers.placement import Placement
 from vegglue.importers.site_file import FieldSite
 from vegglue.importers.stations import StationTable, station_tables
 from vegglue.measurements.kinds import KINDS
@@ -38,9 +38,7 @@ class MeasuredFiles:
     imported: list[Tree]
 
 
-def measured_files(
-    folder: Path, target: Path, site: FieldSite, frame: Frame | None, used: Sequence[str]
-) -> MeasuredFiles:
+def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement, used: Sequence[str]) -> MeasuredFiles:
     """All measurements of a folder. used: files that the site file names elsewhere, such as that of the bed.
 
     Errors: InputError where there are none, or one cannot be read.
@@ -51,12 +49,13 @@ def measured_files(
     others = []
     for path in _candidates(folder, said, used):
         kind = next((kind for kind in KINDS.values() if kind.file == path.name), None)
-        if kind is not None and path.name not in said and frame is None and _is_plain(path, kind.column, kind.at_point):
+        named = kind is not None and path.name not in said and not place.turned
+        if named and kind is not None and _is_plain(path, kind.column, kind.at_point):
             found.append(observed(kind.name, named_from(path, target)))
         else:
             others.append((path, said.get(path.name, FileWords())))
     for group in _groups(others):
-        tables, records = _brought(group, frame, list(site.experiments))
+        tables, records = _brought(group, place, list(site.experiments))
         for table in tables:
             _write(data_folder(target) / table.file, table)
             found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
@@ -127,12 +126,18 @@ def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, Fi
 
 
 def _brought(
-    group: Sequence[tuple[Path, FileWords]], frame: Frame | None, experiments: list[str]
+    group: Sequence[tuple[Path, FileWords]], place: Placement, experiments: list[str]
 ) -> tuple[list[StationTable], list[Tree]]:
     """The tables of the files of a group, and what the config keeps of each file."""
-    placed = [in_the_channel(reader_of(path)(path, words), frame, words) for path, words in group]
+    for path, words in group:
+        if words.flip and place.line is not None and words.coordinates != "channel":
+            raise InputError(
+                f"{shown_path(path)}: expected no `flip` of places on the map of a centreline; where velocities run "
+                "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
+            )
+    placed = [in_the_channel(reader_of(path)(path, words), place, words) for path, words in group]
     path, words = group[0]
-    tables = station_tables(joined_rows(placed), path.stem, words, experiments, f"{shown_path(path)}:")
+    tables = station_tables(joined_rows(placed), path.stem, words, experiments, place, f"{shown_path(path)}:")
     made = ", ".join(table.said for table in tables) or "no measurement, left out"
     said = [f"{made if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)]
     return tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]

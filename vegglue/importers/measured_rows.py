@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES, role_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
+from vegglue.importers.placement import Placement
 from vegglue.importers.unit_words import UNITS, si_factor, unit_named
 from vegglue.in_short import so_many
 
@@ -89,37 +89,37 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
     return Taken(numbers, texts, named, units, tuple(said))
 
 
-def in_the_channel(taken: Taken, frame: Frame | None, words: FileWords) -> Taken:
-    """The rows in the frame of the model: turned, shifted and flipped; a speed with its direction as components."""
+def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
+    """The rows along and across the channel: turned, shifted and flipped; a speed with its direction as components."""
     taken = _components(taken)
-    if frame is not None and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
-        x, y = frame.to_model(taken.numbers["x"], taken.numbers["y"])
-        taken = taken.having({"x": x, "y": y}, "places turned from the map into the channel")
-    return _flipped(_along_and_across(taken, frame, words), words.flip)
+    if place.turned and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
+        x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])
+        taken = taken.having({"x": x, "y": y}, f"places turned from the map into {place.words}")
+    return _flipped(_along_and_across(taken, place, words), words.flip)
 
 
-def _along_and_across(taken: Taken, frame: Frame | None, words: FileWords) -> Taken:
+def _along_and_across(taken: Taken, place: Placement, words: FileWords) -> Taken:
     """u and v of components east and north; a velocity without a second component is one along the channel."""
     pair = next((pair for pair in COMPONENTS if set(pair) <= taken.numbers.keys()), None)
     if pair is None:
         return taken
     first, second = (taken.numbers[role] for role in pair)
-    turn = (
-        frame is not None and words.directions != "channel" and (pair != ("u", "v") or words.coordinates != "channel")
-    )
-    if frame is not None and turn:
-        first, second = frame.turned_to_model(first, second)
-        taken = _errors_turned(taken, frame)
+    turn = place.turned and words.directions != "channel" and (pair != ("u", "v") or words.coordinates != "channel")
+    if turn:
+        along = taken.numbers.get("x", np.zeros(taken.size))
+        first, second = place.turned_to_channel(along, first, second)
+        taken = _errors_turned(taken, place, along)
     of_map = ("velocities turned with them, as components east and north",) if turn else ()
     return taken.without(*pair).having({"u": first, "v": second}, *of_map)
 
 
-def _errors_turned(taken: Taken, frame: Frame) -> Taken:
+def _errors_turned(taken: Taken, place: Placement, along: Array) -> Taken:
     """se_u^2 = (cos a se_E)^2 + (sin a se_N)^2, and se_v likewise, where both are given, errors independent."""
     if not {"u_se", "v_se"} <= taken.numbers.keys():
         return taken
     east, north = taken.numbers["u_se"], taken.numbers["v_se"]
-    (ee, en), (ne, nn) = frame.turned_to_model(1.0, 0.0), frame.turned_to_model(0.0, 1.0)
+    one, none = np.ones(taken.size), np.zeros(taken.size)
+    (ee, en), (ne, nn) = place.turned_to_channel(along, one, none), place.turned_to_channel(along, none, one)
     return taken.having({"u_se": np.hypot(ee * east, ne * north), "v_se": np.hypot(en * east, nn * north)})
 
 

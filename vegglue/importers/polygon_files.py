@@ -1,7 +1,7 @@
 """Polygons of patches and friction classes from GeoJSON files and shapefiles, brought into the channel."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
     features = list(_of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path))
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
-    _refuse_degrees(path, frame, features)
+    refuse_degrees(path, frame, [ring for ring, _ in features])
     found = []
     for number, (ring, properties) in enumerate(features, 1):
         density = _first(properties, DENSITIES)
@@ -89,10 +89,11 @@ def _first(properties: Mapping[str, Any], names: Iterable[str]) -> Any:
     return next((lower[name] for name in names if lower.get(name) not in (None, "")), None)
 
 
-def _refuse_degrees(path: Path, frame: Frame | None, features: list[tuple[Ring, Mapping[str, Any]]]) -> None:
+def refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Ring]) -> None:
+    """Errors: InputError where all points are degrees and those of the frame are metres."""
     if frame is None or max(map(abs, frame.origin)) <= 360.0:
         return
-    if all(abs(x) <= 360.0 and abs(y) <= 90.0 for ring, _ in features for x, y in ring):
+    if all(abs(x) <= 360.0 and abs(y) <= 90.0 for line in lines for x, y in line):
         raise InputError(
             f"{shown_path(path)}: expected coordinates in m like the origin of `frame`, got degrees; save it in the "
             f"projected system{f' {frame.crs}' if frame.crs else ''}."

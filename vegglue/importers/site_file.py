@@ -12,6 +12,7 @@ from vegglue.case.config import read_tree
 from vegglue.case.frame import Frame
 from vegglue.case.messages import dotted
 from vegglue.case.parts import Interval, Number, Polygon, Positive
+from vegglue.case.site_schema import CentrelineShape
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
@@ -52,6 +53,9 @@ Length = Annotated[Number, Field(gt=0, le=1e6)]
 Level = Annotated[Number, Field(ge=-1e4, le=1e4)]
 
 
+ONE_DIRECTION = "either `angle` or `towards: [east, north]`"
+
+
 class _Said(BaseModel):
     """What the parts of a site share: keys that mean nothing here are notes."""
 
@@ -59,9 +63,9 @@ class _Said(BaseModel):
 
 
 class Channel(_Said):
-    """A straight trapezoid; z = 0 on the floor at x = 0, y = 0 on the axis."""
+    """A trapezoid; z = 0 on the floor at x = 0, y = 0 on the axis. Without a length it is as long as its centreline."""
 
-    length_m: Length
+    length_m: Length | None = None
     bottom_width_m: Annotated[Number, Field(gt=0, le=1e4)]
     bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)]
     bed_slope: Annotated[Number, Field(gt=-1, lt=1)]
@@ -114,26 +118,44 @@ class FileOfSite(_Said):
     file: PrintableName
 
 
-class SiteGrid(_Said):
-    """The grid of the model, where it is not made of the channel or the survey; SI."""
+def _drawn(given: Any) -> Any:
+    """A centreline in a file, as a list of points, or as a case describes one."""
+    if isinstance(given, list):
+        return CentrelineShape.model_validate({"points": given})
+    if isinstance(given, dict):
+        return (FileOfSite if "file" in given else CentrelineShape).model_validate(given)
+    if given is not None:
+        raise ValueError("`points`, `parts` or a `file`")
+    return None
 
-    x: Interval
-    y: Interval
-    cell: tuple[Positive, Positive]
+
+class SiteGrid(_Said):
+    """The grid of the model, as far as it is not made of the channel or the survey, and the line that it follows; SI.
+
+    centreline: on the map where there is a frame.
+    """
+
+    x: Interval | None = None
+    y: Interval | None = None
+    cell: tuple[Positive, Positive] | None = None
+    centreline: Annotated[FileOfSite | CentrelineShape | None, BeforeValidator(_drawn)] = None
 
 
 class SiteFrame(_Said):
-    """Where the model lies on the map: its origin, and the angle of its x axis or a point further down that axis."""
+    """Where the model lies on the map: its origin, and the angle of its x axis or a point further down that axis.
 
-    origin: tuple[Number, Number]
+    With a centreline nothing of this is needed: the line lies on the map itself.
+    """
+
+    origin: tuple[Number, Number] = (0.0, 0.0)
     angle: Annotated[Number, BeforeValidator(_with_unit("angle"))] | None = None
     towards: tuple[Number, Number] | None = None
     crs: PrintableName | None = None
 
     @model_validator(mode="after")
     def _one_direction(self) -> Self:
-        if (self.angle is None) == (self.towards is None):
-            raise ValueError("either `angle` or `towards: [east, north]`")
+        if self.angle is not None and self.towards is not None:
+            raise ValueError(ONE_DIRECTION)
         return self
 
     @property
@@ -177,13 +199,43 @@ class FieldSite(_Said):
     @model_validator(mode="before")
     @classmethod
     def _some_ground(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "bed" not in given:
+        if not isinstance(given, dict):
+            return given
+        if "bed" not in given:
             _Ground.model_validate(given)
+        if not (isinstance(given.get("grid"), dict) and given["grid"].get("centreline")):
+            for key, whole in (("channel", _Straight), ("frame", _StraightlyPlaced)):
+                if isinstance(given.get(key), dict):
+                    whole.model_validate(given)
         return given
 
 
 class _Ground(_Said):
     channel: Channel
+
+
+class _StraightChannel(_Said):
+    length_m: Length
+
+
+class _Straight(_Said):
+    channel: _StraightChannel
+
+
+class _WholeFrame(_Said):
+    origin: tuple[Number, Number]
+    angle: Any = None
+    towards: Any = None
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if (self.angle is None) == (self.towards is None):
+            raise ValueError(ONE_DIRECTION)
+        return self
+
+
+class _StraightlyPlaced(_Said):
+    frame: _WholeFrame
 
 
 def site_file(folder: Path) -> Path:
@@ -235,6 +287,9 @@ def left_open(folder: Path) -> list[str]:
     if not site.patches:
         assumed.append("no plants")
     unread = [str(key) for key in given if key not in FieldSite.model_fields]
+    parts: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame}
+    for name, part in parts.items():
+        unread += [f"{name}.{key}" for key in given.get(name) or {} if key not in part.model_fields]
     told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
     told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
     if (folder / "holdout.csv").is_file() and not site.holdout:

@@ -11,6 +11,7 @@ from vegglue.errors import InputError
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import Taken
+from vegglue.importers.placement import Placement
 from vegglue.measurements.kinds import KINDS, Kind
 
 # Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
@@ -33,13 +34,13 @@ class StationTable:
 
 
 def station_tables(
-    taken: Taken, stem: str, words: FileWords, experiments: Sequence[str], where: str
+    taken: Taken, stem: str, words: FileWords, experiments: Sequence[str], place: Placement, where: str
 ) -> list[StationTable]:
     """The tables of what was taken from one file. Errors: InputError, which begins with `where`."""
     taken = _named(taken, words, experiments, where)
     if _in_verticals(taken):
         return [_points(taken, stem, words)]
-    found = [_stations(taken, stem, words, kind) for kind in KINDS.values() if kind.column in taken.numbers]
+    found = [_stations(taken, stem, words, kind, place) for kind in KINDS.values() if kind.column in taken.numbers]
     return [table for table in found if table.rows]
 
 
@@ -140,8 +141,11 @@ def _section_observation(file: str, name: str, words: FileWords, across: bool) -
     return tree | levels | ({"across": True} if across else {})
 
 
-def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind) -> StationTable:
-    """Stations of one kind; values at one place are averaged, and their scatter is the error where none is given."""
+def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Placement) -> StationTable:
+    """Stations of one kind; values at one place are averaged, and their scatter is the error where none is given.
+
+    What was measured at a point stands on the map of its centreline, as a case reads it.
+    """
     kept = taken.only(np.isfinite(taken.numbers[kind.column]))
     errors = kept.numbers.get(kind.error_column)
     if errors is None:
@@ -149,7 +153,12 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind) -> StationT
     gathered: dict[tuple[str, str, float, float], list[tuple[float, float]]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
-    rows = [[*place[:2], *map(_number, (*place[2:], *_mean(values)))] for place, values in gathered.items()]
+    x, y = np.array([place[2:] for place in gathered]).reshape(-1, 2).T
+    x, y = channel.to_case(x, y) if kind.at_point else (x, y)
+    rows = [
+        [*place[:2], *map(_number, (*at, *_mean(values)))]
+        for (place, values), at in zip(gathered.items(), zip(x.tolist(), y.tolist(), strict=True), strict=True)
+    ]
     repeats = kept.size - len(rows)
     file = f"{stem}-{kind.name}.csv"
     said = f"{len(rows)} of {kind.words}" + (f", {repeats} repeats averaged" if repeats else "")

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import MANNING_BED, even
 from vegglue.importers.file_words import file_words
 from vegglue.importers.measured_files import data_folder, record
+from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.site_file import FieldSite, FileOfSite
-from vegglue.importers.terrain_files import Terrain, filled, read_terrain
+from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
+from vegglue.importers.terrain_files import RASTERS, Terrain, filled, read_terrain
 from vegglue.site.grid import centres
 
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
@@ -33,22 +33,26 @@ class Ground:
     imported: list[Tree]
 
 
-def surveyed_bed(folder: Path, target: Path, site: FieldSite, frame: Frame | None) -> Ground:
+def surveyed_bed(folder: Path, target: Path, site: FieldSite, place: Placement) -> Ground:
     """The ground of a site whose `bed` names a file: `{file: dtm.tif}`, `{file: sections.csv, sections: true}`.
 
-    `grid` (x, y, cell in m, in the frame of the model) is that of the site file, else made of the extent of the survey.
-    The bed is written as bed.asc into the folder beside the config. Errors: InputError.
+    `grid` (x, y, cell in m, in the frame of the model) is that of the site file, as far as it says, and made of the
+    extent of the survey. The bed is written into the folder beside the config: as bed.asc, and as points along a
+    centreline. Errors: InputError.
     """
     path = _named(folder, site.bed, "bed")
     given = dict(site.bed.model_extra or {}) if site.bed is not None else {}
     sections = bool(given.pop("sections", False))
     words = file_words(given, f"{shown_path(folder)}: `bed`")
-    terrain = read_terrain(path, frame, words, sections)
-    grid = _grid_of(terrain) if site.grid is None else {name: list(value) for name, value in site.grid}
-    beyond = _write_bed(data_folder(target) / "bed.asc", terrain, grid)
+    terrain = read_terrain(path, place, words, sections)
+    grid = _grid_of(path, terrain, site.grid or SiteGrid(), place)
+    layer = {"raster": "bed.asc"} if place.line is None else {"points": "bed.csv"}
+    (file,) = layer.values()
+    beyond = _write_bed(data_folder(target) / file, terrain, grid, place)
     outside = f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level" if beyond > 0.0 else ""
-    friction, imported = _friction(folder, site, frame)
-    tree = {"grid": grid, "bed": [{"raster": f"{data_folder(target).name}/bed.asc"}], "friction": friction}
+    friction, imported = _friction(folder, site, place)
+    named = {form: f"{data_folder(target).name}/{name}" for form, name in layer.items()}
+    tree = {"grid": grid, "bed": [named], "friction": friction}
     return Ground(tree, [record(path, None, f"bed: {terrain.said}{outside}"), *imported])
 
 
@@ -61,16 +65,25 @@ def _named(folder: Path, given: FileOfSite | None, key: str) -> Path:
     return folder / name
 
 
-def _grid_of(terrain: Terrain) -> Tree:
+def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) -> Tree:
+    """What the site file says, else the extent of the survey; along a centreline no further than the line goes."""
     west, east, south, north = terrain.extent
-    dy = (north - south) / SURVEYED_ROWS
-    columns = max(even((east - west) / (dy * LENGTH_OF_CELLS)), 4)
-    x, y = ([round(low, 4), round(high, 4)] for low, high in ((west, east), (south, north)))
-    return {"x": x, "y": y, "cell": [(x[1] - x[0]) / columns, (y[1] - y[0]) / SURVEYED_ROWS]}
+    if place.line is not None:
+        west, east = max(west, 0.0), min(east, float(place.line.s[-1]))
+        if given.y is None and path.suffix.lower() in RASTERS:
+            raise InputError(
+                f"{shown_path(path)}: expected `grid.y`, how far the grid reaches to the right and to the left of its "
+                "centreline, as a raster lies on both sides of it; add it."
+            )
+    x, y = (list(one or (round(low, 4), round(high, 4))) for one, low, high in (
+        (given.x, west, east), (given.y, south, north)))  # fmt: skip
+    dy = (y[1] - y[0]) / SURVEYED_ROWS
+    columns = max(even((x[1] - x[0]) / (dy * LENGTH_OF_CELLS)), 4)
+    return {"x": x, "y": y, "cell": list(given.cell or ((x[1] - x[0]) / columns, dy))}
 
 
-def _write_bed(path: Path, terrain: Terrain, grid: Mapping[str, Any]) -> float:
-    """An ESRI ASCII grid of square cells as small as those of the grid; returns the share that no level is known of."""
+def _write_bed(path: Path, terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> float:
+    """Levels on squares as small as the cells of the grid; returns the share of the grid that no level is known of."""
     size = float(min(grid["cell"]))
     (west, east), (south, north) = grid["x"], grid["y"]
     x = centres(west - size, size, int(np.ceil((east - west) / size)) + 2)
@@ -78,7 +91,12 @@ def _write_bed(path: Path, terrain: Terrain, grid: Mapping[str, Any]) -> float:
     at_x, at_y = (part.ravel() for part in np.meshgrid(x, y, indexing="ij"))
     level, _ = filled(terrain, at_x, at_y)
     inside = (at_x > west) & (at_x < east) & (at_y > south) & (at_y < north)
-    write_text(path, _ascii(x, y, size, level.reshape(x.size, y.size)), "give another place by --to")
+    if place.line is None:
+        text = _ascii(x, y, size, level.reshape(x.size, y.size))
+    else:
+        rows = np.column_stack([*place.to_case(at_x, at_y), level])
+        text = "x,y,z\n" + "".join(f"{at[0]:.4f},{at[1]:.4f},{at[2]:.4f}\n" for at in rows.tolist())
+    write_text(path, text, "give another place by --to")
     return float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean())
 
 
@@ -89,14 +107,14 @@ def _ascii(x: Array, y: Array, size: float, level: Array) -> str:
     return "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
 
 
-def _friction(folder: Path, site: FieldSite, frame: Frame | None) -> tuple[Tree, list[Tree]]:
+def _friction(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:
     """One class of bed, or those of a file of polygons, which share one coefficient until the user parts them."""
     friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
     if site.classes is None:
         return friction, []
     path = _named(folder, site.classes, "classes")
     zones = []
-    for polygon in read_polygons(path, frame):
+    for polygon in read_polygons(path, place.frame):
         name = case_name(polygon.friction_class or polygon.name)
         friction["classes"].setdefault(name, MANNING_BED)
         zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})

@@ -9,14 +9,18 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, Regul
 from scipy.spatial import QhullError
 
 from vegglue.arrays import Array
-from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
+from vegglue.importers.placement import Placement
 from vegglue.site.terrain import Raster, read_raster
 
+# Endings of files of levels on a grid.
+RASTERS = (".tif", ".tiff", ".asc", ".grd")
 # Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, and, of GDAL, what marks no data.
 PIXEL_SCALE, TIE_POINT, NO_DATA = 33550, 33922, 42113
+# Levels of a raster that are sought along a centreline to tell how far it reaches: it is told in words only.
+MOST_FOR_EXTENT = 5000
 
 
 @dataclass(frozen=True)
@@ -30,16 +34,15 @@ class Terrain:
     said: str
 
 
-def read_terrain(path: Path, frame: Frame | None, words: FileWords, sections: bool) -> Terrain:
+def read_terrain(path: Path, place: Placement, words: FileWords, sections: bool) -> Terrain:
     """The bed in a file, by what kind of file it is. sections: whether its points stand in cross-sections.
 
     Errors: InputError for what cannot be read.
     """
-    if path.suffix.lower() in (".tif", ".tiff"):
-        return _of_raster(read_geotiff(path), frame)
-    if path.suffix.lower() in (".asc", ".grd"):
-        return _of_raster(read_raster(path), frame)
-    points, said = _points(path, frame, words)
+    ending = path.suffix.lower()
+    if ending in RASTERS:
+        return _of_raster(read_geotiff(path) if ending in (".tif", ".tiff") else read_raster(path), place)
+    points, said = _points(path, place, words)
     return _of_sections(points, said) if sections else _of_points(path, points, said)
 
 
@@ -77,19 +80,19 @@ def _north_up(values: Array, tags: dict[int, tuple[float, ...]]) -> Raster:
     return Raster(x, y[::-1].copy(), size, values[::-1].T)
 
 
-def _of_raster(raster: Raster, frame: Frame | None) -> Terrain:
+def _of_raster(raster: Raster, place: Placement) -> Terrain:
     reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
 
     def level(x: Array, y: Array) -> Array:
-        return np.asarray(reader(np.column_stack(frame.to_map(x, y) if frame is not None else (x, y))))
+        return np.asarray(reader(np.column_stack(place.to_map(x, y))))
 
     known = np.argwhere(~np.isnan(raster.values))
-    x, y = raster.x[known[:, 0]], raster.y[known[:, 1]]
-    along, across = frame.to_model(x, y) if frame is not None else (x, y)
+    shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
+    along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
     return Terrain(level, _extent(along, across), f"grid of {len(known):,} levels, {raster.size:g} m apart")
 
 
-def _points(path: Path, frame: Frame | None, words: FileWords) -> tuple[Array, str]:
+def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, str]:
     """x, y, z (points, 3) [m]; three columns without a heading are these."""
     bare = {"x": "1", "y": "2", "z": "3"}
     taken = read_rows(path, words)
@@ -98,7 +101,7 @@ def _points(path: Path, frame: Frame | None, words: FileWords) -> tuple[Array, s
             f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(taken.columns.values())}; name them "
             f"by `columns`, or by place where there is no heading: {bare}."
         )
-    taken = in_the_channel(taken, frame, words)
+    taken = in_the_channel(taken, place, words)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
     return points[np.isfinite(points).all(axis=1)], taken_in_words(taken)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from vegglue.arrays import Array
@@ -23,6 +24,8 @@ FEWEST_NODES = 500
 NODES_PER_PAIR = 50
 # Steps of Newton from the nearest node [-]: two are enough where nodes are as near as these.
 STEPS = 6
+# Distances from places to nodes held at once [-]: 80 MB, where a survey of a long reach has many of both.
+DISTANCES_AT_ONCE = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def along_and_across(line: Centreline, x: Array, y: Array) -> tuple[Array, Array
 
     Newton's steps ds = (p - (X, Y)) . t / (1 - n kappa), from the nearest node.
     """
-    nearest = np.hypot(x[:, None] - line.x, y[:, None] - line.y).argmin(axis=1)
+    nearest = _nearest_node(line, x, y)
     s, n = line.s[nearest], np.zeros_like(x)
     curvature = np.gradient(line.heading, line.s)
     for _ in range(STEPS):
@@ -71,6 +74,16 @@ def along_and_across(line: Centreline, x: Array, y: Array) -> tuple[Array, Array
         turning = np.interp(s, line.s, curvature, left=0.0, right=0.0)
         s = s + ahead / np.maximum(1.0 - n * turning, 0.5)
     return s, n
+
+
+def _nearest_node(line: Centreline, x: Array, y: Array) -> NDArray[np.int64]:
+    """Number of the node nearest to each place (n,), a part of the places at a time."""
+    size = max(DISTANCES_AT_ONCE // line.x.size, 1)
+    found = [
+        np.hypot(x[i : i + size, None] - line.x, y[i : i + size, None] - line.y).argmin(axis=1)
+        for i in range(0, x.size, size)
+    ]
+    return np.concatenate([np.empty(0, np.int64), *found])
 
 
 def _position(line: Centreline, s: Array) -> tuple[Array, Array]:

@@ -1,0 +1,251 @@
+"""Measurements of a bend on the map arrive along and across its centreline, with the bed and the patches."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from reach import COARSE, said_to, write_reach
+
+import vegglue
+from vegglue.case.config import load_case
+from vegglue.case.frame import Frame
+from vegglue.case.schema import Case
+from vegglue.case.site_schema import CentrelineShape
+from vegglue.importers.placement import Placement
+from vegglue.measurements.observations import read_observations
+from vegglue.site.centreline import centreline_of
+from vegglue.site.grid import build_grid
+from vegglue.site.gridded_site import build_site
+from vegglue.workflow.import_folder import assumptions_of
+
+FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0, crs="EPSG:2056")
+SAID = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"
+# Half the reach straight, then a bend to the left, through a few points as a map program has them.
+POINTS = ((0.0, 0.0), (6.0, 0.0), (12.0, 0.1), (17.5, 1.1), (22.0, 4.0), (24.9, 8.5), (26.0, 13.5))
+BENT = f"{COARSE[1]}, centreline: {{points: {[list(one) for one in POINTS]}}}}}"
+ON_MAP = [FRAME.to_map(*one) for one in POINTS]
+EXPERIMENTS = "experiments: {June: {discharge: 2.0, level: 0.95}}\n"
+GROUND = "channel: {bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
+OF_MAP = {"E": "east [m]", "N": "north [m]", "Ve": "east_velocity [m/s]", "Vn": "north_velocity [m/s]"}
+
+
+@pytest.fixture(scope="module")
+def flow(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """The product's own flow in the bend, cell by cell, along the channel and on the map; wet cells only."""
+    folder = tmp_path_factory.mktemp("bend")
+    case = load_case(write_reach(folder, (COARSE[0] + "}", BENT), ("friction:\n", f"{SAID}friction:\n")))
+    vegglue.export(case, runs=folder / "runs", forms=("csv",))
+    table = pd.read_csv(folder / "runs/brook/export/flow-june.csv")
+    return table[table["depth [m]"].notna()].reset_index(drop=True)
+
+
+def imported(folder: Path, site: str, **files: str) -> Case:
+    """The case of a folder; names of files with __ for the point."""
+    folder.mkdir()
+    (folder / "site.yaml").write_text(site, encoding="utf-8")
+    for name, text in files.items():
+        (folder / name.replace("__", ".")).write_text(text, encoding="utf-8")
+    return vegglue.import_folder(folder, folder.parent / "bend.yaml")
+
+
+def line_file(ending: str) -> str:
+    if ending == "csv":
+        return "Point;Easting;Northing\n" + "".join(f"{i};{e:.9f};{n:.9f}\n" for i, (e, n) in enumerate(ON_MAP))
+    shape = {"type": "LineString", "coordinates": [list(one) for one in ON_MAP]}
+    return json.dumps({"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": shape}]})
+
+
+def survey(flow: pd.DataFrame) -> pd.DataFrame:
+    """Every seventh wet cell, as a boat with a satellite receiver would have it."""
+    return flow.iloc[::7].reset_index(drop=True)
+
+
+@pytest.mark.parametrize("ending", ["csv", "geojson", "list"])
+def test_a_survey_on_the_map_comes_back_along_and_across(tmp_path: Path, flow: pd.DataFrame, ending: str) -> None:
+    cells = survey(flow)
+    table = cells[list(OF_MAP.values())].set_axis(list(OF_MAP), axis=1).to_csv(index=False)
+    drawn = f"{{file: axis.{ending}}}" if ending != "list" else str([list(one) for one in ON_MAP])
+    files = {} if ending == "list" else {f"axis__{ending}": line_file(ending)}
+    site = GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {drawn}}}\n"
+    case = imported(tmp_path / "Bend", site, boat__csv=table, **files)
+    found = read_observations(case).table
+    along, across = (found[found["kind"] == kind] for kind in ("velocity", "velocity_across"))
+    for part, column in ((along, "u [m/s]"), (across, "v [m/s]")):
+        assert np.allclose(part[["x", "y"]], cells[["x [m]", "y [m]"]], atol=0.001), "to the millimetre of a station"
+        assert np.allclose(part["value"], cells[column], atol=2e-6), "to the six digits of a station"
+    assert part["used"].all()
+    assert case.imported is not None
+    assert "centreline of 33.53 m, 81 degrees to the left, radius 12 m at least" in case.imported[0].taken
+    assert "lengths along and across the centreline" in case.imported[1].taken
+    assert case.imported[0].name == ("site.yaml" if ending == "list" else f"axis.{ending}")
+
+
+def test_places_given_along_the_channel_stay_there(tmp_path: Path) -> None:
+    site = GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {[list(one) for one in ON_MAP]}}}\n"
+    site += "files: {a.csv: {coordinates: channel}}\n"
+    case = imported(tmp_path / "Bend", site, a__csv="x,y,u,v\n20,1,0.5,0.02\n25,-1,0.6,0.01\n")
+    found = read_observations(case).table
+    assert found["x"].tolist() == pytest.approx([20.0, 25.0] * 2, abs=1e-4)
+    assert found["y"].tolist() == pytest.approx([1.0, -1.0] * 2, abs=1e-4)
+    assert found["value"].tolist() == [0.5, 0.6, 0.02, 0.01]
+
+
+def test_discharge_is_measured_along_the_line(tmp_path: Path, flow: pd.DataFrame) -> None:
+    """A station of the map with a discharge passes the section that lies s along the centreline."""
+    place = flow.iloc[len(flow) // 2]
+    site = GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {[list(one) for one in ON_MAP]}}}\n"
+    case = imported(tmp_path / "Bend", site, q__csv=f"E,N,Q\n{place['east [m]']},{place['north [m]']},2.0\n")
+    found = read_observations(case).table
+    assert found["x"].tolist() == pytest.approx([place["x [m]"]], abs=0.001)
+
+
+def test_parts_begin_on_the_map_and_head_there(tmp_path: Path) -> None:
+    east, north = FRAME.to_map(1.0, 2.0)
+    parts = f"{{parts: [{{length: 12}}, {{radius: 20, angle: 60}}], start: [{east}, {north}], heading: 32}}"
+    case = imported(
+        tmp_path / "Bend", GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {parts}}}\n", a__csv="E,N,u\n1,2,0.5\n"
+    )
+    assert case.grid.centreline is not None
+    assert case.grid.centreline.start == pytest.approx((1.0, 2.0))
+    assert case.grid.centreline.heading == pytest.approx(0.0)
+    assert case.grid.x == pytest.approx((0.0, 12.0 + 20.0 * np.pi / 3.0), abs=1e-4)
+
+
+def test_no_frame_is_needed_but_its_system_may_be_named(tmp_path: Path, flow: pd.DataFrame) -> None:
+    cells = survey(flow)
+    table = cells[list(OF_MAP.values())].set_axis(list(OF_MAP), axis=1).to_csv(index=False)
+    site = GROUND + EXPERIMENTS + "frame: {crs: EPSG:2056}\n"
+    case = imported(
+        tmp_path / "Bend", site + "grid: {centreline: {file: axis.csv}}\n", boat__csv=table, axis__csv=line_file("csv")
+    )
+    assert case.frame == Frame(origin=(0.0, 0.0), angle=0.0, crs="EPSG:2056")
+    found = read_observations(case).table
+    along = found[found["kind"] == "velocity"]
+    assert np.allclose(along[["x", "y"]], cells[["x [m]", "y [m]"]], atol=0.002)
+    assert np.allclose(along["value"], cells["u [m/s]"], atol=1e-4)
+
+
+def test_the_bed_and_the_patches_follow_the_line(tmp_path: Path, flow: pd.DataFrame) -> None:
+    """Levels on the map of a bed that falls along the bend and rises to its banks; a patch drawn on the map."""
+    place = Placement(FRAME, centreline_of(CentrelineShape(points=POINTS)))
+    along, across = (part.ravel() for part in np.meshgrid(np.arange(-1.0, 32.0), np.arange(-4.0, 4.1, 0.5)))
+    east, north = place.to_map(along, across)
+    level = 2.0 - 0.002 * along + 0.02 * across
+    points = "".join(f"{e:.6f} {n:.6f} {z:.6f}\n" for e, n, z in zip(east, north, level, strict=True))
+    corners = np.stack(place.to_map(np.array([18.0, 22.0, 22.0, 18.0]), np.array([0.0, 0.0, 1.5, 1.5])), axis=1)
+    shape = {"type": "Polygon", "coordinates": [[list(one) for one in corners]]}
+    patch = json.dumps({"type": "Feature", "properties": {"name": "Reed"}, "geometry": shape})
+    site = EXPERIMENTS.replace("0.95", "2.9") + SAID + "patches: {file: reed.geojson}\n"
+    site += "bed: {file: bed.xyz, columns: {x: 1, y: 2, z: 3}}\ngrid: {centreline: {file: axis.csv}, y: [-3.5, 3.5]}\n"
+    files = {"bed__xyz": points, "axis__csv": line_file("csv"), "reed__geojson": patch}
+    case = imported(tmp_path / "Bend", site, boat__csv="E,N,u\n683140,247495,0.5\n", **files)
+    found, grid = build_site(case), build_grid(case)
+    assert case.grid.x == pytest.approx((0.0, 31.0), abs=1e-3), "as far as the survey goes"
+    assert np.allclose(found.bed, 2.0 - 0.002 * grid.x[:, None] + 0.02 * grid.y, atol=0.002)
+    planted = np.argwhere(found.patch >= 0)
+    assert len(planted)
+    assert grid.x[planted[:, 0]].min() == pytest.approx(18.0, abs=0.6)
+    assert grid.x[planted[:, 0]].max() == pytest.approx(22.0, abs=0.6)
+    assert 0.0 < grid.y[planted[:, 1]].min() < grid.y[planted[:, 1]].max() < 1.5
+
+
+def test_a_raster_needs_the_width_of_the_grid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head = "ncols 40\nnrows 40\nxllcorner 683110\nyllcorner 247470\ncellsize 1\n"
+    site = EXPERIMENTS + SAID + "bed: {file: dtm.asc}\ngrid: {centreline: {file: axis.csv}}\n"
+    folder = tmp_path / "Bend"
+    folder.mkdir()
+    for name, text in (("site.yaml", site), ("dtm.asc", head + ("2.0 " * 40 + "\n") * 40),
+                       ("axis.csv", line_file("csv")), ("a.csv", "E,N,u\n683140,247495,0.5\n")):  # fmt: skip
+        (folder / name).write_text(text, encoding="utf-8")
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    assert code == 2
+    assert "dtm.asc: expected `grid.y`" in error
+    (folder / "site.yaml").write_text(site.replace("axis.csv}", "axis.csv}, y: [-4, 4]"), encoding="utf-8")
+    assert np.allclose(build_site(vegglue.import_folder(folder, tmp_path / "bend.yaml")).bed, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "files", "said"),
+    [
+        ("{file: no.csv}", {}, "`grid.centreline.file` names no.csv, which is not there"),
+        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2\n"}, "expected a line of 2 to 1,000 points, got 1"),
+        ("{file: a.csv, colums: {x: E}}", {"a__csv": "E,N\n1,2\n3,4\n"}, "does not know `colums`"),
+        ("{file: a.geojson}", {"a__geojson": '{"type": "Point", "coordinates": [1, 2]}'}, "expected one line, got 0"),
+        ("{file: a.geojson}", {"a__geojson": "[]"}, "a.geojson: expected GeoJSON with a line"),
+        (
+            "{file: a.geojson}",
+            {"a__geojson": '{"type": "LineString", "coordinates": [[8.1, 47.2], [8.1001, 47.2003]]}'},
+            "expected coordinates in m, got degrees",
+        ),
+        ("{points: [[0, 0]]}", {}, "`grid.centreline.points`"),
+        ("{parts: [{length: 3}], points: [[0, 0], [1, 1]]}", {}, "either `points` or `parts`"),
+        ("12", {}, "`grid.centreline` expected `points`, `parts` or a `file`, got 12"),
+    ],
+)
+def test_a_line_that_cannot_be_taken_is_refused_in_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    drawn: str,
+    files: dict[str, str],
+    said: str,
+) -> None:
+    folder = tmp_path / "Bend"
+    folder.mkdir()
+    (folder / "site.yaml").write_text(GROUND + EXPERIMENTS + f"grid: {{centreline: {drawn}}}\n", encoding="utf-8")
+    for name, text in {"u__csv": "x,y,u\n1,2,0.5\n", **files}.items():
+        (folder / name.replace("__", ".")).write_text(text, encoding="utf-8")
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    assert code == 2
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_file_on_the_map_of_a_line_is_not_flipped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "Bend"
+    folder.mkdir()
+    site = GROUND + EXPERIMENTS + "grid: {centreline: [[0, 0], [30, 0], [50, 10]]}\nfiles: {u.csv: {flip: x}}\n"
+    (folder / "site.yaml").write_text(site, encoding="utf-8")
+    (folder / "u.csv").write_text("x,y,u\n1,2,0.5\n", encoding="utf-8")
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    assert code == 2
+    assert "u.csv: expected no `flip` of places on the map of a centreline" in error
+
+
+def test_a_line_from_its_other_end(tmp_path: Path) -> None:
+    site = GROUND + EXPERIMENTS + SAID + "grid: {centreline: {file: axis.csv, reverse: true}}\n"
+    case = imported(tmp_path / "Bend", site, axis__csv=line_file("csv"), a__csv="E,N,u\n683140,247495,0.5\n")
+    assert case.grid.centreline is not None
+    assert case.grid.centreline.points is not None
+    assert case.grid.centreline.points[0] == pytest.approx(POINTS[-1], abs=1e-4)
+    assert case.imported is not None
+    assert "the last one first" in case.imported[0].taken
+
+
+def test_a_key_of_the_grid_that_nobody_reads_is_told(tmp_path: Path) -> None:
+    folder = tmp_path / "Brook"
+    site = GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "grid: {centerline: [[0, 0], [1, 1]]}\n"
+    imported(folder, site, u__csv="x,y,u\n1,0,0.5\n")
+    assert "site.yaml: taken as notes, and not read: grid.centerline." in assumptions_of(folder)
+
+
+def test_without_a_line_the_length_and_the_frame_are_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "Brook"
+    folder.mkdir()
+    (folder / "u.csv").write_text("x,y,u\n1,0,0.5\n", encoding="utf-8")
+    for site, said in (
+        (GROUND + EXPERIMENTS, "`channel.length_m` is missing; add it"),
+        (GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "frame: {crs: a}\n", "`frame.origin` is missing"),
+    ):
+        (folder / "site.yaml").write_text(site, encoding="utf-8")
+        code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "brook.yaml")
+        assert code == 2
+        assert said in error

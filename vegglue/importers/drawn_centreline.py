@@ -1,0 +1,157 @@
+"""The centreline of a bend in a site file: points in a file, a list of them, or straight parts and arcs.
+
+A file is a table of x and y, a line of GeoJSON, or of a shapefile; upstream first.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vegglue.case.frame import Frame
+from vegglue.case.resolved_config import Tree
+from vegglue.case.site_schema import CentrelineShape
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.file_words import file_words
+from vegglue.importers.loose_table import readable_text
+from vegglue.importers.measured_rows import Taken, in_the_channel, read_rows, taken_in_words
+from vegglue.importers.placement import Placement
+from vegglue.importers.polygon_files import refuse_degrees
+from vegglue.importers.site_file import FileOfSite
+from vegglue.site.centreline import Centreline, centreline_of
+
+# Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
+MOST_POINTS = 1000
+# Degrees on the map that a whole reach spans at most: a line so short, in a file of a map program, lies in degrees.
+SPAN_OF_DEGREES = 0.5
+
+
+@dataclass(frozen=True)
+class DrawnCentreline:
+    """shape: as a case keeps it, in the frame; line: what it makes; columns, units: of a table; taken: in words."""
+
+    shape: Tree
+    line: Centreline
+    columns: Tree
+    units: Tree
+    taken: str
+
+
+def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: Frame | None) -> DrawnCentreline:
+    """The centreline that a site file describes, brought from the map into the frame.
+
+    Errors: InputError for a file that is not there, or holds no line.
+    """
+    if isinstance(given, CentrelineShape):
+        return _made(_in_frame(given, frame), {}, {}, "as the site file says")
+    path = folder / given.file
+    if not path.is_file():
+        raise InputError(
+            f"{shown_path(folder)}: `grid.centreline.file` names {given.file}, which is not there; correct it."
+        )
+    said = dict(given.model_extra or {})
+    turned = bool(said.pop("reverse", False))
+    words = file_words(said, f"{shown_path(folder)}: `grid.centreline`")
+    taken = _of_map(path) if path.suffix.lower() in (".geojson", ".json", ".shp") else read_rows(path, words)
+    points = _points(path, in_the_channel(taken, Placement(frame), words))
+    refuse_degrees(path, frame, [list(zip(taken.numbers["x"].tolist(), taken.numbers["y"].tolist(), strict=True))])
+    shape = CentrelineShape(points=tuple(points[::-1] if turned else points))
+    how = f"{taken_in_words(taken)}{', the last one first' if turned else ''}"
+    return _made(shape, dict(taken.columns), dict(taken.units), how)
+
+
+def _made(shape: CentrelineShape, columns: Tree, units: Tree, how: str) -> DrawnCentreline:
+    line = centreline_of(shape)
+    kept = {key: _plain(value) for key, value in shape.model_dump(exclude_defaults=True, exclude_none=True).items()}
+    turn = np.degrees(line.heading[-1] - line.heading[0])
+    side = "left" if turn > 0.0 else "right"
+    sharpest = float(np.abs(np.gradient(line.heading, line.s)).max())
+    radius = f", radius {1.0 / sharpest:.3g} m at least" if sharpest > 0.0 else ""
+    taken = f"centreline of {line.s[-1]:.4g} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
+    return DrawnCentreline(kept, line, columns, units, taken)
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as the lists that a config has."""
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return {key: _plain(one) for key, one in value.items() if one is not None} if isinstance(value, dict) else value
+
+
+def _in_frame(shape: CentrelineShape, frame: Frame | None) -> CentrelineShape:
+    """What is said on the map, in the frame."""
+    if frame is None:
+        return shape
+    if shape.points is not None:
+        return CentrelineShape(points=tuple(_rounded(*frame.to_model(*point)) for point in shape.points))
+    start = _rounded(*frame.to_model(*shape.start))
+    return shape.model_copy(update={"start": start, "heading": round(shape.heading - frame.angle, 6)})
+
+
+def _points(path: Path, taken: Taken) -> list[tuple[float, float]]:
+    """Places of the line, each once. Errors: InputError without two of them, or with too many."""
+    if not {"x", "y"} <= taken.numbers.keys():
+        raise InputError(
+            f"{shown_path(path)}: expected columns of x and y, got {', '.join(taken.columns.values())}; name them by "
+            "`columns` of `grid.centreline`."
+        )
+    places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
+    places = places[np.isfinite(places).all(axis=1)]
+    found = [_rounded(*place) for place in places.tolist()]
+    found = [point for number, point in enumerate(found) if number == 0 or point != found[number - 1]]
+    if not 2 <= len(found) <= MOST_POINTS:
+        raise InputError(
+            f"{shown_path(path)}: expected a line of 2 to {MOST_POINTS:,} points, got {len(found):,}; a few dozen do, "
+            "simplify it in the map program."
+        )
+    return found
+
+
+def _of_map(path: Path) -> Taken:
+    """The one line in a file of a map program."""
+    found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path)
+    if len(found) != 1:
+        raise InputError(f"{shown_path(path)}: expected one line, got {len(found)}; save the centreline alone.")
+    x, y = np.array(found[0], dtype=np.float64)[:, :2].T
+    if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0:
+        raise InputError(f"{shown_path(path)}: expected coordinates in m, got degrees; save it in a projected system.")
+    form = (f"line of {path.suffix[1:]}",)
+    return Taken({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, form)
+
+
+def _of_geojson(path: Path) -> list[Any]:
+    try:
+        tree = json.loads(readable_text(path))
+        features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+        shapes = [feature.get("geometry", feature) for feature in features]
+        lines = [[shape["coordinates"]] for shape in shapes if shape["type"] == "LineString"]
+        lines += [shape["coordinates"] for shape in shapes if shape["type"] == "MultiLineString"]
+        return [[(float(point[0]), float(point[1])) for point in line] for part in lines for line in part]
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise InputError(f"{shown_path(path)}: expected GeoJSON with a line, got another file ({error}).") from None
+
+
+def _of_shapefile(path: Path) -> list[Any]:
+    try:
+        import shapefile
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
+            "`pip install 'vegglue[field]'`, or save it as GeoJSON."
+        ) from None
+    try:
+        with shapefile.Reader(str(path)) as reader:
+            shapes = [shape for shape in reader.shapes() if shape.shapeTypeName.startswith("POLYLINE")]
+            return [shape.points[a:b] for shape in shapes for a, b in _parts(shape)]
+    except (OSError, shapefile.ShapefileException) as error:
+        raise InputError(f"{shown_path(path)} cannot be read as a shapefile: {error}; save it anew.") from None
+
+
+def _parts(shape: Any) -> list[tuple[int, int]]:
+    return list(zip(shape.parts, [*shape.parts[1:], len(shape.points)], strict=True))
+
+
+def _rounded(x: float, y: float) -> tuple[float, float]:
+    return round(x, 4), round(y, 4)
