@@ -1,5 +1,7 @@
 """Exports of instruments, built to the description of each format: no measurement, and nobody's file."""
 
+import struct
+
 import numpy as np
 
 FOOT = 0.3048
@@ -89,3 +91,47 @@ def vectrino(mean: tuple[float, float, float], sd: float, samples: int, bad: int
 
 
 VECTRINO_HEADING = "[run.vno]\nNumber of measurements            1000\nSampling rate                         25 Hz\n"
+
+
+def pd0(east: np.ndarray, north: np.ndarray, depth: float, velocity: tuple[float, float], noise: float) -> bytes:
+    """A raw transect as a Rio Grande writes it: the boat of `winriver`, one ensemble a second, 0.2 m deep in the water.
+
+    Header, fixed and variable leader, velocities against the boat, three blocks of quality, bottom track, check sum.
+    """
+    random, cells, draft = np.random.default_rng(3), np.arange(30), 0.2
+    boats = np.gradient(np.column_stack([east, north]), axis=0)
+    return b"".join(
+        _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise * random.standard_normal((cells.size, 2)))
+        for number, boat in enumerate(boats, 1)
+    )
+
+
+def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise) -> bytes:
+    minute, second = divmod(number, 60)
+    clock = (20, 6, 3, 10, minute, second, 0)
+    # Rio Grande 10.16; beams of 20 degrees; cells of 10 cm from 35 cm on; the frame of the earth, tilts used.
+    fixed = struct.pack("<H8B3H4BH4Bhh2BHH4BH",
+                        0, 10, 16, 0x41, 0x41, 0, 13, 4, cells.size, 1, 10, 25, 1, 64, 5, 0, 1500,
+                        0, 1, 0, 0x1F, 0, 0, 0x7D, 0x3D, 35, 15, 1, 5, 50, 0, 5)  # fmt: skip
+    fixed += struct.pack("<8xHBBIB", 0, 255, 0, 12345, 20)
+    leader = struct.pack("<HH7BBHHHHhhhh3B3B8BIHIIB8B", 0x80, number, *clock, 0, 0, 1480, round(10 * draft), 0, 0, 0, 0,
+                         1450, 0, 1, 0, 0, 0, 0, *[0] * 8, 0, 0, 0, 0, 0, 20, *clock)  # fmt: skip
+    below = draft + 0.35 + 0.1 * cells
+    shape = 7.0 / 6.0 * (np.clip(depth - below, 0.0, None) / depth) ** (1.0 / 6.0)
+    water = 1000.0 * (shape[:, None] * np.array(velocity) + noise - boat)
+    rows = np.column_stack([water, np.zeros((cells.size, 2))]).round().astype("<i2")
+    rows[below > 0.97 * depth] = -32768
+    blocks = [fixed, leader, struct.pack("<H", 0x100) + rows.tobytes()]
+    blocks += [
+        struct.pack("<H", name) + bytes([value]) * rows.size
+        for name, value in ((0x200, 120), (0x300, 90), (0x400, 100))
+    ]
+    bottom = (*[round(100 * (depth - draft))] * 4, *(-1000.0 * boat).round().astype(int).tolist(), 0, 0)
+    blocks += [
+        struct.pack("<3H4BHI4H4h", 0x600, 1, 0, 220, 30, 0, 5, 1000, 0, *bottom)
+        + bytes([255] * 4 + [100] * 8 + [0] * 37)
+    ]
+    starts = np.cumsum([6 + 2 * len(blocks), *map(len, blocks)]).tolist()
+    whole = struct.pack("<HHBB", 0x7F7F, starts[-1] + 2, 0, len(blocks)) + struct.pack(f"<{len(blocks)}H", *starts[:-1])
+    whole += b"".join(blocks) + bytes(2)
+    return whole + struct.pack("<H", sum(whole) & 0xFFFF)

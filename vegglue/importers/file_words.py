@@ -17,7 +17,9 @@ class FileWords:
     components of velocity are those of the map or of the channel, None for map where the site has a frame; flip:
     coordinates that run the other way;
     line: ends of the tape (first its zero), for tables along a tape; start: where a boat started; position: of a probe
-    whose record holds no place; sheet: of a workbook; floor, surface: z of the file at the lowest bed and at the water.
+    whose record holds no place; sheet: of a workbook; floor, surface: z of the file at the lowest bed and at the water;
+    draft: of a raw ADCP below the surface [m], None for that in the file; declination: of its compass, degrees that
+    magnetic north lies east of true north.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -35,6 +37,8 @@ class FileWords:
     sheet: str | None = None
     floor: float | None = None
     surface: float | None = None
+    draft: float | None = None
+    declination: float = 0.0
 
 
 def file_words(given: Any, where: str) -> FileWords:
@@ -50,9 +54,9 @@ def file_words(given: Any, where: str) -> FileWords:
         changes[key] = _by_role(given.get(key, {}), f"{where}.{key}")
     for name, unit in changes["units"].items():
         si_factor(unit, ROLES[name].quantity or "length", f"{where}.units.{name}")
-    for key in ("floor", "surface"):
+    for key, quantity in (("floor", "length"), ("surface", "length"), ("draft", "length"), ("declination", "angle")):
         if key in given:
-            changes[key] = in_si(given[key], "length", f"{where}.{key}")
+            changes[key] = in_si(given[key], quantity, f"{where}.{key}")
     if "standard_error" in given:
         # Of a velocity or of a level: a bare number is in SI, and words of the two are told apart by themselves.
         quantity = "velocity" if "/" in str(given["standard_error"]) else "length"

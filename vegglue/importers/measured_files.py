@@ -16,7 +16,7 @@ from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords, file_words
-from vegglue.importers.instruments import reader_of
+from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words
 from vegglue.importers.placement import Placement
@@ -25,7 +25,7 @@ from vegglue.importers.stations import StationTable, station_tables
 from vegglue.measurements.kinds import KINDS
 
 # Endings of files that may hold measurements; others need an entry in `files`.
-ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm", ".dis")
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm", ".dis", *BINARY_ENDINGS)
 # Files of a folder that are none of its measurements; what is held out is only for judging a finished model.
 OTHERS = ("holdout.csv", "answer.json", "readme.txt")
 

@@ -1,0 +1,96 @@
+"""Raw files of instruments: read where a kept reader does, else refused with what to export instead."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from instrument_files import pd0, winriver
+from reach import said_to
+
+from vegglue.errors import InputError
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.instruments import reader_of
+from vegglue.importers.raw_transects import read_pd0
+from vegglue.importers.winriver import read_winriver
+
+ALONG = np.linspace(0.0, 15.0, 151)  # 0.06 m/s east and 0.08 m/s north, whole millimetres as the format has them
+TRACK = (0.6 * ALONG, 0.8 * ALONG)
+SITE = """\
+channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}
+experiments: {June: {discharge: 2.0, level: 0.95}}
+"""
+
+
+def raw_file(folder: Path) -> Path:
+    (folder / "t.PD0").write_bytes(pd0(*TRACK, 2.0, (0.64, -0.48), 0.05))
+    return folder / "t.PD0"
+
+
+def test_a_raw_transect_gives_the_stations_of_its_ascii_output(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = raw_file(tmp_path)
+    (tmp_path / "t_ASC.TXT").write_text(winriver(*TRACK, 2.0, (0.64, -0.48), 0.05), encoding="utf-8")
+    assert reader_of(path) is read_pd0
+    words = FileWords(start=(100.0, 200.0))
+    raw, text = read_pd0(path, words), read_winriver(tmp_path / "t_ASC.TXT", words)
+    assert raw.size == text.size == 15
+    for role in ("x", "y"):
+        assert np.allclose(raw.numbers[role], text.numbers[role], atol=0.08), "the reader drops the last ensemble"
+    assert raw.numbers["east_velocity"] == pytest.approx(0.64, abs=0.02)
+    assert raw.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.02)
+    assert np.median(raw.numbers["u_se"]) == pytest.approx(np.median(text.numbers["u_se"]), rel=0.5)
+    assert "PD0 of a Rio Grande, 150 ensembles" in raw.said[0]
+
+
+def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = raw_file(tmp_path)
+    plain, turned = (read_pd0(path, FileWords(start=(0.0, 0.0), declination=d)) for d in (0.0, 90.0))
+    assert np.allclose(turned.numbers["east_velocity"], plain.numbers["north_velocity"], atol=1e-6)
+    assert np.allclose(turned.numbers["north_velocity"], -plain.numbers["east_velocity"], atol=1e-6)
+    assert np.allclose(turned.numbers["x"], plain.numbers["y"], atol=1e-6)
+
+
+def test_a_damaged_raw_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = tmp_path / "t.PD0"
+    for content in (b"\x7f\x7f", b"\x7f\x7f" + bytes(400), raw_file(tmp_path).read_bytes()[:500]):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"t\.PD0") as caught:
+            read_pd0(path, FileWords(start=(0.0, 0.0)))
+        assert len(str(caught.value).splitlines()) == 1
+
+
+def test_without_the_library_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "mhkit", None)
+    with pytest.raises(InputError, match=r"read by mhkit, which is not installed; run `pip install 'vegglue\[adcp\]'`"):
+        read_pd0(raw_file(tmp_path), FileWords(start=(0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "begins", "said"),
+    [
+        ("p.vec", b"\xa5\x05\x18\x00", "got a binary record of a Nortek instrument, which is not read"),
+        ("p.dat", b"\xa5\x05\x18\x00", "convert it to ASCII in the maker's program"),
+        ("p.ad2cp", b"\xa5\x0a\x0a\x10", "got a binary record of a Nortek instrument"),
+        ("p.vno", b"??", "got a record .vno, which is not read"),
+        ("p.ntk", b"??", "got a record .ntk, which is not read"),
+    ],
+)
+def test_records_that_nobody_reads_say_what_to_export(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    begins: bytes,
+    said: str,
+) -> None:
+    folder = tmp_path / "flume"
+    folder.mkdir()
+    (folder / "site.yaml").write_text(SITE, encoding="utf-8")
+    (folder / name).write_bytes(begins + bytes(100))
+    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "flume.yaml")
+    assert code == 2
+    assert f"{name}: expected an export as text" in error
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
