@@ -4,6 +4,7 @@ from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from reach import said_to
 
@@ -133,6 +134,26 @@ def test_repeats_give_their_mean_and_its_error(tmp_path: Path) -> None:
     assert table["value"].tolist() == pytest.approx([0.42, 0.41])
     assert table["standard_error"].iloc[0] == pytest.approx(0.02 / 3**0.5, rel=1e-4)
     assert np.isnan(table["standard_error"].iloc[1])
+
+
+@pytest.mark.parametrize("name", ["holdout__csv", "holdout__txt"])
+def test_what_is_held_out_may_have_any_form(tmp_path: Path, name: str) -> None:
+    """It goes where no calibration sees it, in SI and in the channel."""
+    site = CHANNEL + JUNE + "holdout: {May: {discharge: 2.4, level: 1.0}}\n"
+    site += "frame: {origin: [683120, 247480], angle: 32}\n"
+    own = "Easting,Northing,u\n683126.78,247484.24,0.5\n"
+    folder = folder_of(tmp_path / "brook", site, adv__csv=own, **{name: survey_on_the_map()})
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert [one.file.name for one in case.observations] == ["adv-velocity.csv"]
+    assert case.validation is not None
+    assert list(case.validation.experiments) == ["May"]
+    found = {one.kind: pd.read_csv(one.file) for one in case.validation.observations}
+    assert set(found["velocity"]["experiment"]) == {"May"}
+    assert np.allclose(found["velocity"]["u"], 0.4, atol=1e-4)
+    assert np.allclose(found["velocity_across"]["v"], 0.02, atol=1e-4)
+    assert np.allclose(found["velocity"][["x", "y"]], [(8, -1), (8, 0), (20, -1), (20, 1)], atol=0.002)
+    assert case.imported is not None
+    assert [one.name for one in case.imported] == ["adv.csv", name.replace("__", ".")]
 
 
 def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:

@@ -23,12 +23,11 @@ from vegglue.importers.config_parts import (
     even,
     loguniform_prior,
     normal_prior,
-    observed,
     validated,
     viscosity_prior,
 )
 from vegglue.importers.drawn_centreline import drawn_centreline
-from vegglue.importers.measured_files import MeasuredFiles, measured_files, named_from, record
+from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.site_file import (
@@ -82,9 +81,10 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     }
     if site.bed is not None:
         tree["parameters"].pop("k_s")
-    if site.holdout and (folder / "holdout.csv").is_file():
-        held_out = {name: _experiment(given) for name, given in site.holdout.items()}
-        tree |= validated(held_out, [observed("velocity", named_from(folder / "holdout.csv", target))])
+    held_out = held_out_files(folder, target, site, place)
+    if held_out.observations:
+        tree |= validated({name: _experiment(given) for name, given in site.holdout.items()}, held_out.observations)
+        measured.imported.extend(held_out.imported)
     if drawn is not None:
         tree["grid"]["centreline"] = drawn.shape
         said = folder / given.file if isinstance(given, FileOfSite) else site_file(folder)

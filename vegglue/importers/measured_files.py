@@ -20,14 +20,16 @@ from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words
 from vegglue.importers.placement import Placement
-from vegglue.importers.site_file import FieldSite
+from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_file
 from vegglue.importers.stations import StationTable, station_tables
-from vegglue.measurements.kinds import KINDS
+from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 
 # Endings of files that may hold measurements; others need an entry in `files`.
 ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm", ".dis", *BINARY_ENDINGS)
-# Files of a folder that are none of its measurements; what is held out is only for judging a finished model.
-OTHERS = ("holdout.csv", "answer.json", "readme.txt")
+# Files of a folder that are none of its measurements.
+OTHERS = ("answer.json", "readme.txt")
+# What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
+KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": kind_of(STREAMWISE)}
 
 
 @dataclass(frozen=True)
@@ -44,28 +46,44 @@ def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement
     Errors: InputError where there are none, or one cannot be read.
     """
     said = _entries(folder, site)
-    found: list[Tree] = []
-    imported: list[Tree] = []
-    others = []
-    for path in _candidates(folder, said, used):
-        kind = next((kind for kind in KINDS.values() if kind.file == path.name), None)
-        named = kind is not None and path.name not in said and not place.turned
-        if named and kind is not None and _is_plain(path, kind.column, kind.at_point):
-            found.append(observed(kind.name, named_from(path, target)))
-        else:
-            others.append((path, said.get(path.name, FileWords())))
-    for group in _groups(others):
-        tables, records = _brought(group, place, list(site.experiments))
-        for table in tables:
-            _write(data_folder(target) / table.file, table)
-            found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
-        imported += records
-    if not found:
+    found = _read(_candidates(folder, said, used), said, target, place, list(site.experiments))
+    if not found.observations:
         files = ", ".join(kind.file for kind in KINDS.values())
         raise InputError(
             f"{shown_path(folder)}: expected one of {files}, or other tables of measurements, got none; put what was "
             "measured there."
         )
+    return found
+
+
+def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
+    """What is held out, read as all measurements are; nothing where no experiment is held out.
+
+    Errors: InputError where a file cannot be read.
+    """
+    paths = [path for path in (held_out_file(folder),) if path is not None and site.holdout]
+    return _read(paths, _entries(folder, site), target, place, list(site.holdout))
+
+
+def _read(
+    paths: Sequence[Path], said: Mapping[str, FileWords], target: Path, place: Placement, experiments: list[str]
+) -> MeasuredFiles:
+    """Tables that a case can name stay where they are; others are brought into that form beside the config."""
+    found: list[Tree] = []
+    imported: list[Tree] = []
+    others = []
+    for path in paths:
+        kind = KIND_OF_FILE.get(path.name)
+        if kind is not None and path.name not in said and not place.turned and _is_plain(path, kind):
+            found.append(observed(kind.name, named_from(path, target)))
+        else:
+            others.append((path, said.get(path.name, FileWords())))
+    for group in _groups(others):
+        tables, records = _brought(group, place, experiments)
+        for table in tables:
+            _write(data_folder(target) / table.file, table)
+            found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
+        imported += records
     return MeasuredFiles(found, imported)
 
 
@@ -104,16 +122,17 @@ def _candidates(folder: Path, said: Mapping[str, FileWords], used: Sequence[str]
         for path in folder.iterdir()
         if path.is_file()
         and path.name not in used
+        and path.stem.lower() != HELD_OUT
         and (path.name in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
     ]
     return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name))
 
 
-def _is_plain(path: Path, column: str, at_point: bool) -> bool:
+def _is_plain(path: Path, kind: Kind) -> bool:
     """Whether a table is in the form that a case names as it is: commas, and the columns by their own names."""
     lines = readable_text(path).splitlines()
     heading = [name.strip() for name in lines[0].split(",")] if lines else []
-    return {"x", column, *(["y"] if at_point else [])} <= set(heading)
+    return {"x", kind.column, *(["y"] if kind.at_point else [])} <= set(heading)
 
 
 def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, FileWords]]]:

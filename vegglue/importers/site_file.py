@@ -53,6 +53,8 @@ Length = Annotated[Number, Field(gt=0, le=1e6)]
 Level = Annotated[Number, Field(ge=-1e4, le=1e4)]
 
 
+# What the file of measurements is called that no calibration sees, whatever its ending.
+HELD_OUT = "holdout"
 ONE_DIRECTION = "either `angle` or `towards: [east, north]`"
 
 
@@ -243,6 +245,12 @@ def site_file(folder: Path) -> Path:
     return folder / "site.yaml" if (folder / "site.yaml").is_file() else folder / "site.json"
 
 
+def held_out_file(folder: Path) -> Path | None:
+    """The file of measurements that a folder holds out: holdout.csv, else the first other table of that name."""
+    found = sorted(path for path in folder.iterdir() if path.is_file() and path.stem.lower() == HELD_OUT)
+    return next((path for path in found if path.name == "holdout.csv"), next(iter(found), None))
+
+
 def read_site(path: Path) -> FieldSite:
     """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
     try:
@@ -292,8 +300,8 @@ def left_open(folder: Path) -> list[str]:
         unread += [f"{name}.{key}" for key in given.get(name) or {} if key not in part.model_fields]
     told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
     told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
-    if (folder / "holdout.csv").is_file() and not site.holdout:
-        told.append(f"holdout.csv is not read: {path.name} names no experiment under `holdout`.")
+    if (held_out := held_out_file(folder)) is not None and not site.holdout:
+        told.append(f"{held_out.name} is not read: {path.name} names no experiment under `holdout`.")
     return told
 
 
