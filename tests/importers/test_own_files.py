@@ -17,6 +17,7 @@ from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import read_rows
 from vegglue.importers.unit_words import in_si, unit_named
 from vegglue.measurements.observations import read_observations
+from vegglue.workflow.import_folder import assumptions_of
 
 CHANNEL = "channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
 JUNE = "experiments: {June: {discharge: 2000 l/s, level: 95 cm}}\n"
@@ -154,6 +155,31 @@ def test_what_is_held_out_may_have_any_form(tmp_path: Path, name: str) -> None:
     assert np.allclose(found["velocity"][["x", "y"]], [(8, -1), (8, 0), (20, -1), (20, 1)], atol=0.002)
     assert case.imported is not None
     assert [one.name for one in case.imported] == ["adv.csv", name.replace("__", ".")]
+
+
+def test_a_flume_has_walls_and_no_banks(tmp_path: Path) -> None:
+    """The grid ends at the walls, their roughness is a parameter, and `check` wants no wider grid."""
+    channel = "channel: {length_m: 8, bottom_width_m: 0.8, bed_slope: 0.001}\nwalls: {n: 0.010}\n"
+    june = "experiments: {June: {discharge: 32 l/s, level: 9.2 cm}}\n"
+    folder = folder_of(tmp_path / "flume", channel + june, a__csv="x,y,u [cm/s]\n4,-0.2,44\n4,0,46\n4,0.2,44\n")
+    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
+    assert case.grid.y == (-0.4, 0.4)
+    assert case.friction.walls is not None
+    assert case.friction.walls.n == "n_w"
+    assert list(case.parameters) == ["n_b", "n_w"]
+    assert case.model_error.bed == 0.001
+    remarks = " ".join(vegglue.check(case, runs=tmp_path).remarks)
+    assert "side edges" not in remarks
+    assert "widen" not in remarks
+
+
+def test_walls_leave_no_room_for_banks(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "flume", CHANNEL + JUNE + "walls: true\n", a__csv="x,y,u\n4,0,0.4\n")
+    assert vegglue.import_folder(folder, tmp_path / "flume.yaml").grid.y == (-1.5, 1.5)
+    assert "not read: channel.bank_slope_v_per_h, as there are walls." in " ".join(assumptions_of(folder))
+    (folder / "site.yaml").write_text(CHANNEL.replace("bank_slope_v_per_h: 0.5, ", "") + JUNE, encoding="utf-8")
+    with pytest.raises(InputError, match=r"`channel.bank_slope_v_per_h` is missing; add it"):
+        vegglue.import_folder(folder, tmp_path / "flume.yaml")
 
 
 def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:

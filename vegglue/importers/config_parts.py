@@ -7,6 +7,8 @@ from vegglue.case.resolved_config import Tree
 
 # One bed of Manning's law, whose coefficient is the parameter n_b.
 MANNING_BED = {"law": "manning", "n": "n_b"}
+# Spread of what is known of a wall by its material [-]: a quarter, as between glass and wood.
+WALL_LOG_SD = 0.25
 # By how much the model itself may be wrong everywhere: friction by some per cent, as between two codes with the same
 # laws or one patch of stones and the next, the bed by what a levelled survey is off. Chosen before the sets that it is
 # judged by; the diagnosis says how much of it is needed.
@@ -15,6 +17,8 @@ MODEL_ERROR: Tree = {"model_error": {"friction": 0.05, "bed": 0.01}}
 # deviation: transverse mixing is 0.1 to 0.2 h u* in straight flumes and 0.3 to 0.9 h u* in streams (Fischer et al.
 # 1979, Mixing in inland and coastal waters, chapter 5; not checked against it).
 VISCOSITY, VISCOSITY_FACTOR = "eddy_viscosity", 2.0
+# The same of a flume, whose floor was set with a level.
+MODEL_ERROR_OF_FLUME: Tree = {"model_error": {"friction": 0.05, "bed": 0.001}}
 # 256 members show within a minute or two what a case is like; all errors are those stated with the data.
 FIRST_LOOK: Tree = {"simulate": {"members": 256, "seed": 1}, "infer": {"sigma": "known"}, **MODEL_ERROR}
 
@@ -43,6 +47,11 @@ def viscosity_prior(stated: float, factor: float) -> Tree:
     """The prior of an eddy viscosity [m2/s] that is known to within a factor."""
     log_sd = round(math.log(factor), 4)
     return lognormal_prior(stated, log_sd, "m2/s", "ν", f"eddy viscosity, known to within a factor of {factor:g}")
+
+
+def wall_prior(median: float) -> Tree:
+    """The prior of n_w, Manning's n of side walls about as known [s m^(-1/3)]."""
+    return lognormal_prior(median, WALL_LOG_SD, "s m^(-1/3)", "n_w", "Manning coefficient of the side walls")
 
 
 def observed(kind: str, file: str, experiment: str | None = None) -> Tree:

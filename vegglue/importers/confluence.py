@@ -21,11 +21,11 @@ from vegglue.importers.config_parts import (
     MANNING_BED,
     bed_prior,
     even,
-    lognormal_prior,
     loguniform_prior,
     normal_prior,
     observed,
     validated,
+    wall_prior,
 )
 from vegglue.measurements.csv_table import read_table
 
@@ -40,7 +40,7 @@ RULE, BESIDES = 0.02, 0.01
 # across, whose means over the last four sections, where walls leave them no place, are -0.05 to -0.11 of those along.
 TURN = 0.05
 # Manning's n of the walls [s m^(-1/3)], whose material is not stated: glass 0.010, wood 0.012 (Chow 1959, table 5-6).
-WALL, WALL_LOG_SD = 0.011, 0.25
+WALL = 0.011
 # Levels are means of so many blocks across, and as long; what is left of their error [m].
 BLOCKS, LEVEL_ERROR = 3, 0.001
 # Spread of the priors of what integration of the sections gives [-], and of the level at the outlet [m].
@@ -138,7 +138,7 @@ def _priors(vertical: Array, blocks: Array, width: float) -> Tree:
         ),
         "outlet_level": normal_prior(_rounded(level), OUTLET, "m", "z_out", "water level at the outlet"),
         "n_b": bed_prior(0.005, 0.05),
-        "n_w": lognormal_prior(WALL, WALL_LOG_SD, "s m^(-1/3)", "n_w", "Manning coefficient of the side walls"),
+        "n_w": wall_prior(WALL),
         "eddy_viscosity": loguniform_prior(3e-5, 1e-2, "m2/s", "ν", "eddy viscosity"),
     }  # fmt: skip
 

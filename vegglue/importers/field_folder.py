@@ -2,13 +2,13 @@
 
 site.json or site.yaml says channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at
 x = 0, y = 0 on the axis) or bed (a survey; see surveyed_bed.py), patches (x, y, stems_per_m2, or a file of polygons),
-canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to, experiments (discharge_m3_s,
-downstream_level_m), and, where needed, frame and grid (site_file.py), its centreline (drawn_centreline.py) and files
-(file_words.py). What is not said there is left at the defaults below.
+walls of a flume, canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to,
+experiments (discharge_m3_s, downstream_level_m), and, where needed, frame and grid (site_file.py), its centreline
+(drawn_centreline.py) and files (file_words.py). What is not said there is left at the defaults below.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from vegglue.case.frame import Frame
@@ -18,6 +18,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MANNING_BED,
+    MODEL_ERROR_OF_FLUME,
     VISCOSITY,
     bed_prior,
     even,
@@ -25,6 +26,7 @@ from vegglue.importers.config_parts import (
     normal_prior,
     validated,
     viscosity_prior,
+    wall_prior,
 )
 from vegglue.importers.drawn_centreline import drawn_centreline
 from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record
@@ -49,6 +51,8 @@ CELLS_ACROSS, LENGTHENED = 16, 8.0 / 3.0
 FEWEST_COLUMNS = 4
 # Dry bank kept above the highest water level [m].
 FREEBOARD = 0.35
+# Bank slope of a bed without banks, whose grid ends where its floor does.
+OF_NO_BANK = 1.0
 # Relative error of a canopy height estimated by eye.
 BY_EYE = 0.12
 
@@ -79,8 +83,10 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         "observations": measured.observations,
         **FIRST_LOOK,
     }
-    if site.bed is not None:
+    if site.bed is not None or site.walls is not None:
         tree["parameters"].pop("k_s")
+    if site.walls is not None:
+        tree |= _as_flume(tree, site.walls.n)
     held_out = held_out_files(folder, target, site, place)
     if held_out.observations:
         tree |= validated({name: _experiment(given) for name, given in site.holdout.items()}, held_out.observations)
@@ -103,15 +109,20 @@ def _ground(folder: Path, target: Path, site: FieldSite, place: Placement, measu
         ground = surveyed_bed(folder, target, site, place)
         measured.imported.extend(ground.imported)
         return ground.tree
-    grid = _grid(site.channel, site.experiments, site.grid or SiteGrid(), place)
+    grid = _grid(site, site.channel, place)
+    friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
+    if site.walls is None:
+        friction["classes"]["bank"] = {"law": "keulegan", "k_s": "k_s"}
+        friction["zones"] = [{"class": "bank", "beyond_slope_break": 0.2}]
+    return {"grid": grid, "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}], "friction": friction}
+
+
+def _as_flume(tree: Tree, wall: float) -> Tree:
+    """Side walls of Manning's n about `wall`, a smoother bed than a stream's, and one that is known better."""
     return {
-        "grid": grid,
-        "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}],
-        "friction": {
-            "classes": {"bed": MANNING_BED, "bank": {"law": "keulegan", "k_s": "k_s"}},
-            "default": "bed",
-            "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
-        },
+        "friction": tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}},
+        "parameters": tree["parameters"] | {"n_b": BED_OF_FLUME, "n_w": wall_prior(wall)},
+        **MODEL_ERROR_OF_FLUME,
     }
 
 
@@ -135,6 +146,8 @@ PARAMETERS: Tree = {
     "n_b": bed_prior(0.01, 0.2),
     "k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks"),
 }
+# Of plaster and glass up to cobbles.
+BED_OF_FLUME = bed_prior(0.005, 0.05)
 PHI = loguniform_prior(0.02, 100.0, "-", "φ", "drag of the densest patches")
 
 
@@ -156,23 +169,25 @@ def _trapezoid(channel: Channel, upstream: float) -> Tree:
     return {
         "axis": 0.0,
         "bottom_width": channel.bottom_width_m,
-        "bank_slope": round(channel.bank_slope_v_per_h, 6),
+        "bank_slope": round(channel.bank_slope_v_per_h or OF_NO_BANK, 6),
         "bed_slope": channel.bed_slope,
         "level": 0.0 - channel.bed_slope * upstream,
     }
 
 
-def _grid(channel: Channel, experiments: Mapping[str, MeasuredFlow], given: SiteGrid, place: Placement) -> Tree:
-    """What the site file says, else cells that fit the floor, as wide as the water can get."""
+def _grid(site: FieldSite, channel: Channel, place: Placement) -> Tree:
+    """What the site file says, else cells that fit the floor, as wide as the water can get, or as the walls let it."""
+    given = site.grid or SiteGrid()
     along = float(place.line.s[-1]) if place.line is not None else 0.0
     x = list(given.x or (0.0, round(along, 4) if channel.length_m is None else channel.length_m))
     length, width = x[1] - x[0], channel.bottom_width_m
     fall = channel.bed_slope * length
-    highest = max(given.downstream_level_m for given in experiments.values())
+    highest = max(one.downstream_level_m for one in site.experiments.values())
     # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
-    beside = math.ceil(depth / channel.bank_slope_v_per_h / dy / 2) * 2
+    bank = channel.bank_slope_v_per_h
+    beside = math.ceil(depth / bank / dy / 2) * 2 if bank is not None and site.walls is None else 0
     half = round(0.5 * width + beside * dy, 6)
     y = list(given.y or (-half, half))
     if given.y is not None:

@@ -65,12 +65,29 @@ class _Said(BaseModel):
 
 
 class Channel(_Said):
-    """A trapezoid; z = 0 on the floor at x = 0, y = 0 on the axis. Without a length it is as long as its centreline."""
+    """A trapezoid, or with `walls` its floor alone; z = 0 on the floor at x = 0, y = 0 on the axis.
+
+    Without a length it is as long as its centreline.
+    """
 
     length_m: Length | None = None
     bottom_width_m: Annotated[Number, Field(gt=0, le=1e4)]
-    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)]
+    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)] | None = None
     bed_slope: Annotated[Number, Field(gt=-1, lt=1)]
+
+
+class FlumeWalls(_Said):
+    """Vertical walls along both sides of the grid, as of a flume.
+
+    n: Manning's, about as known; glass 0.010, wood 0.012 (Chow 1959, table 5-6) [s m^(-1/3)].
+    """
+
+    n: Annotated[Number, Field(ge=0.001, le=0.1)] = 0.011
+
+
+def _walled(given: Any) -> Any:
+    """`walls: true` as walls of which nothing else is known, and false as none."""
+    return ({} if given else None) if isinstance(given, bool) else given
 
 
 class PlantedPatch(_Said):
@@ -183,6 +200,7 @@ class FieldSite(_Said):
     grid: SiteGrid | None = None
     frame: SiteFrame | None = None
     classes: FileOfSite | None = None
+    walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
     files: dict[PrintableName, dict[str, Any] | None] = {}
     experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
     holdout: dict[PrintableName, MeasuredFlow] = {}
@@ -205,10 +223,12 @@ class FieldSite(_Said):
             return given
         if "bed" not in given:
             _Ground.model_validate(given)
-        if not (isinstance(given.get("grid"), dict) and given["grid"].get("centreline")):
-            for key, whole in (("channel", _Straight), ("frame", _StraightlyPlaced)):
-                if isinstance(given.get(key), dict):
-                    whole.model_validate(given)
+        straight = not (isinstance(given.get("grid"), dict) and given["grid"].get("centreline"))
+        whole: list[tuple[str, type[BaseModel]]] = [("channel", _Straight), ("frame", _StraightlyPlaced)]
+        whole = (whole if straight else []) + ([] if given.get("walls") else [("channel", _Banked)])
+        for key, model in whole:
+            if isinstance(given.get(key), dict):
+                model.model_validate(given)
         return given
 
 
@@ -222,6 +242,14 @@ class _StraightChannel(_Said):
 
 class _Straight(_Said):
     channel: _StraightChannel
+
+
+class _ChannelWithBanks(_Said):
+    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)]
+
+
+class _Banked(_Said):
+    channel: _ChannelWithBanks
 
 
 class _WholeFrame(_Said):
@@ -298,6 +326,8 @@ def left_open(folder: Path) -> list[str]:
     parts: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame}
     for name, part in parts.items():
         unread += [f"{name}.{key}" for key in given.get(name) or {} if key not in part.model_fields]
+    if site.walls is not None and site.channel is not None and site.channel.bank_slope_v_per_h is not None:
+        unread.append("channel.bank_slope_v_per_h, as there are walls")
     told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
     told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
     if (held_out := held_out_file(folder)) is not None and not site.holdout:
