@@ -171,6 +171,7 @@ def test_a_flume_has_walls_and_no_banks(tmp_path: Path) -> None:
     remarks = " ".join(vegglue.check(case, runs=tmp_path).remarks)
     assert "side edges" not in remarks
     assert "widen" not in remarks
+    assert "n_w" not in remarks, "it acts on the walls"
 
 
 def test_walls_leave_no_room_for_banks(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def remarks_on_idle_parameters(case: Case, site: Site) -> Iterator[str]:
 
 
 def _acts(place: KeyPath, classes: set[str], growing: set[str]) -> bool:
-    if place[0] == "friction":
+    if place[:2] == ("friction", "classes"):
         return place[2] in classes
     return place[-2] in growing if "stands" in place[:-2] else True
 

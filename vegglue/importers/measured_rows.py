@@ -137,8 +137,9 @@ def _in_all(role: str, parts: Sequence[Taken]) -> bool:
 
 def taken_in_words(taken: Taken) -> str:
     """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma, 12 rows`."""
+    units = {role: f" [{unit}]" for role, unit in taken.units.items()}
     roles = [
-        f"{role} from {heading}" + (f" [{taken.units[role]}]" if role in taken.units else "")
+        f"{role} from {heading.removesuffix(units.get(role, ''))}{units.get(role, '')}"
         for role, heading in taken.columns.items()
     ]
     return f"{', '.join(roles)}; {', '.join(taken.said)}; {so_many(taken.size, 'row')}"
