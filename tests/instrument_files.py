@@ -52,22 +52,28 @@ def riversurveyor(places: list[float], depths: list[float], velocities: list[flo
     return "\n".join([*lines, "", "Comments; "])
 
 
-def winriver(east: np.ndarray, north: np.ndarray, depth: float, velocity: tuple[float, float], noise: float) -> str:
-    """Classic ASCII output of WinRiver II: a boat at (east, north) of its start, a power law in cells of 0.1 m."""
-    random, cells = np.random.default_rng(3), np.arange(0.3, 0.9 * depth, 0.1)
-    lines = ["Test transect", "made to the format", f"10 25 15 {cells.size} 1 100 1"]
-    for number, (x, y) in enumerate(zip(east, north, strict=True), 1):
+def winriver(east: np.ndarray, north: np.ndarray, depth, velocity, noise: float, seed: int = 3) -> str:
+    """Classic ASCII output of WinRiver II: a boat at (east, north) of its start, a power law in cells of 0.1 m.
+
+    depth, velocity: of the whole transect, or of each ensemble (n,), (n, 2).
+    """
+    random, depths = np.random.default_rng(seed), np.broadcast_to(depth, east.shape)
+    flows = np.broadcast_to(velocity, (east.size, 2))
+    most = np.arange(0.3, 0.9 * depths.max(), 0.1).size
+    lines = ["Test transect", "made to the format", f"10 25 15 {most} 1 100 1"]
+    for number, (x, y, deep, flow) in enumerate(zip(east, north, depths, flows, strict=True), 1):
+        cells = np.arange(0.3, 0.9 * deep, 0.1)
         lines += [
             f"20 6 3 10 28 {number % 60} 0 {number} 1 0.5 -0.3 120.0 14.5",
-            f"-3.0 10.0 0.1 0.2 0 0 0 0 {depth} {depth} {depth} {depth}",
+            f"-3.0 10.0 0.1 0.2 0 0 0 0 {deep:.2f} {deep:.2f} {deep:.2f} {deep:.2f}",
             f"{np.hypot(x, y):.2f} {number * 1.0} {y:.3f} {x:.3f} {np.hypot(x, y):.3f}",
             "30000 30000 -32768 -32768 0",
             "1.0 0.2 0.1 0 0 0 0 0.3 1.2",
             f"{cells.size} cm BT dB 0.43 0.139",
         ]
         for place in cells:
-            shape = 7.0 / 6.0 * ((depth - place) / depth) ** (1.0 / 6.0)
-            ve, vn = (100.0 * (shape * one + noise * random.standard_normal()) for one in velocity)
+            shape = 7.0 / 6.0 * ((deep - place) / deep) ** (1.0 / 6.0)
+            ve, vn = (100.0 * (shape * one + noise * random.standard_normal()) for one in flow)
             bad = number == 5 and place == cells[0]
             row = "-32768 -32768 -32768 -32768" if bad else f"{np.hypot(ve, vn):.2f} 90.0 {ve:.2f} {vn:.2f}"
             lines.append(f"{place:.2f} {row} 0.5 0.2 80 80 80 80 100 0.01")

@@ -128,6 +128,19 @@ def test_files_of_the_page_are_read_as_shown(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_folders_of_others_come_to_a_verdict_as_shown(tmp_path: Path) -> None:
+    """docs/from_your_files.md: a bend and a flume, a diagnosis each, some 20 s in all."""
+    page = ROOT / "docs" / "from_your_files.md"
+    shutil.copytree(ROOT / "data" / "samples", tmp_path, dirs_exist_ok=True)
+    written = re.findall(r"^```yaml\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert written == [(tmp_path / name / "site.yaml").read_text(encoding="utf-8") for name in ("bend", "flume")]
+    for one in shown_in(page):
+        said = printed(one.command, tmp_path)
+        for wanted in one.lines:
+            assert any(is_said(wanted, each) for each in said), "\n".join([one.command, f"shown: {wanted}", *said])
+
+
+@pytest.mark.slow
 def test_the_law_of_the_page_is_found(tmp_path: Path) -> None:
     """The commands of docs/discover.md, on the channel of twins."""
     for name in ("configs/twin.yaml", "data/twin"):
