@@ -1,31 +1,43 @@
 """Which reader a file of measurements needs: that of an instrument's export, or that of plain columns."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, read_rows
 from vegglue.importers.nortek import is_nortek, read_nortek
 from vegglue.importers.raw_transects import PD0_BEGINS, read_pd0
+from vegglue.importers.riversurveyor_mat import MAT_73_BEGINS, MAT_BEGINS, read_riversurveyor
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
 from vegglue.importers.winriver import is_winriver, read_winriver
 
 InstrumentReader = Callable[[Path, FileWords], Taken]
 # Endings of files that instruments write for programs, beside those of tables.
-BINARY_ENDINGS = (".pd0", ".000", ".vec", ".vno", ".ntk", ".ad2cp")
+BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
 # How binary records of Nortek begin: those of the Vector and Vectrino, and those of the Signature.
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
+# Readers of files that are no text, by how these begin.
+BY_BEGINNING: Mapping[bytes, InstrumentReader] = {
+    PD0_BEGINS: read_pd0,
+    ZIP_BEGINS: read_flowtracker2,
+    MAT_BEGINS: read_riversurveyor,
+    MAT_73_BEGINS: read_riversurveyor,
+}
+LONGEST_MARK = max(map(len, BY_BEGINNING))
 
 
 def reader_of(path: Path) -> InstrumentReader:
     """The reader that knows the file, told by how it begins. Errors: InputError for a record that none knows."""
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         return read_rows
-    if (begin := _beginning(path)) == PD0_BEGINS:
-        return read_pd0
-    if begin in NORTEK_BEGINS or path.suffix.lower() in BINARY_ENDINGS:
+    begin = _beginning(path)
+    known = next((reader for mark, reader in BY_BEGINNING.items() if begin.startswith(mark)), None)
+    if known is not None:
+        return known
+    if begin.startswith(NORTEK_BEGINS) or path.suffix.lower() in BINARY_ENDINGS:
         raise InputError(
             f"{shown_path(path)}: expected an export as text, got {_binary_words(path, begin)}, which is not read; "
             "convert it to ASCII in the maker's program (Nortek: .dat with .hdr; WinRiver: classic ASCII output)."
@@ -41,10 +53,11 @@ def reader_of(path: Path) -> InstrumentReader:
 def _beginning(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(2)
+            return file.read(LONGEST_MARK)
     except OSError as error:
         raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
 
 
 def _binary_words(path: Path, begin: bytes) -> str:
-    return "a binary record of a Nortek instrument" if begin in NORTEK_BEGINS else f"a record {path.suffix}"
+    nortek = begin.startswith(NORTEK_BEGINS)
+    return "a binary record of a Nortek instrument" if nortek else f"a record {path.suffix}"

@@ -25,7 +25,8 @@ from vegglue.importers.stations import StationTable, station_tables
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 
 # Endings of files that may hold measurements; others need an entry in `files`.
-ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm", ".dis", *BINARY_ENDINGS)
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".dis")
+ENDINGS = (*TEXT_ENDINGS, ".xlsx", ".xlsm", *BINARY_ENDINGS)
 # Files of a folder that are none of its measurements.
 OTHERS = ("answer.json", "readme.txt")
 # What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
@@ -115,17 +116,23 @@ def _entries(folder: Path, site: FieldSite) -> dict[str, FileWords]:
 
 
 def _candidates(folder: Path, said: Mapping[str, FileWords], used: Sequence[str]) -> list[Path]:
-    """Files of every kind in their order, then others by name."""
+    """Files of every kind in their order, then others by name; no raw record whose export lies beside it."""
     order = {kind.file: place for place, kind in enumerate(KINDS.values())}
+    free = [path for path in folder.iterdir() if path.is_file() and path.name not in used]
+    texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
     paths = [
         path
-        for path in folder.iterdir()
-        if path.is_file()
-        and path.name not in used
-        and path.stem.lower() != HELD_OUT
+        for path in free
+        if path.stem.lower() != HELD_OUT
         and (path.name in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
+        and (path.name in said or not _is_raw_of(path, texts))
     ]
     return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name))
+
+
+def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
+    """Whether a file is the raw record that one of the texts was exported from: `mill_000` of `mill_000_ASC`."""
+    return path.suffix.lower() in BINARY_ENDINGS and any(text.startswith(path.stem) for text in texts)
 
 
 def _is_plain(path: Path, kind: Kind) -> bool:

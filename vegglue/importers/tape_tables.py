@@ -36,7 +36,7 @@ def read_tape_table(path: Path, words: FileWords) -> Taken:
     table, units = _flowtracker(path, text) if FLOWTRACKER.search(text) else _riversurveyor(path, text)
     taken = rows_of_table(path, table, replace(words, units={**units, **words.units}, columns=_columns(table)))
     wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0)
-    return on_the_tape(path, _last_of_each_place(taken.only(wet)), words)
+    return on_the_tape(path, last_of_each_place(taken.only(wet)), words)
 
 
 def on_the_tape(path: Path, taken: Taken, words: FileWords) -> Taken:
@@ -97,7 +97,7 @@ def _riversurveyor(path: Path, text: str) -> tuple[LooseTable, dict[str, str]]:
     return LooseTable(headings, ("",) * len(headings), tuple(rows), False, "RiverSurveyor Stationary"), units
 
 
-def _last_of_each_place(taken: Taken) -> Taken:
+def last_of_each_place(taken: Taken) -> Taken:
     """Of points of one vertical the last row, which has its mean; with an error where the file has no sound one."""
     place = taken.numbers["tape"]
     last = np.array([not np.any(place[i + 1 :] == place[i]) for i in range(taken.size)], dtype=bool)

@@ -1,0 +1,85 @@
+"""ADCP transects of SonTek's RiverSurveyor (S5, M9), as RiverSurveyor Live exports them to MATLAB.
+
+Format: RiverSurveyor S5/M9 System Manual (SonTek, February 2013), appendix C, with velocities east, north and up:
+structures Summary (Depth, Cells, Track of each sample), System (Cell_Start, Cell_Size, Step) and WaterTrack (Velocity,
+over ground). Cell_Start counts from the surface, as QRev of the U.S. Geological Survey reads it.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.measured_rows import Taken
+from vegglue.importers.transects import BoatProfile, stations_of_transect
+from vegglue.importers.unit_words import si_factor
+
+# How a MATLAB file begins: version 5, which the program writes, and 7.3, which is HDF5.
+MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+# Numbers of the manual: velocities as east, north and up; a boat that is told from the bottom or from satellites; the
+# step of a sample within the transect, between those at its edges.
+EAST_NORTH_UP, OVER_GROUND, IN_TRANSECT = 2, (1, 2, 3), 3
+
+
+def read_riversurveyor(path: Path, words: FileWords) -> Taken:
+    """Stations of a transect. Errors: InputError naming the file."""
+    parts = _parts(path)
+    try:
+        return stations_of_transect(path, words, list(_profiles(path, parts)), "RiverSurveyor MATLAB export")
+    except (AttributeError, IndexError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{shown_path(path)}: expected the structures of a MATLAB export of RiverSurveyor Live, got others "
+            f"({error}); export it anew."
+        ) from None
+
+
+def _parts(path: Path) -> dict[str, Any]:
+    try:
+        found: dict[str, Any] = loadmat(path, struct_as_record=False, squeeze_me=True)
+    except (OSError, ValueError, TypeError, KeyError, NotImplementedError, MatReadError) as error:
+        raise InputError(
+            f"{shown_path(path)} cannot be read as a MATLAB file of version 5 ({type(error).__name__}); export it anew "
+            "from RiverSurveyor Live."
+        ) from None
+    missing = [name for name in ("Setup", "Summary", "System", "WaterTrack") if name not in found]
+    if missing:
+        raise InputError(
+            f"{shown_path(path)}: expected a MATLAB export of RiverSurveyor Live, got one without "
+            f"{', '.join(missing)}; files that QRev saves are not read, export the transect from RiverSurveyor Live."
+        )
+    return found
+
+
+def _profiles(path: Path, parts: dict[str, Any]) -> Iterator[BoatProfile]:
+    """One profile for each sample of the transect; cells counted as used for the discharge, others hold no velocity."""
+    setup, summary, system, water = (parts[name] for name in ("Setup", "Summary", "System", "WaterTrack"))
+    if int(setup.coordinateSystem) != EAST_NORTH_UP or int(setup.trackReference) not in OVER_GROUND:
+        raise InputError(
+            f"{shown_path(path)}: expected velocities in ENU coordinates with a track reference, got others; set both "
+            "in RiverSurveyor Live and export it again."
+        )
+    velocity = _in_si(path, water, "Velocity", "velocity")
+    velocity = np.where(velocity == 0.0, np.nan, velocity)  # the file is filled up with zeros
+    depth, track = _in_si(path, summary, "Depth", "length"), _in_si(path, summary, "Track", "length")
+    start, size = _in_si(path, system, "Cell_Start", "length"), _in_si(path, system, "Cell_Size", "length")
+    cells = np.asarray(summary.Cells, dtype=int)
+    for i in np.flatnonzero(np.asarray(system.Step) == IN_TRANSECT):
+        below = start[i] + (np.arange(cells[i]) + 0.5) * size[i]
+        moving = velocity[: cells[i], :2, i]
+        good = np.isfinite(moving).all(axis=1) & (below < depth[i])
+        yield BoatProfile(
+            (float(track[i, 0]), float(track[i, 1])), float(depth[i]), depth[i] - below[good], moving[good]
+        )
+
+
+def _in_si(path: Path, part: Any, name: str, quantity: str) -> Array:
+    """A variable in the SI unit; `Units` beside it says that of the file."""
+    unit = getattr(getattr(part, "Units", None), name, "")
+    factor = si_factor(str(unit), quantity, shown_path(path)) if str(unit) else 1.0
+    return np.asarray(getattr(part, name), dtype=np.float64) * factor
