@@ -101,6 +101,42 @@ def test_a_geotiff_lies_on_the_map_cell_by_cell(done: Done) -> None:
     np.testing.assert_array_equal(values.ravel(), table["level [m]"].fillna(-9999.0).to_numpy()[north_up])
 
 
+def test_gdal_opens_the_geotiff_with_the_same_numbers(done: Done) -> None:
+    """Through rasterio, where it is installed: levels, their place on the turned grid, and the system of the map."""
+    rasterio = pytest.importorskip("rasterio")
+    table = at_cells(done)
+    with rasterio.open(done[2] / "level-june.tif") as file:
+        assert file.crs.to_epsg() == 2056
+        values = file.read(1, masked=True).filled(np.nan)
+        rows, columns = np.indices(values.shape)
+        east, north = rasterio.transform.xy(file.transform, rows.ravel(), columns.ravel())
+    found = sorted(zip(np.round(east, 4), np.round(north, 4), values.ravel(), strict=True))
+    wanted = sorted(zip(table["east [m]"].round(4), table["north [m]"].round(4), table["level [m]"], strict=True))
+    np.testing.assert_allclose(np.array(found), np.array(wanted), atol=2e-4)
+
+
+def test_gdal_opens_the_mesh_with_the_same_numbers(done: Done) -> None:
+    """Its driver of netCDF reads each variable of the mesh as rows of numbers, one for each face."""
+    rasterio = pytest.importorskip("rasterio")
+    with rasterio.Env() as environment:
+        if "netCDF" not in environment.drivers():
+            pytest.skip("this GDAL has no driver of netCDF")
+    of_pixels = pytest.warns(rasterio.errors.NotGeoreferencedWarning)  # which a mesh does not have
+    with of_pixels, rasterio.open(f"netcdf:{done[2] / 'flow.nc'}:u_june") as file:
+        values = file.read().ravel()
+    np.testing.assert_array_equal(values, at_cells(done)["u [m/s]"])
+
+
+def test_a_library_of_meshes_knows_the_faces(done: Done) -> None:
+    """xugrid, where it is installed: the mesh as UGRID has it, its areas those of the cells, its values theirs."""
+    xugrid = pytest.importorskip("xugrid")
+    mesh, table = xugrid.open_dataset(done[2] / "flow.nc", engine="h5netcdf"), at_cells(done)
+    assert mesh.ugrid.grid.n_face == len(table)
+    assert np.allclose(mesh.ugrid.grid.area, 1.25 * 0.75)
+    assert np.allclose(mesh.ugrid.grid.face_coordinates[:, 0], table["east [m]"])
+    np.testing.assert_array_equal(mesh["depth_june"], table["depth [m]"])
+
+
 def test_only_some_forms_and_a_case_without_a_frame(tmp_path: Path) -> None:
     case = load_case(write_reach(tmp_path, COARSE))
     found = export(case, runs=tmp_path / "runs", forms=("csv",))
