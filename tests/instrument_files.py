@@ -141,3 +141,39 @@ def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise) -> bytes:
     whole = struct.pack("<HHBB", 0x7F7F, starts[-1] + 2, 0, len(blocks)) + struct.pack(f"<{len(blocks)}H", *starts[:-1])
     whole += b"".join(blocks) + bytes(2)
     return whole + struct.pack("<H", sum(whole) & 0xFFFF)
+
+
+def vector(mean: tuple[float, float, float], sd: float, samples: int, bad: int) -> bytes:
+    """A binary record of a Vector: hardware, head and user configuration, header, then samples and, each second, the
+    state of the instrument. 32 Hz, XYZ coordinates; the first `bad` samples of low correlation and no sense.
+    """
+    random, rate = np.random.default_rng(5), 32
+    clock = bytes([0x28, 0x00, 0x03, 0x10, 0x20, 0x06])  # 3 June 2020, 10:28:00, each digit four bits
+    user = bytearray(508)
+    struct.pack_into("<H", user, 14, 512 // rate)  # time between samples, in 1/512 s
+    struct.pack_into("<2H", user, 30, 1, 1)  # XYZ coordinates; one cell
+    blocks = [
+        _nortek(0x05, b"VEC 1234" + bytes(28) + b"3.35" + bytes(2), 48),
+        _nortek(0x04, bytes(218), 224),
+        _nortek(0x00, bytes(user[2:]), 512),
+        _nortek(0x12, clock + struct.pack("<H", samples) + bytes(28), 42),
+    ]
+    for number in range(samples):
+        if number % rate == 0:
+            state = struct.pack("<2H3hhBBH", 120, 14800, 0, 0, 0, 1450, 0, 0, 0)
+            blocks.append(_nortek(0x11, bytes([0x28, number // rate]) + clock[2:] + state, 28))
+        sound = number >= bad
+        velocity = [round(1000 * (one + sd * random.standard_normal())) if sound else -3000 for one in mean]
+        body = struct.pack("<4B2H3h6B", 0, number % 256, 0, 0, 0, 0, *velocity, 90, 90, 90, *[95 if sound else 30] * 3)
+        blocks.append(_summed(bytes([0xA5, 0x10]) + body))
+    return b"".join(blocks)
+
+
+def _nortek(name: int, body: bytes, size: int) -> bytes:
+    """A block with its size in words of two bytes, and its check sum."""
+    head = struct.pack("<BBH", 0xA5, name, size // 2)
+    return _summed(head + body.ljust(size - 6, b"\0")[: size - 6])
+
+
+def _summed(block: bytes) -> bytes:
+    return block + struct.pack("<H", (0xB58C + sum(struct.unpack(f"<{len(block) // 2}H", block))) & 0xFFFF)

@@ -6,7 +6,7 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from instrument_files import pd0, winriver
+from instrument_files import pd0, vector, winriver
 from reach import said_to
 from scipy.io import savemat
 
@@ -15,6 +15,7 @@ from vegglue.errors import InputError
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import read_flowtracker2
 from vegglue.importers.instruments import reader_of
+from vegglue.importers.nortek import read_vector
 from vegglue.importers.raw_transects import read_pd0
 from vegglue.importers.riversurveyor_mat import read_riversurveyor
 from vegglue.importers.winriver import read_winriver
@@ -65,6 +66,22 @@ def test_a_damaged_raw_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"t\.PD0") as caught:
             read_pd0(path, FileWords(start=(0.0, 0.0)))
         assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_binary_record_of_a_vector_is_its_mean_without_spikes(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = tmp_path / "p.vec"
+    path.write_bytes(vector((0.30, 0.02, 0.0), 0.03, 960, bad=20))
+    assert reader_of(path) is read_vector
+    taken = read_vector(path, FileWords(position=(12.0, 0.5, 0.1)))
+    assert taken.numbers["u"][0] == pytest.approx(0.30, abs=0.005)
+    assert taken.numbers["v"][0] == pytest.approx(0.02, abs=0.005)
+    assert taken.numbers["u_std"][0] == pytest.approx(0.03, rel=0.1)
+    assert taken.numbers["duration_s"][0] == pytest.approx(940 / 32, rel=0.01)
+    assert "samples at 32 Hz, 20 left out" in taken.said[0]
+    assert taken.words["device"] == ["Vector"]
+    with pytest.raises(InputError, match="expected where the probe stood"):
+        read_vector(path, FileWords())
 
 
 def riversurveyor_mat(path: Path, unit: str, **setup: int) -> None:
@@ -161,8 +178,12 @@ def test_another_zip_is_refused_in_one_sentence(tmp_path: Path) -> None:
 
 def test_without_the_library_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "mhkit", None)
-    with pytest.raises(InputError, match=r"read by mhkit, which is not installed; run `pip install 'vegglue\[adcp\]'`"):
+    (tmp_path / "p.vec").write_bytes(vector((0.3, 0.0, 0.0), 0.03, 64, bad=0))
+    said = r"read by mhkit, which is not installed; run `pip install 'vegglue\[instruments\]'`"
+    with pytest.raises(InputError, match=said):
         read_pd0(raw_file(tmp_path), FileWords(start=(0.0, 0.0)))
+    with pytest.raises(InputError, match=said):
+        read_vector(tmp_path / "p.vec", FileWords(position=(0.0, 0.0, 0.1)))
 
 
 def test_a_raw_record_beside_its_export_is_left_alone(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, read_rows
-from vegglue.importers.nortek import is_nortek, read_nortek
+from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
 from vegglue.importers.raw_transects import PD0_BEGINS, read_pd0
 from vegglue.importers.riversurveyor_mat import MAT_73_BEGINS, MAT_BEGINS, read_riversurveyor
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
@@ -17,11 +17,12 @@ from vegglue.importers.winriver import is_winriver, read_winriver
 InstrumentReader = Callable[[Path, FileWords], Taken]
 # Endings of files that instruments write for programs, beside those of tables.
 BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
-# How binary records of Nortek begin: those of the Vector and Vectrino, and those of the Signature.
+# How binary records of Nortek begin that no kept reader has: those of the Vectrino, and those of the Signature.
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
 # Readers of files that are no text, by how these begin.
 BY_BEGINNING: Mapping[bytes, InstrumentReader] = {
     PD0_BEGINS: read_pd0,
+    VECTOR_BEGINS: read_vector,
     ZIP_BEGINS: read_flowtracker2,
     MAT_BEGINS: read_riversurveyor,
     MAT_73_BEGINS: read_riversurveyor,

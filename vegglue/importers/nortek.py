@@ -1,4 +1,4 @@
-"""Records of one point: the ASCII exports (.dat) of Nortek's Vectrino and Vector, as their mean and its scatter.
+"""Records of one point: Nortek's Vectrino and Vector as ASCII (.dat), and the Vector as it wrote it (.vec).
 
 Format: Nortek's conversion to ASCII: no heading, one line a sample; Vectrino: time, counter, status, velocities x, y,
 z1, z2 [m/s], then amplitudes, ratios and correlations of four beams; Vector: burst, counter, velocities x, y, z [m/s],
@@ -16,7 +16,11 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken
+from vegglue.importers.raw_files import opened_raw
 
+# How a binary record of a Vector begins: its hardware configuration, with its serial number.
+VECTOR_BEGINS = b"\xa5\x05\x18\x00VEC"
+BYTES_OF_A_SAMPLE = 24
 LEAST_CORRELATION = 70.0  # %, the maker's advice for means and turbulence
 SPIKE = 6.0  # median absolute deviations beyond which a sample is a spike; of noise one in 10,000 is
 
@@ -43,34 +47,64 @@ def is_nortek(path: Path, text: str) -> bool:
 
 
 def read_nortek(path: Path, words: FileWords) -> Taken:
-    """One row: the mean of the record at its `position`, its standard deviation and its length.
+    """One row: the mean of an ASCII record at its `position`. Errors: InputError naming the file."""
+    _refuse_nowhere(path, words)
+    layout, rows = _rows(path)
+    velocity = rows[:, layout.velocity : layout.velocity + 3]
+    return record_mean(path, words, layout.name, velocity, rows[:, layout.correlation], _rate(path))
 
-    Samples of low correlation and spikes are left out, and counted. Errors: InputError naming the file.
+
+def read_vector(path: Path, words: FileWords) -> Taken:
+    """One row of a binary record of a Vector, as the probe's axes x, y and z have it.
+
+    Errors: InputError naming the file, for other axes, and without mhkit.
     """
+    _refuse_nowhere(path, words)
+    most = path.stat().st_size // BYTES_OF_A_SAMPLE
+    data = opened_raw(path, "ASCII data from Nortek's program, the .dat and the .hdr", most)
+    axes = str(data.attrs.get("coord_sys"))
+    if axes != "inst" or not {"vel", "corr"} <= set(data):
+        raise InputError(
+            f"{shown_path(path)}: expected a record in XYZ coordinates, got one in {axes}; convert it in Nortek's "
+            "program, and export ASCII data."
+        )
+    velocity, correlation = (np.asarray(data[name].values, dtype=np.float64).T for name in ("vel", "corr"))
+    there = np.isfinite(velocity).all(axis=1)  # the reader fills up what the file does not hold
+    return record_mean(path, words, "Vector, binary", velocity[there], correlation[there], float(data.attrs["fs"]))
+
+
+def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correlation: Array, rate: float) -> Taken:
+    """The mean of a record at its `position`, its standard deviation and its length.
+
+    velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%]; rate: [1/s]. Samples of low correlation
+    and spikes are left out, and counted. Errors: InputError where none is left.
+    """
+    u, v, w = velocity.T
+    sound = correlation.min(axis=1) >= LEAST_CORRELATION
+    trusted = sound & _no_spike(u) & _no_spike(v) & _no_spike(w)
+    if not trusted.any():
+        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
+    x, y, z = (np.array([one]) for one in words.position or ())
+    numbers = {
+        "x": x,
+        "y": y,
+        "z": z,
+        **{axis: part[trusted].mean(keepdims=True) for axis, part in zip("uvw", (u, v, w), strict=True)},
+    }
+    numbers["u_std"] = u[trusted].std(ddof=1, keepdims=True)
+    numbers["duration_s"] = np.array([trusted.sum() / rate])
+    said = f"{name}, {len(velocity):,} samples at {rate:g} Hz, {len(velocity) - int(trusted.sum()):,} left out"
+    device = name.partition(",")[0]
+    return Taken(numbers, {"device": [device]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
+                 dict.fromkeys("uvw", "m/s"), (said,))  # fmt: skip
+
+
+def _refuse_nowhere(path: Path, words: FileWords) -> None:
     if words.position is None:
         raise InputError(
             f"{shown_path(path)}: expected where the probe stood, `position: [x, y, z]`, which no record says; add "
             "it to this file in `files`."
         )
-    layout, rows = _rows(path)
-    u, v, w = rows[:, layout.velocity : layout.velocity + 3].T
-    sound = rows[:, layout.correlation].min(axis=1) >= LEAST_CORRELATION
-    trusted = sound & _no_spike(u) & _no_spike(v) & _no_spike(w)
-    if not trusted.any():
-        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
-    rate = _rate(path)
-    x, y, z = (np.array([one]) for one in words.position)
-    numbers = {
-        "x": x,
-        "y": y,
-        "z": z,
-        **{name: part[trusted].mean(keepdims=True) for name, part in zip("uvw", (u, v, w), strict=True)},
-    }
-    numbers["u_std"] = u[trusted].std(ddof=1, keepdims=True)
-    numbers["duration_s"] = np.array([trusted.sum() / rate])
-    said = f"{layout.name}, {len(rows):,} samples at {rate:g} Hz, {len(rows) - int(trusted.sum()):,} left out"
-    return Taken(numbers, {"device": [layout.name]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
-                 dict.fromkeys("uvw", "m/s"), (said,))  # fmt: skip
 
 
 def _rows(path: Path) -> tuple[_Layout, Array]:

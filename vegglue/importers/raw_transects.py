@@ -1,14 +1,11 @@
 """ADCP transects as the instrument wrote them: PD0 of Teledyne RD Instruments, the raw files of WinRiver.
 
-The bytes are read by mhkit, which carries on dolfyn. Format: WorkHorse Commands and Output Data Format (Teledyne RD
-Instruments, P/N 957-6156-00): velocities against the boat, and those of the bottom against it.
+Format: WorkHorse Commands and Output Data Format (Teledyne RD Instruments, P/N 957-6156-00): velocities against the
+boat, and those of the bottom against it.
 """
 
-import io
 import math
-import warnings
 from collections.abc import Iterator
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import Taken
+from vegglue.importers.raw_files import opened_raw, turned_to_earth
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 
 # How a file of ensembles begins.
@@ -36,26 +34,7 @@ def read_pd0(path: Path, words: FileWords) -> Taken:
 
 def _opened(path: Path) -> Any:
     """The ensembles of a file, velocities turned to the earth (magnetic north)."""
-    try:
-        from mhkit import dolfyn
-    except ImportError:
-        raise InputError(
-            f"{shown_path(path)}: raw ADCP files (PD0) are read by mhkit, which is not installed; run "
-            "`pip install 'vegglue[adcp]'`, or export classic ASCII output from WinRiver."
-        ) from None
-    data, problem = None, ""
-    with redirect_stdout(io.StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the reader leaves files open, and warns of what is of no use here
-        try:
-            data = dolfyn.read(str(path), userdata=False)
-            if data.attrs["coord_sys"] != "earth":
-                dolfyn.rotate2(data, "earth")
-        except Exception as error:  # what breaks on a damaged file is of any kind
-            problem = f"{type(error).__name__}: {error}"
-    if data is None or problem:
-        raise InputError(
-            f"{shown_path(path)} cannot be read as PD0 ({problem}); export classic ASCII output from WinRiver."
-        )
+    data = turned_to_earth(path, opened_raw(path, "classic ASCII output from WinRiver"))
     missing = {"vel", "vel_bt", "dist_bt"} - set(data)
     if missing:
         raise InputError(
