@@ -96,7 +96,9 @@ def test_what_is_imported_is_what_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[<>=\[ ]", requirement)[0] for requirement in project["dependencies"]}
     assert declared == {DISTRIBUTIONS.get(library, library) for library in HOMES} | NOWHERE_ELSE
-    extras = [one for name in ("arviz", "cluster", "field", "instruments") for one in project["optional-dependencies"][name]]
+    extras = [
+        one for name in ("arviz", "cluster", "field", "instruments") for one in project["optional-dependencies"][name]
+    ]
     wanted = {DISTRIBUTIONS.get(library, library) for library in HOMES_OF_EXTRAS}
     assert wanted <= {re.split("[<>=]", one)[0] for one in extras}
 

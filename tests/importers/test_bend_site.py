@@ -173,6 +173,7 @@ def test_a_raster_needs_the_width_of_the_grid(
     [
         ("{file: no.csv}", {}, "`grid.centreline.file` names no.csv, which is not there"),
         ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2\n"}, "expected a line of 2 to 1,000 points, got 1"),
+        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2.0006\n"}, "expected a line of 2 to 1,000 points, got 1"),
         ("{file: a.csv, colums: {x: E}}", {"a__csv": "E,N\n1,2\n3,4\n"}, "does not know `colums`"),
         ("{file: a.geojson}", {"a__geojson": '{"type": "Point", "coordinates": [1, 2]}'}, "expected one line, got 0"),
         ("{file: a.geojson}", {"a__geojson": "[]"}, "a.geojson: expected GeoJSON with a line"),

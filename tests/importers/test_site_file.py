@@ -28,6 +28,17 @@ def places(tree: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from places(tree[key], (*above, key))
 
 
+# What a site file may say of a bend, a frame and walls.
+BENT: dict[str, Any] = SITE | {
+    "grid": {
+        "x": [0, 30], "y": [-3, 3], "cell": [1, 0.5],
+        "centreline": {"parts": [{"length": 12.0}, {"radius": 20.0, "angle": 60.0}], "start": [5, 2], "heading": 30.0},
+    },
+    "frame": {"origin": [3.0, 4.0], "angle": 20.0, "crs": "EPSG:2056"},
+    "walls": {"n": 0.01},
+}  # fmt: skip
+
+
 def put(tree: Any, place: tuple[Any, ...], value: Any) -> Any:
     if not place:
         return value
@@ -53,6 +64,18 @@ def test_whatever_stands_in_it_is_read_or_refused(tmp_path: Path, place: tuple[A
     folder = field_folder(tmp_path / "site")
     for value in ODD:
         (folder / "site.json").write_text(json.dumps(put(SITE, place, value)), encoding="utf-8")
+        said = refusal(folder, tmp_path / "site.yaml")
+        assert len(said.splitlines()) <= 1
+        assert len(said) < 1000
+
+
+@pytest.mark.parametrize(
+    "place", [one for one in places(BENT) if one[:1] in (("grid",), ("frame",), ("walls",))], ids=str
+)
+def test_whatever_stands_of_a_bend_is_read_or_refused(tmp_path: Path, place: tuple[Any, ...]) -> None:
+    folder = field_folder(tmp_path / "site")
+    for value in (*ODD, [[0, 0], [1, 1]], {"file": "velocities.csv"}, {"points": [[0, 0], [0, 0]]}):
+        (folder / "site.json").write_text(json.dumps(put(BENT, place, value)), encoding="utf-8")
         said = refusal(folder, tmp_path / "site.yaml")
         assert len(said.splitlines()) <= 1
         assert len(said) < 1000

@@ -10,17 +10,26 @@ from pydantic import Field, model_validator
 from vegglue.case.parts import Interval, Number, Part, Polygon, Positive, Value, exactly
 from vegglue.case.size_limits import LARGEST_FACTORS, MOST_CELLS, factor_bytes
 
+# Bounds far beyond any stream, within which the geometry of a centreline has its digits; a hundred turns.
+_Run = Annotated[Number, Field(ge=1e-3, le=1e6)]
+_Turn = Annotated[Number, Field(ge=-36000.0, le=36000.0)]
+_OnMap = Annotated[Number, Field(ge=-1e9, le=1e9)]
+# Points of a centreline nearer than this are one, and an arc shorter than this is none [m].
+NEAREST_POINTS = 1e-3
+
 
 class Stretch(Part):
-    length: Positive | None = Field(default=None, description="length of a straight part [m]")
-    radius: Positive | None = Field(default=None, description="radius of an arc [m]")
-    angle: Number | None = Field(default=None, description="turn of an arc, positive to the left [degrees]")
+    length: _Run | None = Field(default=None, description="length of a straight part [m]")
+    radius: _Run | None = Field(default=None, description="radius of an arc [m]")
+    angle: _Turn | None = Field(default=None, description="turn of an arc, positive to the left [degrees]")
 
     @model_validator(mode="after")
     def _straight_or_arc(self) -> Self:
         exactly(self, "an arc" if self.length is None else "a straight part", STRETCHES)
         if self.angle == 0.0:
             raise ValueError("an `angle` that is not 0; a straight part has a `length`")
+        if self.run < NEAREST_POINTS:
+            raise ValueError("an arc of at least 1 mm")
         return self
 
     @property
@@ -33,20 +42,20 @@ STRETCHES = {"a straight part": ("length",), "an arc": ("radius", "angle")}
 
 
 class CentrelineShape(Part):
-    points: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=2)] | None = Field(
+    points: Annotated[tuple[tuple[_OnMap, _OnMap], ...], Field(min_length=2)] | None = Field(
         default=None, description="x, y on the map, upstream first, a smooth curve passes through them [m]"
     )
     parts: Annotated[tuple[Stretch, ...], Field(min_length=1)] | None = Field(
         default=None, description="straight parts and arcs, upstream first"
     )
-    start: tuple[Number, Number] = Field(default=(0.0, 0.0), description="x, y where `parts` begin [m]")
-    heading: Number = Field(default=0.0, description="where `parts` head first, from x towards y [degrees]")
+    start: tuple[_OnMap, _OnMap] = Field(default=(0.0, 0.0), description="x, y where `parts` begin [m]")
+    heading: _Turn = Field(default=0.0, description="where `parts` head first, from x towards y [degrees]")
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if (self.points is None) == (self.parts is None):
             raise ValueError("either `points` or `parts`")
-        if self.points is not None and any(one == other for one, other in pairwise(self.points)):
+        if self.points is not None and any(math.dist(*pair) < NEAREST_POINTS for pair in pairwise(self.points)):
             raise ValueError("`points` that differ from the one before")
         return self
 

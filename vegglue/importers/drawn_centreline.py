@@ -4,6 +4,7 @@ A file is a table of x and y, a line of GeoJSON, or of a shapefile; upstream fir
 """
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
-from vegglue.case.site_schema import CentrelineShape
+from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import file_words
 from vegglue.importers.loose_table import readable_text
@@ -85,7 +86,7 @@ def _in_frame(shape: CentrelineShape, frame: Frame | None) -> CentrelineShape:
     if frame is None:
         return shape
     if shape.points is not None:
-        return CentrelineShape(points=tuple(_rounded(*frame.to_model(*point)) for point in shape.points))
+        return shape.model_copy(update={"points": tuple(_rounded(*frame.to_model(*one)) for one in shape.points)})
     start = _rounded(*frame.to_model(*shape.start))
     return shape.model_copy(update={"start": start, "heading": round(shape.heading - frame.angle, 6)})
 
@@ -99,8 +100,10 @@ def _points(path: Path, taken: Taken) -> list[tuple[float, float]]:
         )
     places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
     places = places[np.isfinite(places).all(axis=1)]
-    found = [_rounded(*place) for place in places.tolist()]
-    found = [point for number, point in enumerate(found) if number == 0 or point != found[number - 1]]
+    found: list[tuple[float, float]] = []
+    for point in (_rounded(*place) for place in places.tolist()):
+        if not found or math.dist(point, found[-1]) >= NEAREST_POINTS:
+            found.append(point)
     if not 2 <= len(found) <= MOST_POINTS:
         raise InputError(
             f"{shown_path(path)}: expected a line of 2 to {MOST_POINTS:,} points, got {len(found):,}; a few dozen do, "
