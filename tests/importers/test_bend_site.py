@@ -16,7 +16,7 @@ from vegglue.case.site_schema import CentrelineShape
 from vegglue.importers.placement import Placement
 from vegglue.measurements.observations import read_observations
 from vegglue.site.centreline import centreline_of
-from vegglue.site.grid import build_grid
+from vegglue.site.grid import build_grid, places_on_map
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_folder import assumptions_of
 
@@ -151,21 +151,44 @@ def test_the_bed_and_the_patches_follow_the_line(tmp_path: Path, flow: pd.DataFr
     assert 0.0 < grid.y[planted[:, 1]].min() < grid.y[planted[:, 1]].max() < 1.5
 
 
+def test_cross_sections_of_a_bend_are_carried_on_along_it(tmp_path: Path) -> None:
+    """Four of them, square to the line on the map, of a bed that falls along it and rises to its banks."""
+    place = Placement(FRAME, centreline_of(CentrelineShape(points=POINTS)))
+    along, across = (part.ravel() for part in np.meshgrid([0.0, 9.0, 20.0, 33.0], np.arange(-4.0, 4.1, 1.0)))
+    rows = zip(*place.to_map(along, across), 2.0 - 0.002 * along + 0.05 * np.abs(across), strict=True)
+    points = "E,N,z\n" + "".join(f"{e:.6f},{n:.6f},{z:.6f}\n" for e, n, z in rows)
+    site = EXPERIMENTS.replace("0.95", "2.9") + SAID + "bed: {file: sections.csv, sections: true}\n"
+    site += "grid: {centreline: {file: axis.csv}, x: [0, 33], y: [-3.5, 3.5], cell: [1, 0.5]}\n"
+    case = imported(
+        tmp_path / "Bend", site, sections__csv=points, axis__csv=line_file("csv"), a__csv="E,N,u\n683140,247495,0.5\n"
+    )
+    found, grid = build_site(case), build_grid(case)
+    assert np.allclose(found.bed, 2.0 - 0.002 * grid.x[:, None] + 0.05 * np.abs(grid.y), atol=0.003)
+    assert case.imported is not None
+    assert "in 4 cross-sections" in " ".join(one.taken for one in case.imported)
+
+
 def test_a_raster_needs_the_width_of_the_grid(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """Levels of a plane on the map, which the grid then reads where its cells lie."""
+    at = np.arange(40.0) + 0.5
+    rows = (2.0 + 0.01 * at[None, :] - 0.02 * at[::-1, None]).tolist()
+    levels = "\n".join(" ".join(f"{one:.6f}" for one in row) for row in rows)
     head = "ncols 40\nnrows 40\nxllcorner 683110\nyllcorner 247470\ncellsize 1\n"
     site = EXPERIMENTS + SAID + "bed: {file: dtm.asc}\ngrid: {centreline: {file: axis.csv}}\n"
     folder = tmp_path / "Bend"
     folder.mkdir()
-    for name, text in (("site.yaml", site), ("dtm.asc", head + ("2.0 " * 40 + "\n") * 40),
+    for name, text in (("site.yaml", site), ("dtm.asc", head + levels),
                        ("axis.csv", line_file("csv")), ("a.csv", "E,N,u\n683140,247495,0.5\n")):  # fmt: skip
         (folder / name).write_text(text, encoding="utf-8")
     code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
     assert code == 2
     assert "dtm.asc: expected `grid.y`" in error
     (folder / "site.yaml").write_text(site.replace("axis.csv}", "axis.csv}, y: [-4, 4]"), encoding="utf-8")
-    assert np.allclose(build_site(vegglue.import_folder(folder, tmp_path / "bend.yaml")).bed, 2.0)
+    case = vegglue.import_folder(folder, tmp_path / "bend.yaml")
+    east, north = FRAME.to_map(*places_on_map(build_grid(case)))
+    assert np.allclose(build_site(case).bed, 2.0 + 0.01 * (east - 683110) - 0.02 * (north - 247470), atol=1e-3)
 
 
 @pytest.mark.parametrize(
