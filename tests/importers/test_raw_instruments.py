@@ -46,7 +46,7 @@ def test_a_raw_transect_gives_the_stations_of_its_ascii_output(tmp_path: Path) -
     assert raw.numbers["east_velocity"] == pytest.approx(0.64, abs=0.02)
     assert raw.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.02)
     assert np.median(raw.numbers["u_se"]) == pytest.approx(np.median(text.numbers["u_se"]), rel=0.5)
-    assert "PD0 of a Rio Grande, 150 ensembles" in raw.said[0]
+    assert "PD0 of a Rio Grande 0.2 m below the surface, 150 ensembles" in raw.said[0]
 
 
 def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
@@ -56,6 +56,7 @@ def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
     assert np.allclose(turned.numbers["east_velocity"], plain.numbers["north_velocity"], atol=1e-6)
     assert np.allclose(turned.numbers["north_velocity"], -plain.numbers["east_velocity"], atol=1e-6)
     assert np.allclose(turned.numbers["x"], plain.numbers["y"], atol=1e-6)
+    assert "turned by a declination of 90 degrees" in turned.said[0]
 
 
 def test_a_damaged_raw_file_is_refused_in_one_sentence(tmp_path: Path) -> None:

@@ -29,7 +29,10 @@ def read_pd0(path: Path, words: FileWords) -> Taken:
     without mhkit.
     """
     data = _opened(path)
-    return stations_of_transect(path, words, _profiles(data, words), f"PD0 of a {data.attrs['inst_model']}")
+    draft = float(np.median(_draft(data, words)))
+    turned = f", turned by a declination of {words.declination:g} degrees" if words.declination else ""
+    form = f"PD0 of a {data.attrs['inst_model']} {draft:.3g} m below the surface{turned}"
+    return stations_of_transect(path, words, _profiles(data, words), form)
 
 
 def _opened(path: Path) -> Any:
@@ -52,8 +55,7 @@ def _profiles(data: Any, words: FileWords) -> Iterator[BoatProfile]:
     known = np.isfinite(bottom).all(axis=0)
     time = (data["time"].values - data["time"].values[0]) / np.timedelta64(1, "s")
     east, north = _track(time[known], -bottom[:, known])
-    draft = np.asarray(data["depth"].values, dtype=np.float64) if words.draft is None else words.draft
-    draft = np.broadcast_to(draft, time.shape)[known]
+    draft = _draft(data, words)[known]
     beams = np.asarray(data["dist_bt"].values, dtype=np.float64)[:, known]
     cells = np.asarray(data["range"].values, dtype=np.float64)
     size, slant = float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
@@ -66,6 +68,12 @@ def _profiles(data: Any, words: FileWords) -> Iterator[BoatProfile]:
         depth = float(seen.mean()) + float(draft[i]) if seen.size else 0.0
         ((x, y),) = _to_true_north(np.array([[east[i], north[i]]]), words.declination).tolist()
         yield BoatProfile((x, y), depth, depth - draft[i] - cells[good], velocity[good])
+
+
+def _draft(data: Any, words: FileWords) -> Array:
+    """Depth of the instrument in each ensemble (n,) [m]."""
+    own = np.asarray(data["depth"].values, dtype=np.float64)
+    return own if words.draft is None else np.full(own.shape, words.draft)
 
 
 def _track(time: Array, boat: Array) -> tuple[Array, Array]:
