@@ -276,8 +276,9 @@ finished is lost.
 - A file appears under its name only when it is whole and on the disk. It grows beside that place with `.new` at its
   end.
 - Whole results end with a line that holds the SHA-256 of all bytes before it. Other readers of HDF5 do not see it. A
-  result of an older version, or that another program opened to write, has none. It is read by a process of its own
-  first, as are the part files of stopped runs: the HDF5 library reads some damaged files in circles.
+  result of an older version, or that another program opened to write, has none.
+- Every result, and every part file of a stopped run, is read by a process of its own first: the HDF5 library reads some
+  damaged files in circles, and anyone can put the right digest behind one.
 - What is read is held against the shapes and types it was stored with, before anyone computes with it.
 - Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum. The next run lays the file out
   anew, and takes over the chunks whose checksum is right.

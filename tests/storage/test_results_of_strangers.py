@@ -1,5 +1,6 @@
 """Whatever a result file holds, its reader makes a value of it or says one sentence, in bounded time and memory."""
 
+import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -21,16 +22,17 @@ from damaged_results import (
 )
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from stored import ALL, HASH, a_header, append, assert_whole, write_chunks
+from stored import ALL, HASH, a_header, append, assert_whole, start, write_chunks
 
 from vegglue.errors import StorageError
 from vegglue.storage import first_look
+from vegglue.storage.digest import state_of, with_digest
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import ensemble_writer, part_file
 
 Valid = Callable[[str], bytes]
 OF_RESULTS = pytest.mark.parametrize("kept", RESULTS, ids=lambda kept: kept.name)
-ANY_EXAMPLES, CHILDREN = 60, 8  # a file without a digest begins a process, which takes a third of a second
+ANY_EXAMPLES, CHILDREN = 60, 8  # a damaged file costs its reader, and another takes a third of a second to begin
 SHARED = {
     "deadline": None, "derandomize": True, "database": None,
     "suppress_health_check": [HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -129,31 +131,92 @@ def test_damage_of_a_file_without_a_digest_is_read_or_refused(
     assert len(sentence_of(kept, path).splitlines()) <= 1
 
 
-def endless(path: Path) -> None:
+def endless(path: Path) -> bytes:
     """Zeros in the heap of texts: the HDF5 library reads such a file in circles, and holds whoever asked."""
     content = bytearray(without_digest(path))
     heap = content.index(b"GCOL")
     content[heap + 16 : heap + 80] = bytes(64)
-    path.write_bytes(content)
+    return bytes(content)
 
 
-def test_a_file_that_is_read_in_circles_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("digest", [bytes, with_digest], ids=["without a digest", "behind a right digest"])
+def test_a_file_that_is_read_in_circles_is_given_up(
+    digest: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(first_look, "LONGEST_START", 2.0)
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
-    endless(path)
+    path.write_bytes(digest(endless(path)))
     began = time.monotonic()
     with pytest.raises(StorageError, match=r"cannot be opened \(it is not read to its end within 2 s\); remove it"):
         read_ensemble(path, HASH)
     assert stored_hash(path) is None, "what is known of it is not found out again"
     assert time.monotonic() - began < 20.0, "given up, not waited for"
+    other = tmp_path / "other.h5"
+    write_chunks(other, ALL, a_header())
+    read_ensemble(other, HASH)  # by the next reader
+
+
+def test_a_reader_that_was_ended_is_replaced(tmp_path: Path) -> None:
+    for number in range(3):
+        path = tmp_path / f"{number}.h5"
+        write_chunks(path, ALL, a_header())
+        read_ensemble(path, HASH)
+        reader = first_look._reader(os.getpid())
+        if number == 0:  # one that lives is kept
+            kept = reader
+        elif number == 1:
+            assert reader is kept
+            reader.kill()
+            reader.wait()
+        else:
+            assert reader is not kept
+
+
+def test_a_process_that_was_forked_has_a_reader_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "ensemble.h5"
+    write_chunks(path, ALL, a_header())
+    assert first_look.why_unreadable(*state_of(path)) is None
+    parents, child = first_look._reader(os.getpid()), os.fork()
+    if not child:
+        first_look.why_unreadable.cache_clear()
+        right = first_look.why_unreadable(*state_of(path)) is None and first_look._reader(os.getpid()) is not parents
+        os._exit(0 if right else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert parents.poll() is None
+    first_look.why_unreadable.cache_clear()
+    assert first_look.why_unreadable(*state_of(path)) is None, "the answers are not mixed up"
+
+
+def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
+    path = tmp_path / "ensemble.h5"
+    write_chunks(path, ALL, a_header())
+    asks = """
+        import os
+        from pathlib import Path
+        from vegglue.storage import digest, first_look
+        first_look.why_unreadable(*digest.state_of(Path({path!r})))
+        print(first_look._reader(os.getpid()).pid, flush=True)
+        os.kill(os.getpid(), 9)
+    """
+    with start(asks, path=str(path)) as asking:
+        reader = int(asking.communicate()[0])
+    for _ in range(100):
+        try:
+            os.kill(reader, 0)
+            if Path(f"/proc/{reader}/stat").read_text(encoding="utf-8").split()[2] == "Z":  # nobody asks for its end
+                return
+        except OSError:
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"process {reader} goes on")
 
 
 def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_look, "LONGEST_START", 2.0)
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
-    endless(path)
+    path.write_bytes(endless(path))
     path.rename(part_file(path))
     with ensemble_writer(path, a_header()) as writer:
         assert writer.set_aside is not None

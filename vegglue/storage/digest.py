@@ -1,7 +1,7 @@
 """A digest of all bytes of a result file, as a line behind its end: what has changed since is noticed when it is read.
 
 The HDF5 library does not look behind the end of its file, so other readers of the format do not mind. A file without
-the line, from an older version, is read as it is.
+the line, from an older version, is read too.
 """
 
 import hashlib

@@ -1,17 +1,22 @@
-"""A result file that states no digest is read by a process of its own first, within limits of time and memory.
+"""Every result file is read by a process of its own first, within limits of time and memory.
 
 On damaged files the HDF5 library may read in circles, ask for any memory or crash, and nothing stops it from within. A
-file whose digest is right has been whole once; one without was cut, is of another program, or is still growing.
+digest is no help: who makes such a file can put the right one behind it. A process takes a third of a second to begin,
+so that one reads all files that a command opens.
 """
 
+import atexit
 import os
 import resource
+import select
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 
 import h5py
 import numpy as np
@@ -24,7 +29,10 @@ from vegglue.storage.foreign_files import why_foreign
 LONGEST_START, FEWEST_BYTES = 20.0, 5e6  # [s], [bytes/s]
 MEMORY = 2 << 30  # [bytes] of addresses: libraries take half of one, and values are read by blocks
 AT_ONCE = 1 << 26  # [bytes] of values read at once
-CHILD = "import sys; sys.path.append(sys.argv[1]); from vegglue.storage.first_look import look; look(sys.argv[2])"
+LONGEST_ANSWER = 2000  # [bytes]: pipes hand over up to 4096 at once, so that an answer is there whole or not at all
+CHILD = "import sys; sys.path.append(sys.argv[1]); from vegglue.storage.first_look import serve; serve()"
+_Reader = subprocess.Popen[bytes]
+_ASKING = Lock()
 
 
 @lru_cache(maxsize=64)
@@ -34,30 +42,83 @@ def why_unreadable(path: Path, size: int, *state: int) -> str | None:
     state: looked at once for each, however often the file is opened. Errors: StorageError when no process can be begun.
     """
     longest = LONGEST_START + size / FEWEST_BYTES
-    command = [sys.executable, "-P", "-c", CHILD, str(Path(__file__).parents[2]), str(path)]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=longest, check=False,
-            stdin=subprocess.DEVNULL, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
+    with _ASKING:
+        try:
+            reader = _living_reader()
+        except OSError as error:
+            why = error.strerror
+            raise StorageError(f"{path}: no process can be begun to read it ({why}); close others.") from error
+        try:
+            why = _answer(reader, path, longest)
+        except BaseException:  # Ctrl-C: the answer would be taken for that to the next question
+            _dismiss(reader, os.getpid())
+            raise
+        if why is not None:  # a damaged file may have harmed whoever read it
+            _dismiss(reader, os.getpid())
+    return why
+
+
+def _living_reader() -> _Reader:
+    """The process that reads for this one: begun when first asked, and again when something has ended it."""
+    reader = _reader(os.getpid())
+    if reader.poll() is None:
+        return reader
+    _dismiss(reader, os.getpid())
+    return _reader(os.getpid())
+
+
+@lru_cache(maxsize=1)
+def _reader(asking: int) -> _Reader:
+    """asking: the process that it reads for; one that was forked has a reader of its own."""
+    reader = subprocess.Popen(
+        [sys.executable, "-P", "-c", CHILD, str(Path(__file__).parents[2])],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+    )  # fmt: skip
+    atexit.register(_dismiss, reader, asking)
+    return reader
+
+
+def _dismiss(reader: _Reader, asking: int) -> None:
+    """End a reader; the next question begins another. What a forked process inherits is not its own to end."""
+    if os.getpid() != asking:
+        return
+    _reader.cache_clear()
+    reader.kill()
+    with reader:  # which closes its pipes and waits for its end
+        pass
+
+
+def _answer(reader: _Reader, path: Path, longest: float) -> str | None:
+    """What the reader says of a file."""
+    assert reader.stdin is not None
+    assert reader.stdout is not None
+    with suppress(BrokenPipeError):  # it has ended, and says nothing
+        reader.stdin.write(f"{longest:.0f} {os.fsencode(path).hex()}\n".encode())
+    if not select.select([reader.stdout], [], [], longest)[0]:
         return f"it is not read to its end within {longest:.0f} s"
-    except OSError as error:
-        raise StorageError(f"{path}: no process can be begun to read it ({error.strerror}); close others.") from error
-    if done.returncode == 0:
-        return None
-    return (done.stdout.splitlines() or ["its reader crashed"])[-1]
+    answer = reader.stdout.readline().decode(errors="replace")
+    return "its reader crashed" if not answer else answer.strip() or None
 
 
-def look(path: str) -> None:
-    """Read all of a file, or print why that fails and end with code 1: what the process of its own does."""
-    for limit, most in ((resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CORE, 0)):
-        with suppress(ValueError, OSError):  # some systems know no such limit
-            resource.setrlimit(limit, (most, most))
-    why = _why_not_to_its_end(path)
-    if why is not None:
-        print(why.encode(errors="replace").decode())
-        sys.exit(1)
+def serve() -> None:
+    """Read one file after another, and say for each why that fails or nothing: what the process of its own does.
+
+    Each line of the input is the longest time [s] and the path of a file.
+    """
+    _limit(resource.RLIMIT_AS, MEMORY)
+    _limit(resource.RLIMIT_CORE, 0)
+    for line in sys.stdin:
+        longest, path = line.split()
+        # Whoever asked may have been killed meanwhile: nobody else ends a reading in circles.
+        _limit(resource.RLIMIT_CPU, int(time.process_time() + float(longest)) + 1)
+        why = " ".join((_why_not_to_its_end(os.fsdecode(bytes.fromhex(path))) or "").split())
+        os.write(sys.stdout.fileno(), why.encode(errors="replace")[:LONGEST_ANSWER] + b"\n")
+
+
+def _limit(what: int, most: int) -> None:
+    with suppress(ValueError, OSError):  # some systems know no such limit
+        resource.setrlimit(what, (most, resource.getrlimit(what)[1]))
 
 
 def _why_not_to_its_end(path: str) -> str | None:

@@ -76,17 +76,15 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
 
 
 def _refuse_damaged(path: Path) -> None:
-    """Errors: StorageError when a file is not what was written, or states no digest and cannot be read to its end."""
+    """Errors: StorageError when a file is not what was written, or cannot be read to its end."""
     state = state_of(path)
-    unchanged = is_unchanged(*state)
-    if unchanged is None:
-        why = why_unreadable(*state)
-        if why is not None:
-            refuse_in_use(path)
-            raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
-    elif not unchanged:
+    if is_unchanged(*state) is False:
         refuse_in_use(path)
         raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
+    why = why_unreadable(*state)
+    if why is not None:
+        refuse_in_use(path)
+        raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
 
 
 def refuse_in_use(path: Path) -> None:
