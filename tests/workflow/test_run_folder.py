@@ -13,6 +13,7 @@ from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
+from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, Point
@@ -65,7 +66,8 @@ def place(case: Case, folder: Path, known: float | None) -> float:
     if known is not None:
         z = np.zeros((1, len(case.parameters)))
         z[0, 0] = known
-        run_folder.remember_place(case, folder, {name: value[0] for name, value in theta_at(case, z).items()})
+        theta = {name: value[0] for name, value in theta_at(case, z).items()}
+        run_folder.remember_place(case, folder, theta, case_hash(case))
     return float(run_folder.calibrated(case, folder, excluded_by()).fitted.point.z[0])
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.case.parameter_space import PriorSample, sample_of, sobol_sample
+from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command_run import CommandEnd
 from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
@@ -34,10 +35,11 @@ def run_ensemble(
     jobs: processes of the built-in solver, where the case has effects. Errors: InputError for a case without
     parameters; StorageError when another run holds the folder or the disk is full (what was written stays).
     """
+    wanted = simulation_hash(case)
     refuse_too_many(case, observations)
     sample, names = sobol_sample(case), own_parameters(case)
     chunks = [np.array([member]) for member in range(case.simulate.members)]  # a run costs more than to write it down
-    with ensemble_writer(path, make_header(case, observations, sample.theta, chunks, None)) as writer:
+    with ensemble_writer(path, make_header(case, wanted, observations, sample.theta, chunks, None)) as writer:
         todo = left_to_do(writer, case, chunks, watch)
         resumed, failed, phase = len(chunks) - len(todo), 0, f"running the command of {case.name}"
         watch(Progress(phase, resumed, len(chunks), "members", failed, resumed))

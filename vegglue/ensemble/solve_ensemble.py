@@ -58,6 +58,7 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
     StorageError when another run holds the folder or the disk is full (what was written stays).
     """
+    wanted = simulation_hash(case)  # before anything else is read: what changes meanwhile makes it out of date
     refuse_too_many(case, observations)
     site = build_site(case)
     refuse_ranges_without_cells(case, site.grid)
@@ -65,7 +66,7 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
         raise InputError(f"{shown_path(case.source)}: {sentence}")
     sample = sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
-    header = make_header(case, observations, sample.theta, chunks, window_of(case, site.grid))
+    header = make_header(case, wanted, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
         todo = left_to_do(writer, case, chunks, watch)
         resumed = sum(chunks[index].size for index in writer.done)
@@ -269,6 +270,7 @@ def _problem_at(case: Case, site: Site, experiment: str, points: np.ndarray) -> 
 
 def make_header(
     case: Case,
+    config_hash: str,
     observations: Observations,
     theta: dict[str, np.ndarray],
     chunks: list[np.ndarray],
@@ -283,7 +285,7 @@ def make_header(
         chunks=len(chunks),
         cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
         config=resolved_yaml(case),
-        config_hash=simulation_hash(case),
+        config_hash=config_hash,
         seed=case.simulate.seed,
         version=VERSION,
         window=window,

@@ -42,7 +42,7 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when a model finds
     no flow, or a station has no standard error.
     """
-    aside = left_out(cases, runs)
+    hashes, aside = [case_hash(case) for case in cases], left_out(cases, runs)
     rungs = []
     with at_most(jobs):
         for number, case in enumerate(cases):
@@ -50,7 +50,7 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
             rungs.append(rung_of(case, runs, aside, watch))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
-    keep_ladder(found, cases, runs)
+    keep_ladder(found, cases, hashes, runs)
     return found
 
 
@@ -75,12 +75,12 @@ def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
     return picture
 
 
-def keep_ladder(found: Comparison, cases: Sequence[Case], runs: Path | str, reason: str = "") -> None:
-    """Keep the ladder in the folder of each of its cases, for their pages; reason: why it ends where it does.
-
-    Errors: StorageError.
+def keep_ladder(
+    found: Comparison, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str, reason: str = ""
+) -> None:
+    """Keep the ladder in the folder of each of its cases, for their pages; hashes: of the cases as they were read;
+    reason: why the ladder ends where it does. Errors: StorageError.
     """
-    hashes = [case_hash(case) for case in cases]
     before: tuple[str, ...] = ()
     steps = []
     for case, config_hash, one in zip(cases, hashes, found.rungs, strict=True):

@@ -40,7 +40,7 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
-    remember_place(case, folder, found.parameters.first)
+    remember_place(case, folder, found.parameters.first, wanted)
     write_diagnosis(path, found, resolved_yaml(case), wanted)  # last: where it is, nothing else is missing
     return found
 

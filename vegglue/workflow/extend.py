@@ -11,7 +11,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.case.config import load_case
 from vegglue.case.made_files import write_made
 from vegglue.case.parameter_space import z_at
-from vegglue.case.resolved_config import as_yaml
+from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
 from vegglue.diagnosis.comparison import Rung, rung
@@ -90,10 +90,15 @@ def extend_stepwise(
 
     force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
     """
+    wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     with at_most(jobs):
         extension = _extended(case, found, runs, watch, force)
-    keep_ladder(extension.comparison, extension.cases, runs, extension.reason)
+    hashes = [case_hash(one) for one in extension.cases]
+    if hashes[0] != wanted:  # children are of the files as they are now, their numbers of those before
+        source = shown_path(case.source)
+        raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
+    keep_ladder(extension.comparison, extension.cases, hashes, runs, extension.reason)
     return extension
 
 
@@ -122,7 +127,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
         assert base is not None
         added = [named[name] for name in names]
         cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added, force))
-        remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base))
+        remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base), case_hash(cases[-1]))
         bases.append(base)
     # Only now are the measurements for validation looked at.
     ladder = [

@@ -42,6 +42,7 @@ def infer(
     Errors: InputError when there is no ensemble of this case, or its likelihood cannot be refined.
     """
     case = of_size(case, members if ensemble is None else len(ensemble.status))
+    wanted = case_hash(case)  # before anything is read: what changes meanwhile then makes the result out of date
     observations = read_observations(case)
     if not observations.table["used"].any():
         raise InputError(
@@ -58,7 +59,7 @@ def infer(
         with at_most(jobs):
             engine = with_command(model_of(case, observations), folder, watch).engine
             posterior = refine(ensemble, case, observations, watch, engine)
-    write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), case_hash(case))
+    write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), wanted)
     median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior
 

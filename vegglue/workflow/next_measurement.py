@@ -68,6 +68,7 @@ def next_measurement(
     the strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept,
     in questions.json. Errors: InputError for a name that is not in the diagnosis.
     """
+    wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
     by_name = {one.name: one for one in found.suspects}
     unknown = [name for name in between if name not in by_name]
@@ -83,7 +84,7 @@ def next_measurement(
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [one for _, one in asked])
         questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
     if not between:
-        write_questions(folder_of(runs, case), [open_question(one) for one in questions], case_hash(case))
+        write_questions(folder_of(runs, case), [open_question(one) for one in questions], wanted)
     return questions
 
 

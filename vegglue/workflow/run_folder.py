@@ -86,17 +86,18 @@ def known_place(case: Case, folder: Path) -> Array | None:
     return z_at(case, {name: values[best] for name, values in posterior.sample.theta.items()})[0]
 
 
-def remember_place(case: Case, folder: Path, theta: Mapping[str, float]) -> None:
-    """Keep the best place for the next command. Errors: StorageError."""
-    text = json.dumps({"config_hash": case_hash(case), "theta": {name: float(theta[name]) for name in case.parameters}})
+def remember_place(case: Case, folder: Path, theta: Mapping[str, float], config_hash: str) -> None:
+    """Keep the best place for the next command; config_hash: of the case as it was read. Errors: StorageError."""
+    text = json.dumps({"config_hash": config_hash, "theta": {name: float(theta[name]) for name in case.parameters}})
     write_text(folder / "best.json", text, MAKE_ROOM)
 
 
 def calibrated(case: Case, folder: Path, aside: pd.DataFrame, watch: Watch = silent) -> Baseline:
     """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
+    wanted = case_hash(case)
     model = with_command(model_in(case), folder, watch)
     base = calibrated_anew(model, known_place(case, folder), aside)
-    remember_place(case, folder, best_place(base))
+    remember_place(case, folder, best_place(base), wanted)
     return base
 
 
