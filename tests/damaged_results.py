@@ -13,6 +13,7 @@ from stored import ALL, HASH, WINDOW, a_header, write_chunks
 
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.sensor import FlowFields
+from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.storage.digest import LENGTH, with_digest
 from vegglue.storage.result_files import (
     flow_that_fits,
@@ -81,7 +82,7 @@ RESULTS = (
     Kept(
         "diagnosis.h5",
         lambda path: write_diagnosis(path, a_diagnosis(), "", HASH),
-        lambda path: read_diagnosis(path, HASH),
+        lambda path: diagnosis_json(read_diagnosis(path, HASH)),  # which looks at all of it
     ),
     Kept("flow.h5", _write_flow, lambda path: flow_that_fits(path, HASH, THETA)),
 )

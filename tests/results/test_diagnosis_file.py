@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis
 
-from vegglue.errors import InputError
+from vegglue.errors import InputError, StorageError
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, write_diagnosis
@@ -47,6 +47,24 @@ IN_JSON = [
     "verdict", "sentence", "set", "groups", "not_excluded", "where", "effects", "steps", "remarks", "chi2", "threshold",
     "noise", "flagged", "parameters", "first_parameters", "places", "instruments", "field", "model_error", "zones",
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("steps", '"rivals": ["', '"rivals": ["un'),
+        ("steps", '"accepted": "', '"accepted": "un'),
+        ("flagged", "[1]", "[400]"),
+        ("instruments", '"stations": [', '"stations": [-1, '),
+    ],
+)
+def test_names_and_rows_of_nothing_are_refused(tmp_path: Path, name: str, old: str, new: str) -> None:
+    write_diagnosis(tmp_path / "diagnosis.h5", EVERY_KIND, "name: open-x\n", HASH)
+    with h5py.File(tmp_path / "diagnosis.h5", "r+") as file:
+        assert old in file.attrs[name], file.attrs[name]
+        file.attrs[name] = file.attrs[name].replace(old, new)
+    with pytest.raises(StorageError, match=r"diagnosis\.h5: is broken or of another version \(a st"):
+        read_diagnosis(tmp_path / "diagnosis.h5", HASH)
 
 
 @pytest.mark.parametrize("diagnosis", [a_diagnosis(), NOTHING, NO_LOCATION, EVERY_KIND])

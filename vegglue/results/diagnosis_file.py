@@ -138,7 +138,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
     """The diagnosis whose file has these groups and attributes."""
     stations, places = fitting(groups["stations"], STATION_VALUES), fitting(groups["places"], SPOTS)
     suspects = _table_from(groups["suspects"], "suspect", SUSPECT_COLUMNS)
-    return Diagnosis(
+    found = Diagnosis(
         name=stated_as(str, attributes, "name"),
         version=stated_as(str, attributes, "version"),
         verdict=_verdict_from(attributes),
@@ -168,6 +168,19 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
     )
+    _refuse_strays(found)
+    return found
+
+
+def _refuse_strays(found: Diagnosis) -> None:
+    """Errors: ValueError where a step names an effect, or a list a station, that the diagnosis does not hold."""
+    effects = {one.name for one in found.suspects}
+    for step in found.steps:
+        if step.accepted not in step.chance or not set(step.rivals) <= effects:
+            raise ValueError(f"a step names {', '.join((step.accepted, *step.rivals))!r}, not all of them its suspects")
+    rows = {*found.errors.flagged, *(row for one in found.instruments for row in one.stations)}
+    if not rows <= set(range(len(found.predictions.station))):
+        raise ValueError("a station that was set aside is not in the table")
 
 
 def _parsed(kind: Any, text: str) -> Any:
