@@ -1,5 +1,21 @@
-"""`python -m vegglue` is `vegglue`."""
+"""The entry point of the shell, and `python -m vegglue`. Ctrl-C is one sentence while libraries load, too."""
 
-from vegglue.cli.main import main
+import signal
+import sys
 
-main()
+
+def enter() -> None:
+    """Run the command of the shell."""
+    try:
+        from vegglue.cli.main import main
+
+        main()
+    except KeyboardInterrupt:
+        print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
+        sys.exit(130)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on Python only takes down what it has put up
+
+
+if __name__ == "__main__":
+    enter()

@@ -2,14 +2,19 @@
 
 import errno
 import os
+import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 from reach import COARSE, ENVIRONMENT, command, said_to, write_reach
 
 from vegglue import parallel
+from vegglue.__main__ import enter
 from vegglue.cli.endings import ending_well
 from vegglue.errors import InputError, StorageError
 
@@ -58,6 +63,25 @@ def test_every_end_has_its_code(
         ending_well(raises(error))
     assert ended.value.code == code
     assert capsys.readouterr().err.startswith(expected)
+
+
+def test_ctrl_c_while_libraries_load_is_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Loading(ModuleType):
+        def __getattr__(self, name: str) -> Any:
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "vegglue.cli.main", Loading("main"))
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            enter()
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN, "nothing is left to stop"
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "Stopped; what was solved is kept, run the same command again to go on.\n"
 
 
 def test_runs_that_are_a_file_are_told(tmp_path: Path, say: Say) -> None:
