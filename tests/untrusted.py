@@ -7,6 +7,7 @@ from pathlib import Path
 
 from field_folders import SITE
 from reach import COARSE, block, write_reach
+from untrusted_imports import IMPORTS
 
 from vegglue.case.config import load_case
 from vegglue.errors import InputError, StorageError
@@ -64,6 +65,7 @@ READERS = (
     Reader("bed.asc", RASTER, read_raster),
     Reader("points.csv", b"x,y,z\n0,0,1\n3,0,1\n0,3,1.5\n3,3,1.2\n", _levels),
     Reader("survey.csv", (ROOT / "data" / "kict" / "plant_survey.csv").read_bytes(), read_survey),
+    *(Reader(*one) for one in IMPORTS),
 )
 
 

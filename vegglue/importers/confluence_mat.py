@@ -4,16 +4,17 @@ data_3d_velocity_topography_surface_maps/ holds a file for each section (X, Y, Z
 and topo_water_level_maps.mat (Xtopo, Ytopo, Ztopo, Xwl, Ywl, Zwl).
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
+from scipy.io import loadmat, whosmat
 
 from vegglue.arrays import Array
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.library_files import read_by_library, refuse_larger
 
 MAPS = "topo_water_level_maps.mat"
 # Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
@@ -46,14 +47,10 @@ def tables_of_mat(source: Path, into: Path) -> Path:
 
 
 def _loaded(path: Path, *names: str) -> dict[str, Array]:
-    try:
-        found = loadmat(path)
+    with read_by_library(path, "a file of the set"):
+        refuse_larger(path, sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
+        found = loadmat(path, variable_names=names)
         return {name: np.asarray(found[name], dtype=np.float64) for name in names}
-    # scipy raises NotImplementedError for files of version 7.3, which are HDF5.
-    except (OSError, ValueError, NotImplementedError, KeyError, MatReadError) as error:
-        raise InputError(
-            f"{shown_path(path)} cannot be read as a file of the set ({error}); download it anew."
-        ) from None
 
 
 def _points(x: Array, y: Array, z: Array) -> Array:

@@ -3,13 +3,16 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
+from typing import Any
+from zipfile import ZipFile
 
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.unit_words import is_unit
 from vegglue.in_short import so_many
 
@@ -20,6 +23,7 @@ NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
 MISSING_WORDS = ("", "-", "--", "nan", "na", "n/a", "null", "none", "nodata", "#n/a", "inf", "-inf")
 # Lines from the end of a file by which its separator is told: titles stand at its head.
 LOOKED_AT = 200
+BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or not
 Line = tuple[int, list[str]]  # number in the file, from 1, and fields
 
 
@@ -69,8 +73,7 @@ def readable_text(path: Path) -> str:
         raw = path.read_bytes() if size <= LARGEST_DATA else b""
     except OSError as error:
         raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
-    if size > LARGEST_DATA:
-        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
+    refuse_larger(path, size)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace")
     try:
@@ -146,16 +149,21 @@ def _sheet(path: Path, name: str | None) -> list[Line]:
             f"{shown_path(path)}: workbooks are read by openpyxl, which is not installed; run "
             "`pip install 'vegglue[field]'`, or save the sheet as CSV."
         ) from None
-    try:
+    with read_by_library(path, "a workbook"), ZipFile(path) as packed:
+        refuse_larger(path, sum(part.file_size for part in packed.infolist()))
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    except (OSError, ValueError, KeyError, BadZipFile, openpyxl.utils.exceptions.InvalidFileException) as error:
-        raise InputError(f"{shown_path(path)} cannot be read as a workbook: {error}; save it anew.") from None
-    if name is not None and name not in book.sheetnames:
-        raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
-    chosen = book[name] if name is not None else book.worksheets[0]
-    lines = [
-        (number, ["" if cell is None else str(cell).strip() for cell in row])
-        for number, row in enumerate(chosen.iter_rows(values_only=True), 1)
-    ]
-    book.close()
-    return [(number, row) for number, row in lines if any(row)]
+        with closing(book):
+            if name is not None and name not in book.sheetnames:
+                raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
+            chosen = book[name] if name is not None else book.worksheets[0]
+            return list(_lines_of_sheet(path, chosen.iter_rows(values_only=True)))
+
+
+def _lines_of_sheet(path: Path, rows: Iterable[tuple[Any, ...]]) -> Iterator[Line]:
+    """Rows that hold something. A sheet of few bytes may have a last column 16,384 cells to the right."""
+    size = 0
+    for number, row in enumerate(rows, 1):
+        if any(cell is not None for cell in row):
+            size += BYTES_OF_CELL * len(row)
+            refuse_larger(path, size)
+            yield number, ["" if cell is None else str(cell).strip() for cell in row]

@@ -198,7 +198,7 @@ def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]
     marked = (
         np.isin(values, [*MARKS_OF_LOGGERS, *missing])
         | (np.abs(values) > LARGEST_OF_ALL)
-        | np.array([_nines(one) for one in values])
+        | np.array([_nines(one) for one in values], dtype=bool)
     )
     return np.where(marked, np.nan, values), int(marked.sum())
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.library_files import read_by_library
 from vegglue.importers.loose_table import readable_text
 
 # What properties of a polygon are called that say its density [1/m2], its class and its name; lower case.
@@ -41,7 +42,7 @@ def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
             NamedPolygon(
                 name=str(_first(properties, NAMES) or f"p{number}"),
                 corners=[_rounded(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
-                density=float(density) if density is not None else None,
+                density=_density(path, density) if density is not None else None,
                 friction_class=str(of_class) if of_class is not None else None,
             )
         )
@@ -57,7 +58,7 @@ def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
             parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
             for rings in parts.get(geometry["type"], []):
                 yield _open([(float(corner[0]), float(corner[1])) for corner in rings[0]]), properties
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise InputError(f"{shown_path(path)}: expected GeoJSON with polygons, got another file ({error}).") from None
 
 
@@ -69,15 +70,20 @@ def _of_shapefile(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
             f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
             "`pip install 'vegglue[field]'`, or save it as GeoJSON."
         ) from None
+    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
+        for record in reader.shapeRecords():
+            if record.shape.shapeTypeName.startswith("POLYGON"):
+                starts = [*record.shape.parts, len(record.shape.points)]
+                ring = [(float(x), float(y)) for x, y, *_ in record.shape.points[starts[0] : starts[1]]]
+                yield _open(ring), record.record.as_dict()
+
+
+def _density(path: Path, value: Any) -> float:
     try:
-        with shapefile.Reader(str(path)) as reader:
-            for record in reader.shapeRecords():
-                if record.shape.shapeTypeName.startswith("POLYGON"):
-                    starts = [*record.shape.parts, len(record.shape.points)]
-                    ring = [(float(x), float(y)) for x, y, *_ in record.shape.points[starts[0] : starts[1]]]
-                    yield _open(ring), record.record.as_dict()
-    except (OSError, shapefile.ShapefileException) as error:
-        raise InputError(f"{shown_path(path)} cannot be read as a shapefile: {error}; save it anew.") from None
+        return float(value)
+    except (ValueError, TypeError, OverflowError):
+        complaint = f"expected a number of stems in 1/m2, got {str(value)[:40]!r}; correct it"
+        raise InputError(f"{shown_path(path)}: {complaint}.") from None
 
 
 def _open(ring: Ring) -> Ring:

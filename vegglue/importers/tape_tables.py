@@ -35,6 +35,11 @@ def read_tape_table(path: Path, words: FileWords) -> Taken:
     text = readable_text(path)
     table, units = _flowtracker(path, text) if FLOWTRACKER.search(text) else _riversurveyor(path, text)
     taken = rows_of_table(path, table, replace(words, units={**units, **words.units}, columns=_columns(table)))
+    if not {"tape", "depth", "u"} <= taken.numbers.keys() or not taken.size:
+        raise InputError(
+            f"{shown_path(path)}: expected rows with place, depth and mean velocity, got {len(table.rows)} rows of "
+            f"{', '.join(table.headings)}; export it anew."
+        )
     wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0)
     return on_the_tape(path, last_of_each_place(taken.only(wet)), words)
 
@@ -67,12 +72,13 @@ def _flowtracker(path: Path, text: str) -> tuple[LooseTable, dict[str, str]]:
     """The table that begins with `St  Clock`; the line below holds its units."""
     lines = text.splitlines()
     head = next((i for i, line in enumerate(lines) if re.match(r"\s*St\s+Clock", line)), None)
-    if head is None:
+    if head is None or head + 1 >= len(lines):
         raise InputError(
             f"{shown_path(path)}: expected the table of stations of a FlowTracker, got none; export it anew."
         )
     headings = tuple(lines[head].split())
     units = tuple("" if one in ("()", "(*D)") else one for one in lines[head + 1].split())
+    units = (units + ("",) * len(headings))[: len(headings)]
     rows = [(number, line.split()) for number, line in enumerate(lines[head + 2 :], head + 3)]
     kept = tuple((number, row) for number, row in rows if len(row) == len(headings) and is_number(row[0]))
     return LooseTable(headings, units, kept, decimal_comma=False, form="FlowTracker"), {}

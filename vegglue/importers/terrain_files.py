@@ -11,6 +11,7 @@ from scipy.spatial import QhullError
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.site.terrain import Raster, read_raster
@@ -55,19 +56,17 @@ def read_geotiff(path: Path) -> Raster:
             f"{shown_path(path)}: GeoTIFFs are read by tifffile, which is not installed; run "
             "`pip install 'vegglue[field]'`, or save it as an ESRI ASCII grid."
         ) from None
-    try:
-        with tifffile.TiffFile(path) as file:
-            page = file.pages.first
-            values = np.asarray(page.asarray(), dtype=np.float64)
-            tags = {code: page.tags[code].value for code in (PIXEL_SCALE, TIE_POINT, NO_DATA) if code in page.tags}
-    except (OSError, ValueError, IndexError, tifffile.TiffFileError) as error:
-        raise InputError(f"{shown_path(path)} cannot be read as a GeoTIFF: {error}; save it anew.") from None
-    if PIXEL_SCALE not in tags or TIE_POINT not in tags or tags[PIXEL_SCALE][0] != tags[PIXEL_SCALE][1]:
-        raise InputError(
-            f"{shown_path(path)}: expected a GeoTIFF with square pixels along the map (tags ModelPixelScale and "
-            "ModelTiepoint), got another; warp it to its own coordinate system first."
-        )
-    return _north_up(values[..., 0] if values.ndim == 3 else values, tags)
+    with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
+        page = file.pages.first
+        refuse_larger(path, page.nbytes)  # before they are unpacked
+        tags = {code: page.tags[code].value for code in (PIXEL_SCALE, TIE_POINT, NO_DATA) if code in page.tags}
+        if PIXEL_SCALE not in tags or TIE_POINT not in tags or not 0.0 < tags[PIXEL_SCALE][0] == tags[PIXEL_SCALE][1]:
+            raise InputError(
+                f"{shown_path(path)}: expected a GeoTIFF with square pixels along the map (tags ModelPixelScale and "
+                "ModelTiepoint), got another; warp it to its own coordinate system first."
+            )
+        values = np.asarray(page.asarray(), dtype=np.float64)
+        return _north_up(values[..., 0] if values.ndim == 3 else values, tags)
 
 
 def _north_up(values: Array, tags: dict[int, tuple[float, ...]]) -> Raster:
@@ -75,6 +74,8 @@ def _north_up(values: Array, tags: dict[int, tuple[float, ...]]) -> Raster:
     column, row, _, east, north, _ = tags[TIE_POINT][:6]
     x = np.array(east + (np.arange(values.shape[1]) + 0.5 - column) * size)
     y = np.array(north - (np.arange(values.shape[0]) + 0.5 - row) * size)
+    if not (np.diff(x) > 0.0).all() or not (np.diff(y) < 0.0).all():
+        raise ValueError(f"pixels of {size:g} m at {east:g}, {north:g} m have no places of their own")
     if NO_DATA in tags:
         values = np.where(values == float(str(tags[NO_DATA]).strip("\x00 ")), np.nan, values)
     return Raster(x, y[::-1].copy(), size, values[::-1].T)
@@ -103,7 +104,10 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, str]
         )
     taken = in_the_channel(taken, place, words)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
-    return points[np.isfinite(points).all(axis=1)], taken_in_words(taken)
+    points = points[np.isfinite(points).all(axis=1)]
+    if not points.size:
+        raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
+    return points, taken_in_words(taken)
 
 
 def _of_points(path: Path, points: Array, said: str) -> Terrain:

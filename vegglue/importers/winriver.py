@@ -57,6 +57,8 @@ def _ensemble(rows: list[list[str]]) -> BoatProfile:
     depth = metres * float(beams[beams > 0.0].mean()) if (beams > 0.0).any() else 0.0
     north, east = float(rows[2][2]), float(rows[2][3])
     cells = np.array([[float(row[column]) for column in (0, 3, 4)] for row in rows[6:]]).reshape(-1, 3)
+    if not np.isfinite([depth, north, east, *cells.ravel()]).all():
+        raise ValueError("a number that is none")
     cells = cells[(cells[:, 1:] != NO_VELOCITY).all(axis=1)]
     height = depth - metres * cells[:, 0]
     above = height > 0.0

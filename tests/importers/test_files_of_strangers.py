@@ -1,0 +1,93 @@
+"""Files that a library reads, made to fill the memory or to break it: one sentence, before room is taken."""
+
+import struct
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from untrusted_imports import IMPORTS
+
+from vegglue.errors import InputError
+from vegglue.importers.confluence_mat import _loaded
+from vegglue.importers.loose_table import read_loosely
+from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.terrain_files import read_geotiff
+
+VALID = {name: content for name, content, _ in IMPORTS}
+SHEET = "xl/worksheets/sheet1.xml"
+MOST = 400_000_000  # bytes, a few times the largest file of data
+
+
+@pytest.fixture(autouse=True)
+def _in_bounded_memory() -> Iterator[None]:
+    tracemalloc.start()
+    yield
+    assert tracemalloc.get_traced_memory()[1] < MOST
+    tracemalloc.stop()
+
+
+def workbook_with(path: Path, sheet: Iterator[bytes]) -> Path:
+    """A workbook whose only sheet holds these bytes."""
+    (path.parent / "valid.xlsx").write_bytes(VALID["table.xlsx"])
+    with ZipFile(path.parent / "valid.xlsx") as valid, ZipFile(path, "w", ZIP_DEFLATED) as packed:
+        for name in valid.namelist():
+            if name != SHEET:
+                packed.writestr(name, valid.read(name))
+        with packed.open(SHEET, "w") as file:
+            for part in sheet:
+                file.write(part)
+    return path
+
+
+def test_a_workbook_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
+    path = workbook_with(tmp_path / "bomb.xlsx", (b" " * 1_000_000 for _ in range(150)))
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(InputError, match=r"bomb\.xlsx: expected at most 100,000,000 bytes, got 150,"):
+        read_loosely(path)
+
+
+def test_a_workbook_with_few_cells_far_to_the_right_is_refused(tmp_path: Path) -> None:
+    def rows() -> Iterator[bytes]:
+        yield b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+        for row in range(1, 2000):
+            yield b'<row r="%d"><c r="XFD%d"><v>1</v></c></row>' % (row, row)
+        yield b"</sheetData></worksheet>"
+
+    with pytest.raises(InputError, match=r"wide\.xlsx: expected at most 100,000,000 bytes, got 100,"):
+        read_loosely(workbook_with(tmp_path / "wide.xlsx", rows()))
+
+
+def test_a_geotiff_that_claims_many_pixels_is_refused(tmp_path: Path) -> None:
+    content, (width, height) = VALID["bed.tif"], (0x100, 0x101)
+    for tag in (width, height):
+        place = content.index(struct.pack("<HHI", tag, 4, 1))
+        content = content[: place + 8] + struct.pack("<I", 1_000_000) + content[place + 12 :]
+    (tmp_path / "bed.tif").write_bytes(content)
+    with pytest.raises(InputError, match=r"bed\.tif: expected at most 100,000,000 bytes, got 4,000,000,000,000"):
+        read_geotiff(tmp_path / "bed.tif")
+
+
+def test_a_matlab_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
+    savemat(tmp_path / "maps.mat", {"X": np.zeros((4000, 4000), np.int8)}, do_compression=True)
+    assert (tmp_path / "maps.mat").stat().st_size < 100_000
+    with pytest.raises(InputError, match=r"maps\.mat: expected at most 100,000,000 bytes, got 128,000,000"):
+        _loaded(tmp_path / "maps.mat", "X")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("a.geojson", b"[" * 100_000, "expected GeoJSON with polygons, got another file"),
+        ("a.geojson", b"[]", "expected GeoJSON with polygons"),
+        ("a.geojson", VALID["patches.geojson"].replace(b"20", b'"many"'), "expected a number of stems in 1/m2, got 'm"),
+        ("a.shp", b"", "cannot be read as a shapefile"),
+    ],
+)
+def test_what_is_wrong_with_polygons_is_told(tmp_path: Path, name: str, content: bytes, expected: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=expected):
+        read_polygons(tmp_path / name, None)

@@ -1,0 +1,92 @@
+"""Readers of what `import` takes from elsewhere: for each a valid file, and what reads it to the end."""
+
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import openpyxl
+import shapefile
+import tifffile
+from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
+from scipy.io import savemat
+
+from vegglue.importers.confluence_mat import _loaded
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.instruments import reader_of
+from vegglue.importers.measured_rows import read_rows
+from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.terrain_files import read_terrain
+
+WORDS = FileWords(
+    experiment="low", standard_error=0.01, line=((0.0, 0.0), (0.0, 9.0)), start=(0.0, 0.0), position=(1.0, 0.0, 0.3)
+)
+PLACES, DEPTHS, VELOCITIES = [1.0, 2.0, 3.0], [0.5, 0.7, 0.6], [0.3, 0.4, 0.2]
+SQUARE = [[0.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 0.0], [0.0, 0.0]]
+GEOJSON = (
+    b'{"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {"stems": 20, "class": "bank"}, '
+    b'"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [0, 2], [2, 2], [2, 0], [0, 0]]]}}]}'
+)
+
+
+def _workbook() -> bytes:
+    book, content = openpyxl.Workbook(), BytesIO()
+    for row in (["x", "y", "u"], ["m", "m", "m/s"], [1.0, 0.0, 0.3], [1.0, 1.0, 0.4]):
+        book.active.append(row)
+    book.save(content)
+    return content.getvalue()
+
+
+def _geotiff() -> bytes:
+    content = BytesIO()
+    of_map = [(33550, 12, 3, (2.0, 2.0, 0.0), False), (33922, 12, 6, (0.0, 0.0, 0.0, 0.0, 6.0, 0.0), False)]
+    tags = [*of_map, (42113, 2, 6, "-9999", False)]
+    tifffile.imwrite(content, np.arange(6, dtype=np.float32).reshape(3, 2), extratags=tags)
+    return content.getvalue()
+
+
+def _shapes() -> dict[str, bytes]:
+    with TemporaryDirectory() as folder:
+        with shapefile.Writer(str(Path(folder) / "p.shp")) as writer:
+            writer.field("stems", "N", decimal=1)
+            writer.poly([SQUARE])
+            writer.record(20.0)
+        return {path.suffix: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+def _matlab() -> bytes:
+    content = BytesIO()
+    savemat(content, {"X": np.ones((2, 2)), "Y": np.eye(2)}, do_compression=True)
+    return content.getvalue()
+
+
+def _measured(path: Path) -> object:
+    path.with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
+    return reader_of(path)(path, WORDS)
+
+
+def _beside(path: Path) -> object:
+    """One file of a shapefile, the others whole."""
+    for ending, content in SHAPES.items():
+        if ending != path.suffix:
+            path.with_suffix(ending).write_bytes(content)
+    return read_polygons(path.with_suffix(".shp"), None)
+
+
+SHAPES = _shapes()
+EAST, NORTH = np.linspace(0.0, 8.0, 20), np.zeros(20)
+IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
+    ("table.xlsx", _workbook(), lambda path: read_rows(path, WORDS)),
+    ("table.txt", b"x;y;u\nm;m;cm/s\n1,5;0;30\n1,5;1;40\n", lambda path: read_rows(path, WORDS)),
+    ("bed.tif", _geotiff(), lambda path: read_terrain(path, None, WORDS, False)),
+    ("sections.csv", b"x,y,z\n0,-1,1\n0,1,1\n9,-1,1\n9,1,1\n", lambda path: read_terrain(path, None, WORDS, True)),
+    ("patches.shp", SHAPES[".shp"], _beside),
+    ("patches.dbf", SHAPES[".dbf"], _beside),
+    ("patches.geojson", GEOJSON, lambda path: read_polygons(path, None)),
+    ("maps.mat", _matlab(), lambda path: _loaded(path, "X", "Y")),
+    ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
+    ("surveyor.dis", riversurveyor(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
+    ("probe.dat", vectrino((0.3, 0.0, 0.0), 0.02, 40, 2).encode(), _measured),
+    ("boat.txt", winriver(EAST, NORTH, 1.0, (0.1, 0.4), 0.01).encode(), _measured),
+)

@@ -1,0 +1,47 @@
+"""Files that a library reads: workbooks, GeoTIFFs, shapefiles, MATLAB files. Whatever one of them makes of a damaged
+file, and however many numbers a small file unpacks to, the user reads one sentence.
+"""
+
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from vegglue.case.size_limits import LARGEST_DATA
+from vegglue.errors import InputError, shown_path
+
+LONGEST_COMPLAINT = 200  # letters of what a library says; some quote the file
+
+
+@contextmanager
+def read_by_library(path: Path, kind: str, logger: str = "") -> Iterator[None]:
+    """Within, a library reads a file: its warnings and its log are not shown, its errors are told as one.
+
+    kind: what the file should be, in words. Errors: InputError when it is larger than a file of data may be, or the
+    library fails in whatever way.
+    """
+    log = logging.getLogger(logger) if logger else None
+    before = None if log is None else log.disabled
+    try:
+        refuse_larger(path, path.stat().st_size)
+        if log is not None:
+            log.disabled = True
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # on damaged files libraries raise anything
+        lines = str(error).splitlines() or [type(error).__name__]
+        complaint = lines[0][:LONGEST_COMPLAINT]
+        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {complaint}; save it anew.") from None
+    finally:
+        if log is not None and before is not None:
+            log.disabled = before
+
+
+def refuse_larger(path: Path, size: int) -> None:
+    """Errors: InputError when what a file holds, packed or unpacked, is more than a file of data may be [bytes]."""
+    if size > LARGEST_DATA:
+        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
