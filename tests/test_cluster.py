@@ -1,6 +1,7 @@
 """More than one machine: the same bits as here, nothing lost with a worker, and one sentence for what cannot be."""
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -179,10 +180,19 @@ def test_what_is_left_alone_half_way_is_taken_back(two: Workers) -> None:
         assert side_by_side(abs, [(-1,)]) == [1]
 
 
+def is_left_alone(task: int) -> bool:
+    """Whether this process neither hears Ctrl-C nor is looked at all the time."""
+    import dask
+
+    masked = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    return masked and not dask.config.get("distributed.worker.profile.enabled")
+
+
 @pytest.mark.slow
 def test_processes_of_this_machine_need_no_scheduler() -> None:
     with on_cluster("local:2"):
         assert side_by_side(abs, [(-1,), (-2,)]) == [1, 2]
+        assert side_by_side(is_left_alone, [(1,), (2,)]) == [True, True]
 
 
 @pytest.mark.slow

@@ -1,12 +1,13 @@
 """Threads of tasks that are split again: never more at once than allowed, whatever the nesting, and none idle."""
 
+import signal
 import threading
 import time
 
 import pytest
 
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, in_threads
+from vegglue.parallel import as_finished, at_most, in_threads
 
 
 def most_at_once(jobs: int) -> int:
@@ -49,3 +50,21 @@ def test_no_jobs_at_all_are_refused() -> None:
 def test_what_a_task_raises_is_raised() -> None:
     with at_most(2), pytest.raises(ZeroDivisionError):
         in_threads(lambda number: 1 / number, [(1,), (0,), (2,)])
+
+
+def hears_ctrl_c(task: int) -> bool:
+    return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@pytest.mark.slow
+def test_ctrl_c_is_never_for_a_worker_not_even_while_it_loads() -> None:
+    assert list(as_finished(hears_ctrl_c, [(0,), (1,)], 2)) == [False, False]
+    assert hears_ctrl_c(0), "here it is heard again"
+
+
+@pytest.mark.slow
+def test_tasks_that_are_left_are_left_without_a_word(recwarn: pytest.WarningsRecorder) -> None:
+    found = as_finished(hears_ctrl_c, [(number,) for number in range(50)], 2)
+    next(found)
+    found.close()
+    assert [str(one.message) for one in recwarn] == []

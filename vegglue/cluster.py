@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, keep_folder_out, one_thread_for_good, taken
+from vegglue.parallel import at_most, keep_folder_out, no_ctrl_c_for_children, one_thread_for_good, taken
 from vegglue.version import VERSION
 
 if TYPE_CHECKING:
@@ -33,6 +33,12 @@ DECIDING = ("numpy", "scipy", "numba")
 GOES_ON = "what was finished is kept, and the same command goes on from there"
 GONE = f"--cluster: expected the scheduler to stay, got no answer any more; {GOES_ON}, once there is one."
 Work = Callable[..., Any]
+DASK_SETTINGS = {
+    # What tasks share is sent with care, once, and may be large: the warning against large graphs tells nothing.
+    "distributed.admin.large-graph-warning-threshold": "1 TB",
+    # Workers of local:N are not looked at a hundred times a second: that took a tenth of them on a small case.
+    "distributed.worker.profile.enabled": False,
+}
 
 
 @contextmanager
@@ -64,10 +70,8 @@ def _connected(where: str) -> Iterator["Client"]:
             "--cluster needs the package distributed, which is not installed: pip install 'vegglue[cluster]'."
         ) from None
     _hush()
-    # What tasks share is sent with care, once, and may be large: the warning against large graphs tells nothing.
-    quiet = {"distributed.admin.large-graph-warning-threshold": "1 TB"}
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(quiet))
+        stack.enter_context(dask.config.set(DASK_SETTINGS))
         count = _local(where)
         address = stack.enter_context(_processes_here(count)) if count else where
         try:
@@ -85,15 +89,16 @@ def _processes_here(count: int) -> "LocalCluster":
     from distributed import LocalCluster
 
     keep_folder_out()
-    return LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-        preload=[__name__],
-    )
+    with no_ctrl_c_for_children():
+        return LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+            preload=[__name__],
+        )
 
 
 def _hush() -> None:

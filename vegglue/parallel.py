@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -14,6 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from itertools import count
+from multiprocessing import resource_tracker
 from threading import Semaphore
 from typing import Any
 
@@ -62,7 +64,10 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
         yield from (found for _, found in taker(work, tasks))
         return
     try:
-        yield from _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+        with no_ctrl_c_for_children():
+            found = _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
+        with _closing_quietly(found):
+            yield from (one for one in found)  # who leaves these closes them only, and not what is found
     except BrokenProcessPool as error:
         raise StorageError(
             "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
@@ -169,6 +174,28 @@ def keep_folder_out() -> None:
     `numpy.py` of its own.
     """
     os.environ["PYTHONSAFEPATH"] = "1"
+
+
+@contextmanager
+def no_ctrl_c_for_children() -> Iterator[None]:
+    """Processes begun within never hear Ctrl-C, from their first moment on: it is for the run that they serve."""
+    resource_tracker.ensure_running()  # else it begins within, and takes the mask off again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _closing_quietly(found: Any) -> Iterator[None]:
+    """Results of a pool, which warns of tasks that are not done when it is left: at a Ctrl-C nobody wonders."""
+    try:
+        yield
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            found.close()
 
 
 def _pool(jobs: int, order: str) -> Parallel:

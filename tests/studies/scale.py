@@ -28,7 +28,7 @@ from vegglue.solver.status import FAILED, members_with
 from vegglue.storage.result_files import read_ensemble
 
 # Members that are timed on the brook: seconds of work. And on cells of half the size.
-TIMED, FINE = 4096, ("cell: [1.0, 0.5]", "cell: [0.25, 0.1875]")
+TIMED, FINE = 16384, ("cell: [1.0, 0.5]", "cell: [0.25, 0.1875]")
 # Each is timed so often, in turns, and the shortest time counts: others use the machine too.
 TURNS = 3
 SOLVED = 16
