@@ -166,7 +166,7 @@ def test_a_flume_has_walls_and_no_banks(tmp_path: Path) -> None:
     assert case.grid.y == (-0.4, 0.4)
     assert case.friction.walls is not None
     assert case.friction.walls.n == "n_w"
-    assert list(case.parameters) == ["n_b", "n_w"]
+    assert list(case.parameters) == ["n_b", "eddy_viscosity", "n_w"]
     assert case.model_error.bed == 0.001
     remarks = " ".join(vegglue.check(case, runs=tmp_path).remarks)
     assert "side edges" not in remarks
