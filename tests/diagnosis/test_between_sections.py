@@ -77,6 +77,14 @@ def test_a_model_that_is_known_does_not_err(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_stations_move_halfway_to_the_next_section_and_to_the_end() -> None:
     kinds = ["velocity", "velocity", "level"]
-    station = pd.DataFrame({"kind": kinds, "x": [2.0, 6.0, 9.0], "used": [True, True, True]})
-    assert halfway(station, 10.0)["x"].tolist() == [4.0, 8.0]
+    station = pd.DataFrame(
+        {"kind": kinds, "x": [2.0, 6.0, 9.0], "y": 0.0, "experiment": "low", "section": ["A", "B", ""]}
+    )
+    assert halfway(station.assign(used=True), 10.0)["x"].tolist() == [4.0, 8.0]
     assert halfway(station.assign(used=[True, False, True]), 10.0)["x"].tolist() == [6.0]
+
+
+def test_a_section_that_a_boat_measured_moves_as_one() -> None:
+    boat = {"x": [1.9, 2.0, 2.1, 6.1, 6.0, 5.9], "y": [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "section": [*"AAABBB"]}
+    station = pd.DataFrame(boat | {"kind": "velocity", "used": True, "experiment": "low"})
+    assert halfway(station, 8.0)["x"].tolist() == pytest.approx([3.9, 4.0, 4.1, 7.1, 7.0, 6.9])

@@ -21,6 +21,7 @@ from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import covariance_of
 from vegglue.engine.interface import linearise
 from vegglue.measurements.kinds import STREAMWISE
+from vegglue.measurements.sections import section_places
 
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
 # is known to half a per cent of the share.
@@ -46,9 +47,10 @@ def largest_error_between(base: Baseline) -> float:
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
     """The stations of velocities moved halfway to the next section downstream, or to the end of the channel [m]."""
     velocity = station[station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()]
-    places = np.unique(velocity["x"])
-    between = dict(zip(places, 0.5 * (places + np.append(places[1:], end)), strict=True))
-    return velocity.assign(x=velocity["x"].map(between))
+    middle = section_places(velocity)
+    places = np.unique(middle)
+    ahead = dict(zip(places, 0.5 * (np.append(places[1:], end) - places), strict=True))
+    return velocity.assign(x=np.minimum(velocity["x"] + middle.map(ahead), end))
 
 
 def _errors_between(search: SearchModel) -> tuple[Array, Array] | None:

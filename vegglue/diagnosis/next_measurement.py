@@ -22,6 +22,7 @@ from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, linearise, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
+from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.site.gridded_site import build_site
 
@@ -116,6 +117,7 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
     """
     tables, plans, count = [model.station], [], len(model.station)
     velocity = model.station[velocity_rows(model.station) & model.station["used"]]
+    velocity = velocity.assign(x=section_places(velocity))
     for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
         table = _stations(experiment, plan_name, x, y, kind)
         rows, setting = np.arange(count, count + len(table)), case.experiments[experiment]

@@ -1,0 +1,15 @@
+"""Sections: stations that were measured together across the channel, though a boat does not keep its line."""
+
+import pandas as pd
+
+
+def section_places(station: pd.DataFrame) -> pd.Series:
+    """The x of the section of each station [m]: the median of those of its name in its experiment.
+
+    Stations without such a name, or that lie along the channel rather than across it, have their own x.
+    """
+    group = station.groupby(["experiment", station["section"].astype(str)])
+    along = group["x"].transform("max") - group["x"].transform("min")
+    across = group["y"].transform("max") - group["y"].transform("min")
+    together = (station["section"].astype(str) != "") & (along <= across)
+    return group["x"].transform("median").where(together, station["x"])
