@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from vegglue.case.config import load_case, read_tree
+from vegglue.case.messages import nearest
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.errors import InputError
 
@@ -246,6 +247,12 @@ def test_what_is_wrong_is_said_in_one_sentence(old, new, expected):
 def test_numbers_of_yaml_1_2_are_numbers():
     case = load_case(changed("name: small", "name: small\nnumerics: {tolerance: 1e-7, film_depth: 2E-3}"))
     assert (case.numerics.tolerance, case.numerics.film_depth) == (1e-7, 2e-3)
+
+
+def test_few_of_many_known_words_are_listed():
+    said = nearest("x", [f"word{number}" for number in range(100)])
+    assert said.startswith("known here are word0, word1,")
+    assert said.endswith("word29 and 70 more")
 
 
 def test_a_misspelt_key_is_named_before_what_it_leaves_missing():

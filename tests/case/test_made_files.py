@@ -1,5 +1,6 @@
 """What a user made or edited is never replaced without being asked to; what vegglue wrote itself is."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -62,3 +63,15 @@ def test_a_folder_and_bytes_that_are_no_text_stay(texts: Texts, tmp_path: Path) 
     (tmp_path / "brook.yaml").mkdir()
     with pytest.raises(InputError, match=r"brook\.yaml"):
         write_made(texts, ADVICE)
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, force: bool) -> None:
+    """Reading a pipe would wait for ever; a link that leads nowhere was made by somebody."""
+    (tmp_path / "link").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("link", "pipe"):
+        with pytest.raises(InputError, match=f"{name}: expected a file or nothing, got something else; give another"):
+            write_made({tmp_path / name: "name: x\n"}, ADVICE, force)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe"]
+    assert (tmp_path / "link").is_symlink()

@@ -50,11 +50,16 @@ def raises(error: BaseException) -> Callable[[], None]:
         (StorageError("a.h5: the disk is full; make room."), 3, "a.h5: the disk is full; make room.\n"),
         (OSError(errno.EACCES, "Permission denied", "runs"), 3, "runs cannot be used (Permission denied); what was"),
         (OSError(errno.ESTALE, "Stale file handle"), 3, "The output, or a file, cannot be used (Stale file handle)"),
+        (
+            RuntimeError("Symlink loop from '/x'"),
+            2,
+            "A link leads back to itself (Symlink loop from '/x')",
+        ),
         (MemoryError(), 3, "The memory is full; what was finished is kept: run it again with fewer --jobs"),
         (SystemExit(130), 130, "Stopped; what was solved is kept"),
         (SystemExit(2), 2, ""),
     ],
-    ids=["mistake", "storage", "system", "unnamed", "memory", "stopped", "usage"],
+    ids=["mistake", "storage", "system", "unnamed", "link", "memory", "stopped", "usage"],
 )
 def test_every_end_has_its_code(
     error: BaseException, code: int, expected: str, capsys: pytest.CaptureFixture[str]

@@ -34,6 +34,12 @@ def shipped_set(folder: Path) -> Path:
     return folder
 
 
+def test_the_set_is_not_looked_for_all_over_a_disk(tmp_path: Path) -> None:
+    shipped_set(tmp_path / "one" / "set")
+    assert mat_folder(tmp_path / "one") is not None
+    assert mat_folder(tmp_path) is None
+
+
 def test_files_become_tables_of_verticals_and_maps(tmp_path: Path) -> None:
     source = mat_folder(shipped_set(tmp_path / "set"))
     assert source is not None

@@ -23,6 +23,9 @@ def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> N
     forced; StorageError, which ends with the advice.
     """
     *tables, config = texts
+    for path in texts:
+        if (path.exists() or path.is_symlink()) and not path.is_file():  # reading a pipe would wait
+            raise InputError(f"{shown_path(path)}: expected a file or nothing, got something else; {advice}.")
     if not force:
         stated = _stated_in(config)
         for path, text in texts.items():
@@ -39,7 +42,7 @@ def _refuse_to_replace(path: Path, text: str, stated: Mapping[str, str], advice:
     if there is None or there == text or stated.get(path.name) == _short(there):
         return
     raise InputError(
-        f"{shown_path(path)}: is there, and was not made by vegglue or was edited since; Add --force to "
+        f"{shown_path(path)}: is there, and was not made by vegglue or was edited since; add --force to "
         f"replace it, or {advice}."
     )
 
@@ -58,7 +61,7 @@ def _text_of(path: Path) -> str | None:
     except FileNotFoundError:
         return None
     except OSError:
-        return ""  # a folder, say: not what vegglue wrote
+        return ""  # not readable: not what vegglue wrote
     body, heading, lines = text.rpartition(HEADING)
     return body if heading and not LINE.sub("", lines) else text
 

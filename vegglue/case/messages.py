@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin
 from vegglue.case.parts import Part
 from vegglue.case.schema import Case
 
+MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
 KeyPath = tuple[str | int, ...]
 
 
@@ -45,7 +46,10 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown word: the known word most like it, else all known ones."""
     known = list(known)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"did you mean `{near[0]}`?" if near else f"known here are {', '.join(known) or 'none'}"
+    if near:
+        return f"did you mean `{near[0]}`?"
+    more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
+    return f"known here are {', '.join(known[:MOST_NAMED]) or 'none'}{more}"
 
 
 def dotted(place: KeyPath) -> str:

@@ -27,6 +27,10 @@ def ending_well(command: Callable[[], object]) -> None:
         _end(f"{where} cannot be used ({error.strerror or error}); {KEPT_ANYWAY}: mend that, run it again.", MACHINE)
     except MemoryError:
         _end(f"The memory is full; {KEPT_ANYWAY}: run it again with fewer --jobs, or a coarser grid.", MACHINE)
+    except RuntimeError as error:
+        if not str(error).startswith("Symlink loop"):  # of Python before 3.13; later it is an OSError
+            raise
+        _end(f"A link leads back to itself ({error}); give another path.", MISTAKE)
     except SystemExit as ended:
         if ended.code == STOPPED:  # typer has made this of Ctrl-C
             _end("Stopped; what was solved is kept, run the same command again to go on.", STOPPED)

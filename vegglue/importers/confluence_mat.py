@@ -17,6 +17,8 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.library_files import read_by_library, refuse_larger
 
 MAPS = "topo_water_level_maps.mat"
+# Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
+DEEPEST = 2
 # Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
 THINNED = 4
 HEADING_OF_VERTICALS = "x_m,y_m,h_m,U_depthavg_ms,V_depthavg_ms,bed_extrapolated"
@@ -24,8 +26,11 @@ HEADING_OF_VERTICALS = "x_m,y_m,h_m,U_depthavg_ms,V_depthavg_ms,bed_extrapolated
 
 def mat_folder(folder: Path) -> Path | None:
     """The folder of the MATLAB files, the one given or one inside it; None where there is none."""
-    found = sorted(folder.rglob(MAPS)) if folder.is_dir() else []
-    return found[0].parent if found else None
+    for depth in range(1 + DEEPEST):
+        found = sorted(folder.glob("*/" * depth + MAPS)) if folder.is_dir() else []
+        if found:
+            return found[0].parent
+    return None
 
 
 def tables_of_mat(source: Path, into: Path) -> Path:
