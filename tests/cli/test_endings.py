@@ -145,6 +145,12 @@ def test_an_output_that_is_full_is_told() -> None:
     )
 
 
+def test_an_output_that_nobody_reads_on_ends_the_command_without_a_word() -> None:
+    shell = f"set -o pipefail; {' '.join(command('effects'))} | true"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, env=ENVIRONMENT, text=True)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
 def test_an_output_that_is_closed_harms_nothing() -> None:
     shell = " ".join(command("version")) + " >&-"
     done = subprocess.run(shell, shell=True, stderr=subprocess.PIPE, env=ENVIRONMENT, text=True)
