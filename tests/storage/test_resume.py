@@ -2,7 +2,7 @@
 
 import signal
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from stored import (
     write_chunks,
 )
 
-from vegglue.errors import InputError
+from vegglue.errors import InputError, StorageError
 from vegglue.results.ensemble import Header
 from vegglue.storage.result_files import read_ensemble
 from vegglue.storage.resume import ensemble_writer
@@ -129,6 +129,30 @@ def test_rows_that_do_not_match_the_file_are_refused(path: Path) -> None:
     del rows["seconds"]
     with ensemble_writer(path, a_header()) as writer, pytest.raises(ValueError, match="expected the rows"):
         writer.append(0, members_of(0), rows)
+
+
+@pytest.mark.parametrize("header", [a_header(), a_header(window=WINDOW)], ids=["rows alone", "with fields"])
+def test_a_run_on_a_machine_that_no_lock_reaches_spoils_nothing(
+    path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both lay out the part file; the first must not call that of the second whole."""
+
+    def two_at_once() -> None:
+        with ensemble_writer(path, header) as first:
+            append(first, 0)
+            with ensemble_writer(path, header) as second:
+                assert second.done == {0}
+                append(second, 1)
+            for chunk in (1, 2):
+                append(first, chunk)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("vegglue.storage.resume.hold_lock", lambda folder: nullcontext())
+        with pytest.raises(StorageError, match="was replaced by another run"):
+            two_at_once()
+    assert not path.exists()
+    assert write_chunks(path, ALL, header) == {0, 1}
+    assert_whole(path, header)
 
 
 def test_long_reasons_are_cut_between_characters(path: Path) -> None:

@@ -133,9 +133,23 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
             writer = EnsembleWriter(file, part, set_aside, unfinished)
             yield writer
             complete = len(writer.done) == header.chunks
+            _refuse_replaced(file, part)
         if complete:
             with failed_writes_told(path, WRITTEN_STAYS):
                 _finish(path, unfinished, header)
+
+
+def _refuse_replaced(file: h5py.File, part: Path) -> None:
+    """Errors: StorageError when the open file is no longer the one of its name: locks of some network disks do not
+    reach other machines, and another run has begun there.
+    """
+    mine = os.fstat(file.id.get_vfd_handle())
+    there = part.stat() if part.exists() else None
+    if there is None or (there.st_dev, there.st_ino) != (mine.st_dev, mine.st_ino):
+        raise StorageError(
+            f"{part}: was replaced by another run, on a machine that the lock of this one does not reach; wait for "
+            "that run to end, then give the same command again."
+        )
 
 
 def remove_left_over_fields(path: Path) -> None:
