@@ -96,6 +96,7 @@ def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
         ),
         ("level: 1.0}", "level: -0.5}", "The outlet level of experiment low, -0.5 m, is below the bed there"),
         ("level: 1.0}", "level: 0.2}", "leaves at a Froude number of 1.3"),
+        ("bed_slope: 0.001", "bed_slope: 0.2", "Experiment low is supercritical: on the slope of the floor, 0.2,"),
         ("level: 1.0}", "level: 2.0}", "Experiment low puts water on the side edges of the grid"),
         ("{side: west}", "{side: west, range: [4.01, 4.02]}", "Inflow upstream holds no cell centre"),
         ("outlet: {}", "outlet: {range: [4.26, 4.75]}", "The outlet holds no cell centre"),

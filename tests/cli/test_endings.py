@@ -178,6 +178,14 @@ def test_a_worker_that_is_killed_is_one_sentence() -> None:
     assert sorted(parallel.as_finished(die, [(0,), (2,)], 2)) == [0, 2], "a second start finishes"
 
 
+def test_fields_that_a_killed_run_left_are_taken_away(tmp_path: Path, say: Say) -> None:
+    assert say("simulate", "brook.yaml", "--jobs", 1) == (0, "")
+    left = tmp_path / "runs/brook/fields.part"
+    left.write_bytes(b"killed just before this was taken away")
+    assert say("simulate", "brook.yaml", "--jobs", 1) == (0, "")
+    assert not left.exists()
+
+
 EXITS = """
 from vegglue.effects.definition import Amplitude, Effect
 raise SystemExit(0)
