@@ -1,9 +1,11 @@
 """Readers of what `import` takes from elsewhere: for each a valid file, and what reads it to the end."""
 
+import json
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zipfile import ZipFile
 
 import numpy as np
 import openpyxl
@@ -13,9 +15,11 @@ from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectr
 from scipy.io import savemat
 
 from vegglue.importers.confluence_mat import _loaded
+from vegglue.importers.drawn_centreline import _of_map
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.measured_rows import read_rows
+from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.terrain_files import read_terrain
 
@@ -28,6 +32,8 @@ GEOJSON = (
     b'{"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {"stems": 20, "class": "bank"}, '
     b'"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [0, 2], [2, 2], [2, 0], [0, 0]]]}}]}'
 )
+
+LINE = b'{"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[0, 0], [500, 0], [900, 30]]}}'
 
 
 def _workbook() -> bytes:
@@ -61,6 +67,15 @@ def _matlab() -> bytes:
     return content.getvalue()
 
 
+def _gauging() -> bytes:
+    """Three verticals, as a FlowTracker2 packs them."""
+    content = BytesIO()
+    stations = [{"Location": at, "Depth": 0.5, "Calculations": {"MeanVelocityInVertical": {"X": 0.3}}} for at in PLACES]
+    with ZipFile(content, "w") as packed:
+        packed.writestr("DataFile.json", json.dumps({"Stations": stations}))
+    return content.getvalue()
+
+
 def _measured(path: Path) -> object:
     path.with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
     return reader_of(path)(path, WORDS)
@@ -79,8 +94,12 @@ EAST, NORTH = np.linspace(0.0, 8.0, 20), np.zeros(20)
 IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("table.xlsx", _workbook(), lambda path: read_rows(path, WORDS)),
     ("table.txt", b"x;y;u\nm;m;cm/s\n1,5;0;30\n1,5;1;40\n", lambda path: read_rows(path, WORDS)),
-    ("bed.tif", _geotiff(), lambda path: read_terrain(path, None, WORDS, False)),
-    ("sections.csv", b"x,y,z\n0,-1,1\n0,1,1\n9,-1,1\n9,1,1\n", lambda path: read_terrain(path, None, WORDS, True)),
+    ("bed.tif", _geotiff(), lambda path: read_terrain(path, Placement(), WORDS, False)),
+    (
+        "sections.csv",
+        b"x,y,z\n0,-1,1\n0,1,1\n9,-1,1\n9,1,1\n",
+        lambda path: read_terrain(path, Placement(), WORDS, True),
+    ),
     ("patches.shp", SHAPES[".shp"], _beside),
     ("patches.dbf", SHAPES[".dbf"], _beside),
     ("patches.geojson", GEOJSON, lambda path: read_polygons(path, None)),
@@ -88,5 +107,7 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("surveyor.dis", riversurveyor(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("probe.dat", vectrino((0.3, 0.0, 0.0), 0.02, 40, 2).encode(), _measured),
+    ("gauging.ft", _gauging(), _measured),
+    ("line.geojson", LINE, _of_map),
     ("boat.txt", winriver(EAST, NORTH, 1.0, (0.1, 0.4), 0.01).encode(), _measured),
 )

@@ -4,17 +4,16 @@ data_3d_velocity_topography_surface_maps/ holds a file for each section (X, Y, Z
 and topo_water_level_maps.mat (Xtopo, Ytopo, Ztopo, Xwl, Ywl, Zwl).
 """
 
-import math
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
-from scipy.io import loadmat, whosmat
+from scipy.io import loadmat
 
 from vegglue.arrays import Array
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.library_files import read_by_library, refuse_larger
+from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
 
 MAPS = "topo_water_level_maps.mat"
 # Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
@@ -53,7 +52,7 @@ def tables_of_mat(source: Path, into: Path) -> Path:
 
 def _loaded(path: Path, *names: str) -> dict[str, Array]:
     with read_by_library(path, "a file of the set"):
-        refuse_larger(path, sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
+        refuse_larger_matlab(path)
         found = loadmat(path, variable_names=names)
         return {name: np.asarray(found[name], dtype=np.float64) for name in names}
 

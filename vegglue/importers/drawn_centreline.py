@@ -16,6 +16,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import file_words
+from vegglue.importers.library_files import read_by_library
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
@@ -117,7 +118,10 @@ def _of_map(path: Path) -> Taken:
     found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path)
     if len(found) != 1:
         raise InputError(f"{shown_path(path)}: expected one line, got {len(found)}; save the centreline alone.")
-    x, y = np.array(found[0], dtype=np.float64)[:, :2].T
+    places = np.array(found[0], dtype=np.float64)
+    if places.ndim != 2 or not np.isfinite(places).all():
+        raise InputError(f"{shown_path(path)}: expected a line of points with numbers, got another; draw it anew.")
+    x, y = places[:, :2].T
     if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0:
         raise InputError(f"{shown_path(path)}: expected coordinates in m, got degrees; save it in a projected system.")
     form = (f"line of {path.suffix[1:]}",)
@@ -132,7 +136,7 @@ def _of_geojson(path: Path) -> list[Any]:
         lines = [[shape["coordinates"]] for shape in shapes if shape["type"] == "LineString"]
         lines += [shape["coordinates"] for shape in shapes if shape["type"] == "MultiLineString"]
         return [[(float(point[0]), float(point[1])) for point in line] for part in lines for line in part]
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise InputError(f"{shown_path(path)}: expected GeoJSON with a line, got another file ({error}).") from None
 
 
@@ -144,12 +148,9 @@ def _of_shapefile(path: Path) -> list[Any]:
             f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
             "`pip install 'vegglue[field]'`, or save it as GeoJSON."
         ) from None
-    try:
-        with shapefile.Reader(str(path)) as reader:
-            shapes = [shape for shape in reader.shapes() if shape.shapeTypeName.startswith("POLYLINE")]
-            return [shape.points[a:b] for shape in shapes for a, b in _parts(shape)]
-    except (OSError, shapefile.ShapefileException) as error:
-        raise InputError(f"{shown_path(path)} cannot be read as a shapefile: {error}; save it anew.") from None
+    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
+        shapes = [shape for shape in reader.shapes() if shape.shapeTypeName.startswith("POLYLINE")]
+        return [shape.points[a:b] for shape in shapes for a, b in _parts(shape)]
 
 
 def _parts(shape: Any) -> list[tuple[int, int]]:

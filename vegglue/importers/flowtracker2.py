@@ -8,13 +8,13 @@ import json
 import math
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 
-from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.tape_tables import last_of_each_place, on_the_tape
 
@@ -44,17 +44,11 @@ def read_flowtracker2(path: Path, words: FileWords) -> Taken:
 
 
 def _stations(path: Path) -> list[dict[str, Any]]:
-    try:
-        with ZipFile(path) as archive:
-            (entry,) = [one for one in archive.infolist() if one.filename.lower() == DATA_FILE]
-            if entry.file_size > LARGEST_DATA:
-                raise ValueError(f"{entry.file_size:,} bytes of {DATA_FILE}")
-            found = json.loads(archive.read(entry).decode("utf-8-sig"))["Stations"]
-    except (OSError, BadZipFile, ValueError, KeyError, TypeError, RuntimeError, NotImplementedError) as error:
-        raise InputError(
-            f"{shown_path(path)}: expected a FlowTracker2 file, a ZIP with DataFile.json and its Stations, got another "
-            f"({error}); export it as CSV from the maker's program."
-        ) from None
+    kind = "a FlowTracker2 file, a ZIP with DataFile.json and its Stations"
+    with read_by_library(path, kind), ZipFile(path) as archive:
+        (entry,) = [one for one in archive.infolist() if one.filename.lower() == DATA_FILE]
+        refuse_larger(path, entry.file_size)
+        found = json.loads(archive.read(entry).decode("utf-8-sig"))["Stations"]
     if not isinstance(found, list) or not found:
         raise InputError(f"{shown_path(path)}: expected a list of Stations in DataFile.json, got none; check the file.")
     return found

@@ -3,7 +3,9 @@ file, and however many numbers a small file unpacks to, the user reads one sente
 """
 
 import logging
+import struct
 import warnings
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +13,7 @@ from pathlib import Path
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
 
+COMPRESSED, AT_ONCE_UNPACKED = 15, 1 << 20  # type of an element of a MATLAB file; [bytes]
 LONGEST_COMPLAINT = 200  # letters of what a library says; some quote the file
 
 
@@ -39,6 +42,26 @@ def read_by_library(path: Path, kind: str, logger: str = "") -> Iterator[None]:
     finally:
         if log is not None and before is not None:
             log.disabled = before
+
+
+def refuse_larger_matlab(path: Path) -> None:
+    """Errors: InputError when the variables of a MATLAB file of version 5 unpack to more than a file of data may be.
+
+    Format: MAT-File Format (MathWorks): a header of 128 bytes that ends in the order of bytes, then elements, each with
+    its type and its size; those of type 15 are packed by deflate.
+    """
+    with path.open("rb") as file:
+        order = "<" if file.read(128)[126:] == b"IM" else ">"
+        total = 0
+        while len(head := file.read(8)) == 8:
+            kind, size = struct.unpack(f"{order}II", head)
+            rest = file.read(size)
+            total += len(rest)
+            unpacker = zlib.decompressobj()
+            while kind == COMPRESSED and rest and not unpacker.eof:
+                total += len(unpacker.decompress(rest, AT_ONCE_UNPACKED))
+                rest = unpacker.unconsumed_tail
+                refuse_larger(path, total)
 
 
 def refuse_larger(path: Path, size: int) -> None:

@@ -54,7 +54,7 @@ def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
         tree = json.loads(readable_text(path))
         features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
         for feature in features:
-            geometry, properties = feature["geometry"], feature.get("properties") or {}
+            geometry, properties = feature["geometry"], dict(feature.get("properties") or {})
             parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
             for rings in parts.get(geometry["type"], []):
                 yield _open([(float(corner[0]), float(corner[1])) for corner in rings[0]]), properties

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.library_files import refuse_larger
 
 
 def opened_raw(path: Path, instead: str, most: int | None = None) -> Any:
@@ -22,6 +23,7 @@ def opened_raw(path: Path, instead: str, most: int | None = None) -> Any:
             f"{shown_path(path)}: raw files of instruments are read by mhkit, which is not installed; run "
             f"`pip install 'vegglue[instruments]'`, or export {instead}."
         ) from None
+    refuse_larger(path, path.stat().st_size)
     data, problem = None, ""
     with redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reader leaves files open, and warns of what is of no use here

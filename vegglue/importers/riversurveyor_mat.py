@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.importers.unit_words import si_factor
@@ -40,13 +40,9 @@ def read_riversurveyor(path: Path, words: FileWords) -> Taken:
 
 
 def _parts(path: Path) -> dict[str, Any]:
-    try:
+    with read_by_library(path, "a MATLAB file of version 5 from RiverSurveyor Live"):
+        refuse_larger_matlab(path)
         found: dict[str, Any] = loadmat(path, struct_as_record=False, squeeze_me=True)
-    except (OSError, ValueError, TypeError, KeyError, NotImplementedError, MatReadError) as error:
-        raise InputError(
-            f"{shown_path(path)} cannot be read as a MATLAB file of version 5 ({type(error).__name__}); export it anew "
-            "from RiverSurveyor Live."
-        ) from None
     missing = [name for name in ("Setup", "Summary", "System", "WaterTrack") if name not in found]
     if missing:
         raise InputError(
