@@ -179,6 +179,7 @@ def keep_folder_out() -> None:
 @contextmanager
 def no_ctrl_c_for_children() -> Iterator[None]:
     """Processes begun within never hear Ctrl-C, from their first moment on: it is for the run that they serve."""
+    keep_folder_out()  # before the first process of all, which comes next
     resource_tracker.ensure_running()  # else it begins within, and takes the mask off again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
