@@ -91,7 +91,7 @@ def test_no_listed_effect_is_left_out(study, monkeypatch):
         raise ZeroDivisionError
 
     monkeypatch.setattr("blind_truth.steady_flow", flow)
-    theta = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7}
+    theta = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7, "eddy_viscosity": 0.01}
     site = perfect_site(model.case, study, theta, len(model.station))
     for name in names:
         candidate, amplitude, shapes = numbers_of(model, name)
