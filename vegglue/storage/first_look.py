@@ -111,7 +111,7 @@ def serve() -> None:
     for line in sys.stdin:
         longest, path = line.split()
         # Whoever asked may have been killed meanwhile: nobody else ends a reading in circles.
-        _limit(resource.RLIMIT_CPU, int(time.process_time() + float(longest)) + 1)
+        _limit(resource.RLIMIT_CPU, int(time.process_time() + 2.0 * float(longest)) + 2)  # later than whoever waits
         why = " ".join((_why_not_to_its_end(os.fsdecode(bytes.fromhex(path))) or "").split())
         os.write(sys.stdout.fileno(), why.encode(errors="replace")[:LONGEST_ANSWER] + b"\n")
 
