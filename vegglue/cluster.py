@@ -38,7 +38,7 @@ DASK_SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1 TB",
     # Workers of local:N are not looked at a hundred times a second: that took a tenth of them on a small case.
     "distributed.worker.profile.enabled": False,
-    # Dask lets workers give memory back at once, so that each array is mapped anew: a tenth of the time on arrays of MB.
+    # Dask has workers give memory back at once, so that arrays of megabytes are mapped anew each time.
     "distributed.nanny.pre-spawn-environ": {"OMP_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1, "MKL_NUM_THREADS": 1},
 }
 
