@@ -3,7 +3,6 @@
 A file is a table of x and y, a line of GeoJSON, or of a shapefile; upstream first.
 """
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import file_words
-from vegglue.importers.library_files import read_by_library
-from vegglue.importers.loose_table import readable_text
+from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
 from vegglue.importers.measured_rows import Taken, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import refuse_degrees
@@ -87,8 +85,8 @@ def _in_frame(shape: CentrelineShape, frame: Frame | None) -> CentrelineShape:
     if frame is None:
         return shape
     if shape.points is not None:
-        return shape.model_copy(update={"points": tuple(_rounded(*frame.to_model(*one)) for one in shape.points)})
-    start = _rounded(*frame.to_model(*shape.start))
+        return shape.model_copy(update={"points": tuple(rounded_place(*frame.to_model(*one)) for one in shape.points)})
+    start = rounded_place(*frame.to_model(*shape.start))
     return shape.model_copy(update={"start": start, "heading": round(shape.heading - frame.angle, 6)})
 
 
@@ -102,7 +100,7 @@ def _points(path: Path, taken: Taken) -> list[tuple[float, float]]:
     places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
     places = places[np.isfinite(places).all(axis=1)]
     found: list[tuple[float, float]] = []
-    for point in (_rounded(*place) for place in places.tolist()):
+    for point in (rounded_place(*place) for place in places.tolist()):
         if not found or math.dist(point, found[-1]) >= NEAREST_POINTS:
             found.append(point)
     if not 2 <= len(found) <= MOST_POINTS:
@@ -129,33 +127,17 @@ def _of_map(path: Path) -> Taken:
 
 
 def _of_geojson(path: Path) -> list[Any]:
-    try:
-        tree = json.loads(readable_text(path))
-        features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+    with geojson_features(path, "a line") as features:
         shapes = [feature.get("geometry", feature) for feature in features]
         lines = [[shape["coordinates"]] for shape in shapes if shape["type"] == "LineString"]
         lines += [shape["coordinates"] for shape in shapes if shape["type"] == "MultiLineString"]
         return [[(float(point[0]), float(point[1])) for point in line] for part in lines for line in part]
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise InputError(f"{shown_path(path)}: expected GeoJSON with a line, got another file ({error}).") from None
 
 
 def _of_shapefile(path: Path) -> list[Any]:
-    try:
-        import shapefile
-    except ImportError:
-        raise InputError(
-            f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
-            "`pip install 'vegglue[field]'`, or save it as GeoJSON."
-        ) from None
-    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
-        shapes = [shape for shape in reader.shapes() if shape.shapeTypeName.startswith("POLYLINE")]
-        return [shape.points[a:b] for shape in shapes for a, b in _parts(shape)]
+    with shapes_and_records(path, "POLYLINE") as found:
+        return [one.shape.points[a:b] for one in found for a, b in _parts(one.shape)]
 
 
 def _parts(shape: Any) -> list[tuple[int, int]]:
     return list(zip(shape.parts, [*shape.parts[1:], len(shape.points)], strict=True))
-
-
-def _rounded(x: float, y: float) -> tuple[float, float]:
-    return round(x, 4), round(y, 4)

@@ -71,15 +71,16 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
     measured = measured_files(folder, target, site, place, used)
+    unknown = _viscosity(site)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
         **_ground(folder, target, site, place, measured),
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
-        "eddy_viscosity": VISCOSITY if site.viscosity_factor > 1 else site.eddy_viscosity_m2_s,
+        "eddy_viscosity": VISCOSITY if unknown else site.eddy_viscosity_m2_s,
         "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
-        "parameters": PARAMETERS | _viscosity(site),
+        "parameters": PARAMETERS | unknown,
         "observations": measured.observations,
         **FIRST_LOOK,
     }

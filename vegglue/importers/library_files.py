@@ -18,11 +18,11 @@ LONGEST_COMPLAINT = 200  # letters of what a library says; some quote the file
 
 
 @contextmanager
-def read_by_library(path: Path, kind: str, logger: str = "") -> Iterator[None]:
+def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save it anew") -> Iterator[None]:
     """Within, a library reads a file: its warnings and its log are not shown, its errors are told as one.
 
-    kind: what the file should be, in words. Errors: InputError when it is larger than a file of data may be, or the
-    library fails in whatever way.
+    kind: what the file should be, in words; advice: how its sentence ends. Errors: InputError when it is larger than a
+    file of data may be, or the library fails in whatever way.
     """
     log = logging.getLogger(logger) if logger else None
     before = None if log is None else log.disabled
@@ -38,7 +38,7 @@ def read_by_library(path: Path, kind: str, logger: str = "") -> Iterator[None]:
     except Exception as error:  # on damaged files libraries raise anything
         lines = str(error).splitlines() or [type(error).__name__]
         complaint = lines[0][:LONGEST_COMPLAINT]
-        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {complaint}; save it anew.") from None
+        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {complaint}; {advice}.") from None
     finally:
         if log is not None and before is not None:
             log.disabled = before

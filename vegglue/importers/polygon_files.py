@@ -1,6 +1,5 @@
 """Polygons of patches and friction classes from GeoJSON files and shapefiles, brought into the channel."""
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +7,7 @@ from typing import Any
 
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.library_files import read_by_library
-from vegglue.importers.loose_table import readable_text
+from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
 
 # What properties of a polygon are called that say its density [1/m2], its class and its name; lower case.
 DENSITIES = ("stems_per_m2", "stems", "density", "stem_density", "stems_m2")
@@ -41,7 +39,7 @@ def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
         found.append(
             NamedPolygon(
                 name=str(_first(properties, NAMES) or f"p{number}"),
-                corners=[_rounded(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
+                corners=[rounded_place(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
                 density=_density(path, density) if density is not None else None,
                 friction_class=str(of_class) if of_class is not None else None,
             )
@@ -50,32 +48,20 @@ def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
 
 
 def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
-    try:
-        tree = json.loads(readable_text(path))
-        features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+    with geojson_features(path, "polygons") as features:
         for feature in features:
             geometry, properties = feature["geometry"], dict(feature.get("properties") or {})
             parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
             for rings in parts.get(geometry["type"], []):
                 yield _open([(float(corner[0]), float(corner[1])) for corner in rings[0]]), properties
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise InputError(f"{shown_path(path)}: expected GeoJSON with polygons, got another file ({error}).") from None
 
 
 def _of_shapefile(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
-    try:
-        import shapefile
-    except ImportError:
-        raise InputError(
-            f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
-            "`pip install 'vegglue[field]'`, or save it as GeoJSON."
-        ) from None
-    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
-        for record in reader.shapeRecords():
-            if record.shape.shapeTypeName.startswith("POLYGON"):
-                starts = [*record.shape.parts, len(record.shape.points)]
-                ring = [(float(x), float(y)) for x, y, *_ in record.shape.points[starts[0] : starts[1]]]
-                yield _open(ring), record.record.as_dict()
+    with shapes_and_records(path, "POLYGON") as found:
+        for one in found:
+            starts = [*one.shape.parts, len(one.shape.points)]
+            ring = [(float(x), float(y)) for x, y, *_ in one.shape.points[starts[0] : starts[1]]]
+            yield _open(ring), one.record.as_dict()
 
 
 def _density(path: Path, value: Any) -> float:
@@ -104,7 +90,3 @@ def refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Ring]) -> No
             f"{shown_path(path)}: expected coordinates in m like the origin of `frame`, got degrees; save it in the "
             f"projected system{f' {frame.crs}' if frame.crs else ''}."
         )
-
-
-def _rounded(x: float, y: float) -> tuple[float, float]:
-    return round(x, 4), round(y, 4)

@@ -1,0 +1,43 @@
+"""What map programs save: features of GeoJSON and shapes of shapefiles."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.library_files import read_by_library
+from vegglue.importers.loose_table import readable_text
+
+
+@contextmanager
+def geojson_features(path: Path, what: str) -> Iterator[list[Any]]:
+    """The features of a GeoJSON file, or its one geometry; what: it should hold, in words.
+
+    Errors: InputError when it is none, or what is done with them within does not find what it should.
+    """
+    try:
+        tree = json.loads(readable_text(path))
+        yield tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+        raise InputError(f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}).") from None
+
+
+@contextmanager
+def shapes_and_records(path: Path, kind: str) -> Iterator[list[Any]]:
+    """Those of a shapefile whose type begins with a kind, such as POLYGON. Errors: InputError when it is none."""
+    try:
+        import shapefile
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: shapefiles are read by pyshp, which is not installed; run "
+            "`pip install 'vegglue[field]'`, or save it as GeoJSON."
+        ) from None
+    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
+        yield [one for one in reader.shapeRecords() if one.shape.shapeTypeName.startswith(kind)]
+
+
+def rounded_place(x: float, y: float) -> tuple[float, float]:
+    """To a tenth of a millimetre [m]."""
+    return round(x, 4), round(y, 4)
