@@ -17,6 +17,7 @@ from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_gr
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, ModelError, Parameter
+from vegglue.diagnosis.between_sections import halfway
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -139,11 +140,8 @@ def hash_of(text: str) -> int:
 
 def unseen_stations(model: Model) -> pd.DataFrame:
     """The stations of velocities moved to sections halfway between those measured, and behind the last."""
-    velocity = model.station[model.station["kind"] == "velocity"]
-    places = np.unique(velocity["x"])
-    ends = np.append(places[1:], model.case.grid.x[1])
-    halfway = dict(zip(places, 0.5 * (places + ends), strict=True))
-    return velocity.assign(x=velocity["x"].map(halfway), section=velocity["section"].astype(str) + " and next")
+    moved = halfway(model.station, model.case.grid.x[1])
+    return moved.assign(section=moved["section"].astype(str) + " and next")
 
 
 def _hidden(base: TwinBase, sizing: Noise, name: str, signal: float, random: np.random.Generator) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import scipy.linalg
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.model_error import model_error_columns
-from vegglue.calibration.noise import covariance_of
+from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import linearise
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.sections import section_places
@@ -65,9 +65,8 @@ def _errors_between(search: SearchModel) -> tuple[Array, Array] | None:
     allowed = model.case.model_error.model_copy(update={"probes": 0.0})
     columns = np.hstack([point.slope, model_error_columns(wide, point, allowed)])
     at_stations, there = columns[:count][noise.rows], columns[count:]
-    slope = noise.used(point.slope[:count])
-    residual = noise.residual(search.point.prediction) + slope @ point.z
-    factor = scipy.linalg.cho_factor(covariance_of(noise) + slope @ slope.T, lower=True)
+    whole, residual = free_of_prior(search)
+    factor = scipy.linalg.cho_factor(whole, lower=True)
     shared = at_stations @ there.T
     mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - point.slope[count:] @ point.z
     covariance = there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
