@@ -65,8 +65,8 @@ def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPa
     found = a_diagnosis(verdict={"kind": kind})
     found = SimpleNamespace(verdict=found.verdict, places=found.places[:1] * places)
     rungs = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
-    alone = SimpleNamespace(rungs=())
-    made, shown = list[str](), list[str]()
+    alone = SimpleNamespace(rungs=(TWIN.name,), left_out=None)
+    made, shown, kept = list[str](), list[str](), list[str]()
 
     def has_posterior(case: Case, *_: Any) -> bool:
         made.append(case.name)
@@ -77,7 +77,8 @@ def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPa
         "diagnose": lambda case, **_: found,
         "extend_stepwise": lambda case, **_: SimpleNamespace(cases=(TWIN,), comparison=alone),
         "discover": lambda case, **_: SimpleNamespace(child=WITH_LAW, law=True),
-        "compare": lambda cases, **_: SimpleNamespace(rungs=[one.name for one in cases]),
+        "rung_of": lambda case, *_: case.name,
+        "keep_ladder": lambda found, cases, *_: kept.append(cases[-1].name),
         "held_out_rmse": lambda rung: rungs[rung],
         "next_measurement": lambda case, **_: [],
         "draw_ladder_of": lambda *_: Path("ladder.png"),
@@ -86,6 +87,9 @@ def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPa
     for name, fake in fakes.items():
         patched.setattr(whole_way, name, fake)
     whole_way.run(TWIN, show=lambda _, result: shown.append("law" if hasattr(result, "law") else ""))
+    assert kept == [name for name in made if name == WITH_LAW.name], (
+        "the ladder of a law that is not kept is not, either"
+    )
     return made, [one for one in shown if one]
 
 

@@ -8,10 +8,11 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import held_out_rmse
 from vegglue.errors import InputError
+from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.result_files import stored_hash
-from vegglue.workflow.compare import Comparison, compare, draw_ladder_of
+from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
@@ -51,16 +52,16 @@ def run(
     show(case, found)
     extension = extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, extension)
-    last, comparison = extension.cases[-1], extension.comparison
+    last = extension.cases[-1]
+    draw_ladder_of(extension.comparison, last, runs)
     if last.source == case.source and _acts_all_over(found) and case.engine is None:
-        last, comparison = _with_a_law(case, comparison, runs, jobs, watch, show, force)
+        last = _with_a_law(case, extension.comparison, runs, jobs, watch, show, force)
     if last.source != case.source:
         show(last, diagnose(last, runs=runs, jobs=jobs, watch=watch))
     both = {one.source: one for one in (case, last)}.values()
     for each in both:
         show(each, next_measurement(each, runs=runs, jobs=jobs, watch=watch))
-    picture = draw_ladder_of(comparison, last, runs)
-    show(last, f"Ladder drawn in {picture}; last config: {last.source}")
+    show(last, f"Ladder drawn in {folder_of(runs, last) / 'ladder.png'}; last config: {last.source}")
     from vegglue.workflow.report import report
 
     # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
@@ -74,20 +75,26 @@ def _acts_all_over(found: Diagnosis) -> bool:
     return found.verdict.kind == "none-of-these" and not found.places
 
 
+@one_thread()
 def _with_a_law(
     case: Case, alone: Comparison, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
-) -> tuple[Case, Comparison]:
-    """The case with a law that is in no list, and both side by side, where one is found and errors at held-out sections
-    are less with it; else the case `alone`.
+) -> Case:
+    """The case with a law that is in no list, where one is found and errors at held-out sections are less with it than
+    those of the case `alone`; else the case. Only then their ladder is kept.
     """
     law = discover(case, jobs=jobs, watch=watch, force=force)
     show(case, law)
     if law.child is None:
-        return case, alone
-    both = compare([case, law.child], runs=runs, jobs=jobs, watch=watch)
+        return case
+    with at_most(jobs):
+        with_law = rung_of(law.child, runs, alone.left_out, watch)
+    both, cases = Comparison((alone.rungs[0], with_law), alone.left_out), [case, law.child]
+    draw_ladder_of(both, law.child, runs)
     show(law.child, both)
-    before, after = (held_out_rmse(one) for one in both.rungs)
-    return (law.child, both) if after < before else (case, alone)
+    if held_out_rmse(with_law) >= held_out_rmse(alone.rungs[0]):
+        return case
+    keep_ladder(both, cases, [case_hash(one) for one in cases], runs)
+    return law.child
 
 
 def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool) -> bool:
