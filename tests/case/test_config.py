@@ -1,61 +1,20 @@
 """A case file is understood, or refused with one sentence that says where, what was expected, what came, what to do."""
 
-import os
 from pathlib import Path
 
 import pytest
-import yaml
+from small_case import SMALL, changed, write
 
 from vegglue.case.config import load_case, read_tree
-from vegglue.case.messages import nearest
-from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.errors import InputError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PAPER = ("d0", "d3a", "d3b", "d3b_paper")
 
-SMALL = """
-name: small
-grid: {x: [0, 40], y: [-4, 4], cell: [1.0, 0.5]}
-bed:
-  - trapezoid: {axis: 0.0, bottom_width: 3.0, bank_slope: 0.6667, bed_slope: 0.001, level: 0.0}
-friction:
-  classes:
-    bed: {law: manning, n: n_b}
-    bank: {law: keulegan, k_s: 1.0}
-  default: bed
-  zones:
-    - {class: bank, steeper_than: 0.2}
-plants:
-  stands:
-    reed: {phi: phi, canopy_height: 0.8, stems: 22}
-  patches:
-    - {name: p1, stand: reed, x: [10, 14], y: [0, 1.5], stems: 22}
-inflows:
-  upstream: {side: west}
-experiments:
-  low: {discharge: 2.66, level: 0.9}
-parameters:
-  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}
-  phi: {distribution: loguniform, low: 0.01, high: 100, unit: "-"}
-"""
-
 
 @pytest.fixture(autouse=True)
 def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def write(text: str, name: str = "small.yaml") -> Path:
-    path = Path(name)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def changed(old: str, new: str) -> Path:
-    assert old in SMALL
-    return write(SMALL.replace(old, new, 1))
 
 
 def sentence(path: Path) -> str:
@@ -249,12 +208,6 @@ def test_numbers_of_yaml_1_2_are_numbers():
     assert (case.numerics.tolerance, case.numerics.film_depth) == (1e-7, 2e-3)
 
 
-def test_few_of_many_known_words_are_listed():
-    said = nearest("x", [f"word{number}" for number in range(100)])
-    assert said.startswith("known here are word0, word1,")
-    assert said.endswith("word29 and 70 more")
-
-
 def test_a_misspelt_key_is_named_before_what_it_leaves_missing():
     assert "`nmae` is not a known key: did you mean `name`?" in sentence(changed("name: small", "nmae: small"))
 
@@ -326,60 +279,6 @@ def test_files_are_found_beside_the_file_that_names_them():
     write(base, "base/small.yaml")
     case = load_case(write("extends: ../../base/small.yaml\n", "far/away/child.yaml"))
     assert case.survey.file == Path("data/bed.csv").resolve()
-
-
-def test_the_resolved_case_reads_as_the_same_case():
-    case = load_case(CONFIGS / "d3b_paper.yaml")
-    folder = Path(os.path.relpath(CONFIGS))
-    resolved = resolved_yaml(case)
-    assert "extends" not in resolved
-    assert str(Path.home()) not in resolved
-    tree = yaml.safe_load(resolved)
-    for part in (*tree["observations"], tree["survey"]):
-        part["file"] = str(folder / part["file"])
-    again = load_case(write(yaml.safe_dump(tree, sort_keys=False), "resolved.yaml"))
-    assert case_hash(again) == case_hash(case)
-
-
-def test_the_hash_follows_contents_and_not_places():
-    text = SMALL.replace("name: small", "name: small\nobservations: [{kind: level, file: levels.csv}]")
-    for folder in ("one", "two"):
-        write("experiment,x,y,level\nlow,1,0,0.9\n", f"{folder}/levels.csv")
-    one, two = (load_case(write(text, f"{folder}/small.yaml")) for folder in ("one", "two"))
-    assert case_hash(one) == case_hash(two)
-    before = case_hash(one)
-    write("experiment,x,y,level\nlow,1,0,0.8\n", "one/levels.csv")
-    assert case_hash(one) != before
-
-
-def test_results_of_other_equations_do_not_fit(monkeypatch):
-    case = load_case(write(SMALL))
-    before = case_hash(case), simulation_hash(case)
-    monkeypatch.setattr("vegglue.case.resolved_config.EQUATIONS", 1)
-    assert case_hash(case) != before[0]
-    assert simulation_hash(case) != before[1]
-
-
-def test_an_ensemble_outlives_another_likelihood_but_not_another_prior():
-    case = load_case(write(SMALL))
-    other = load_case(changed("name: small", "name: small\ninfer: {likelihood: nse, behavioural: 0.5}"))
-    assert simulation_hash(other) == simulation_hash(case)
-    assert case_hash(other) != case_hash(case)
-    assert simulation_hash(load_case(changed("high: 0.15", "high: 0.16"))) != simulation_hash(case)
-    # The order of the parameters decides which member gets which value.
-    first = "  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}\n"
-    swapped = write(SMALL.replace(first, "") + first)
-    assert simulation_hash(load_case(swapped)) != simulation_hash(case)
-
-
-def test_an_ensemble_outlives_what_is_said_of_the_record():
-    write("experiment,x,y,level\nlow,1,0,0.9\n", "levels.csv")
-    text = SMALL + "observations:\n  - {kind: level, file: levels.csv}\n"
-    case = load_case(write(text))
-    computed = load_case(write(text.replace("levels.csv}", "levels.csv, synthetic: true}")))
-    assert [one.synthetic for one in (*case.observations, *computed.observations)] == [False, True]
-    assert simulation_hash(computed) == simulation_hash(case)
-    assert case_hash(computed) != case_hash(case)
 
 
 def test_a_case_cannot_be_changed():
