@@ -4,6 +4,7 @@ file, and however many numbers a small file unpacks to, the user reads one sente
 
 import logging
 import struct
+import traceback
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -32,7 +33,8 @@ def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save
             log.disabled = True
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            yield
+            with _frames_cleared():
+                yield
     except (InputError, MemoryError):
         raise
     except Exception as error:  # on damaged files libraries raise anything
@@ -42,6 +44,16 @@ def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save
     finally:
         if log is not None and before is not None:
             log.disabled = before
+
+
+@contextmanager
+def _frames_cleared() -> Iterator[None]:
+    """What a library that fails leaves open is closed at once, while nobody hears its warnings."""
+    try:
+        yield
+    except Exception as error:
+        traceback.clear_frames(error.__traceback__)
+        raise
 
 
 def refuse_larger_matlab(path: Path) -> None:
