@@ -20,7 +20,7 @@ def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
     case = load_case(tmp_path / "mill.yaml")
     assert "vegglue run mill.yaml" in said
     assert case.name == "mill-brook"
-    assert set(case.parameters) == {"n_b", "k_s", "phi", "canopy_height"}
+    assert set(case.parameters) == {"n_b", "k_s", "phi", "canopy_height", "eddy_viscosity"}
     assert [patch.stems for patch in case.plants.patches] == [20.0, 1.0]
     assert case.plants.stands["plants"].stems == 20.0
     assert case.grid.cell[1] == pytest.approx(3.0 / 16)
@@ -29,7 +29,7 @@ def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
     assert list(case.validation.experiments) == ["high"]
     table = read_observations(case).table
     assert table["kind"].tolist() == ["velocity", "level"]
-    assert linearise(model_of(case, read_observations(case)), np.zeros(4)) is not None, "water flows in it"
+    assert linearise(model_of(case, read_observations(case)), np.zeros(5)) is not None, "water flows in it"
 
 
 @pytest.mark.parametrize(
