@@ -44,6 +44,33 @@ def test_a_point_leads_to_one_on_narrower_cells() -> None:
     assert warm.prediction == pytest.approx(cold.prediction, abs=1e-6)
 
 
+def test_a_flow_borrows_the_factors_of_one_nearby_and_makes_its_own_further_away() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    first = linearise(model, np.zeros(4))
+    assert first is not None
+    for far, borrowed in ((0.003, True), (0.2, False)):
+        z = np.full(4, far)
+        near, alone = linearise(model, z, first), linearise(model, z)
+        assert near is not None
+        assert alone is not None
+        assert near.prediction == pytest.approx(alone.prediction, abs=1e-6)
+        assert near.slope == pytest.approx(alone.slope, abs=1e-5)
+        assert all((near.flows[name].factors is flow.factors) == borrowed for name, flow in first.flows.items())
+
+
+def test_factors_are_renewed_after_many_small_moves() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    model = model_of(case, read_observations(case))
+    point = first = linearise(model, np.zeros(4))
+    for k in range(1, 40):
+        assert point is not None
+        point = linearise(model, np.full(4, 0.01 * k), point)
+    assert first is not None
+    assert point is not None
+    assert all(point.flows[name].factors is not flow.factors for name, flow in first.flows.items())
+
+
 def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     model = model_of(case, read_observations(case))
