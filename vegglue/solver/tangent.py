@@ -60,10 +60,10 @@ def _answer(problem: Problem, state: Array, shared: Factors, causes: Array, tole
 def jacobian_times(problem: Problem, state: Array, direction: Array) -> Array:
     """J direction, (nx, 3, ny, p), by central differences of the residual."""
     scale = np.maximum(_largest(direction), 1e-300)
-    many = take(problem, np.zeros(direction.shape[3], dtype=np.int64))
-    ahead = residual(many, state + DIRECTION_STEP * direction / scale)
-    behind = residual(many, state - DIRECTION_STEP * direction / scale)
-    return (ahead - behind) * (scale / (2.0 * DIRECTION_STEP))
+    lanes = direction.shape[3]
+    step = DIRECTION_STEP * direction / scale
+    both = residual(take(problem, np.zeros(2 * lanes, dtype=np.int64)), np.concatenate([state + step, state - step], 3))
+    return (both[..., :lanes] - both[..., lanes:]) * (scale / (2.0 * DIRECTION_STEP))
 
 
 def adjoints(shared: Factors, weights: Array) -> Array:
@@ -79,4 +79,5 @@ def _product(one: Array, other: Array) -> Array:
 
 
 def _largest(values: Array) -> Array:
-    return np.abs(values).max(axis=(0, 1, 2))
+    """Largest |value| of each lane (p,), lane by lane: over all at once it takes six times as long."""
+    return np.array([np.abs(values[..., lane]).max() for lane in range(values.shape[3])])
