@@ -58,7 +58,7 @@ def test_what_is_left_out_is_said(model: Model) -> None:
     assert exclusion_in_words(excluded_by()) == ""
 
 
-def quickly(model: Model, known: object) -> Baseline:
+def quickly(model: Model) -> Baseline:
     """A baseline without any flow: predictions are what was measured, a little off."""
     noise, size = noise_of(model.station), len(model.names)
     slope = 0.01 * np.random.default_rng(1).standard_normal((len(model.station), size))
@@ -73,7 +73,7 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
     case = load_case(CONFIG)
     added = [(candidate_named(case, model.station, "discharge_error[high]"), {})]
     child, runs = write_child(case, tmp_path / "child.yaml", added), tmp_path / "runs"
-    monkeypatch.setattr("vegglue.workflow.run_folder.baseline", quickly)
+    monkeypatch.setattr("vegglue.workflow.run_folder.kept_baseline", quickly)
     stations = int(model.station["used"].sum())
     for flagged, said in (((), 0), ((3, 20), 2)):
         found = flagging(model, *flagged)

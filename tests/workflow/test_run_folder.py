@@ -50,14 +50,15 @@ def case(monkeypatch: pytest.MonkeyPatch) -> Case:
 def from_prior_at(first: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """The search of the prior begins at that first z."""
 
-    def searched(model: Model, known: Array | None) -> Baseline:
+    def searched(model: Model, known: Array | None = None) -> Baseline:
         STARTS.append(known)
         z = np.zeros(len(model.names))
         z[0] = first
         noise = noise_of(model.station)
         return Baseline(model, noise, fit(model, noise, two_wells(model, z if known is None else known)), None, None)
 
-    monkeypatch.setattr("vegglue.workflow.run_folder.baseline", searched)
+    for name in ("baseline", "kept_baseline"):
+        monkeypatch.setattr(f"vegglue.workflow.run_folder.{name}", searched)
 
 
 def place(case: Case, folder: Path, known: float | None) -> float:

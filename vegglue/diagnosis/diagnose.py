@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegglue.calibration.baseline import Baseline, baseline, log_evidence
+from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
+from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_offset
 from vegglue.diagnosis.competition import (
     LEAST_ODDS,
@@ -69,7 +70,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
     watch(Progress("calibrating the model as it is"))
-    base = baseline(model)
+    base = kept_baseline(model)
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)
     found, suspects = Findings(absurd=tuple(absurd_values(model.case, model.site, model.station))), dict[str, Suspect]()

@@ -14,6 +14,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction, log_evidence
 from vegglue.calibration.fit import fit
+from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -106,7 +107,7 @@ def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> B
     they end at different places, the one with more evidence, as the model's own error is another at each.
     """
     model = excluding(model, aside)
-    base = for_prediction(baseline(model, None))
+    base = for_prediction(kept_baseline(model))
     if known is None or _leads_to(base, known):
         return base
     return max(base, for_prediction(baseline(model, known)), key=log_evidence)

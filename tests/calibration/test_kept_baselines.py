@@ -1,0 +1,83 @@
+"""A baseline is computed once for the same grid, measurements and priors, and anew for any others."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from vegglue.calibration import kept_baselines
+from vegglue.calibration.kept_baselines import MOST_KEPT, kept_baseline
+from vegglue.case.config import load_case
+from vegglue.engine.interface import Model
+from vegglue.engine.model import model_of
+from vegglue.measurements.observations import read_observations
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    return model_of(case, read_observations(case))
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Model]]:
+    """The models that a baseline was computed of."""
+    models: list[Model] = []
+
+    def computed(model: Model) -> Any:
+        from vegglue.calibration.baseline import Baseline
+
+        models.append(model)
+        return Baseline(model, SimpleNamespace(), SimpleNamespace(), None, None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(kept_baselines, "baseline", computed)
+    monkeypatch.setattr(kept_baselines, "_kept", type(kept_baselines._kept)())
+    yield models
+
+
+def named(model: Model, **changes: Any) -> Model:
+    return replace(model, case=model.case.model_copy(update=changes))
+
+
+def test_the_same_model_is_computed_once_whatever_it_is_called(model: Model, made: list[Model]) -> None:
+    other = named(model, name="other", title="of another name")
+    first, second = kept_baseline(model), kept_baseline(other)
+    assert len(made) == 1
+    assert second.fitted is first.fitted
+    assert second.model.case.name == "other"
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda model: replace(model, station=model.station.assign(value=model.station["value"] + 1e-9)),
+        lambda model: replace(model, station=model.station.assign(used=False)),
+        lambda model: replace(model, site=replace(model.site, bed=model.site.bed + 1e-9)),
+        lambda model: named(model, eddy_viscosity=0.02),
+        lambda model: named(model, model_error=model.case.model_error.model_copy(update={"friction": 0.5})),
+        lambda model: named(model, parameters=dict(list(model.case.parameters.items())[:-1])),
+    ],
+)
+def test_another_model_is_computed_by_itself(changed: Any, model: Model, made: list[Model]) -> None:
+    kept_baseline(model)
+    kept_baseline(changed(model))
+    assert len(made) == 2
+
+
+def test_codes_of_others_are_asked_each_time(model: Model, made: list[Model]) -> None:
+    of_others = replace(model, engine=replace(model.engine, name="command"))
+    for one in (of_others, of_others, named(model, effect_file=Path("own.py")), named(model, effect_file=Path("own.py"))):
+        kept_baseline(one)
+    assert len(made) == 4
+
+
+def test_no_more_are_kept_than_a_case_and_its_child(model: Model, made: list[Model]) -> None:
+    models = [named(model, eddy_viscosity=0.01 * (1 + k)) for k in range(MOST_KEPT + 1)]
+    for one in [*models, models[0]]:
+        kept_baseline(one)
+    assert len(made) == MOST_KEPT + 2
