@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.overview import write_overview
 from vegglue.report_page.run import Run
+from vegglue.storage.kept_words import ladder_that_fits
 from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.report import results_of
 from vegglue.workflow.run_folder import folder_of, of_size
@@ -15,15 +18,26 @@ from vegglue.workflow.run_folder import folder_of, of_size
 def overview(cases: Sequence[Case], *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
     """Write runs/overview.html about runs that have a posterior, in the order given; returns the page.
 
+    In place of a case that `run` took round the loop stands its last child, which has the posterior.
+
     Errors: InputError where an ensemble or a posterior of a case is missing or out of date; StorageError when a file
     cannot be written.
     """
     known = []
     for case in cases:
         watch(Progress(f"reading {case.name}"))
-        known.append(_results_of(case, runs))
+        known.append(_results_of(_with_posterior(case, runs), runs))
     watch(Progress("drawing the overview"))
     return write_overview(Path(runs) / "overview.html", known)
+
+
+def _with_posterior(case: Case, runs: Path | str) -> Case:
+    """The case, or the last child of its ladder where only that has a posterior."""
+    ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
+    if ladder is None or (folder_of(runs, case) / "posterior.h5").exists():
+        return case
+    child = case.source.with_name(ladder.steps[-1].config)
+    return load_case(child, trust=case.effect_file is not None) if child.exists() else case
 
 
 def _results_of(case: Case, runs: Path | str) -> Run:

@@ -39,10 +39,10 @@ def run(
     force: bool = False,
 ) -> StepwiseExtension:
     """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then ensemble,
-    posterior and report of the case and of its last child. What is up to date is not made again. Where none of the
-    known effects explains the misfit, and it is not at a place, a law is searched that does, and kept where errors
-    fall with it. members: size of the ensembles instead of the case's; force: replace a child that was edited by hand
-    and a larger ensemble, too.
+    posterior and report of the last child, or of the case if there is none. What is up to date is not made again. Where
+    none of the known effects explains the misfit, and it is not at a place, a law is searched that does, and kept where
+    errors fall with it. members: size of the ensemble instead of the case's; force: replace a child that was edited by
+    hand and a larger ensemble, too.
 
     show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, DiscoveredCase and Comparison,
     list of Question, Ensemble, Posterior, the Path of a page, or a sentence.
@@ -62,11 +62,12 @@ def run(
     for each in both:
         show(each, next_measurement(each, runs=runs, jobs=jobs, watch=watch))
     show(last, f"Ladder drawn in {folder_of(runs, last) / 'ladder.png'}; last config: {last.source}")
-    from vegglue.workflow.report import report
+    # A posterior of the case without what it lacks would be of a model that is known to be wrong. What the diagnosis
+    # said is of the case, whatever its size.
+    if _has_posterior(of_size(last, members), runs, jobs, watch, show, force):
+        from vegglue.workflow.report import report
 
-    # Each page names the other: both posteriors come first. What the diagnosis said is of the case, whatever its size.
-    for each in [one for one in both if _has_posterior(of_size(one, members), runs, jobs, watch, show, force)]:
-        show(each, report(each, runs=runs, members=members, watch=watch))
+        show(last, report(last, runs=runs, members=members, watch=watch))
     return extension
 
 
