@@ -1,6 +1,5 @@
 """A baseline is computed once for the same grid, measurements and priors, and anew for any others."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,6 +8,7 @@ from typing import Any
 import pytest
 
 from vegglue.calibration import kept_baselines
+from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.kept_baselines import MOST_KEPT, kept_baseline
 from vegglue.case.config import load_case
 from vegglue.engine.interface import Model
@@ -25,19 +25,17 @@ def model() -> Model:
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Model]]:
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Model]:
     """The models that a baseline was computed of."""
     models: list[Model] = []
 
     def computed(model: Model) -> Any:
-        from vegglue.calibration.baseline import Baseline
-
         models.append(model)
         return Baseline(model, SimpleNamespace(), SimpleNamespace(), None, None)  # type: ignore[arg-type]
 
     monkeypatch.setattr(kept_baselines, "baseline", computed)
     monkeypatch.setattr(kept_baselines, "_kept", type(kept_baselines._kept)())
-    yield models
+    return models
 
 
 def named(model: Model, **changes: Any) -> Model:
@@ -71,7 +69,8 @@ def test_another_model_is_computed_by_itself(changed: Any, model: Model, made: l
 
 def test_codes_of_others_are_asked_each_time(model: Model, made: list[Model]) -> None:
     of_others = replace(model, engine=replace(model.engine, name="command"))
-    for one in (of_others, of_others, named(model, effect_file=Path("own.py")), named(model, effect_file=Path("own.py"))):
+    with_file = named(model, effect_file=Path("own.py"))
+    for one in (of_others, of_others, with_file, with_file):
         kept_baseline(one)
     assert len(made) == 4
 
