@@ -17,6 +17,7 @@ from vegglue.calibration.noise import (
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
+from vegglue.parallel import in_threads
 from vegglue.site.channel_geometry import cells_across
 
 # Points of the prior that are computed on the coarse grid, and how many of them the fit starts from. Chosen, not
@@ -149,7 +150,8 @@ def for_prediction(base: Baseline) -> Baseline:
 
 def _best_from_prior(model: Model, noise: Noise) -> Point:
     """The point of the best fit among those that start from the best points of the prior."""
-    return min((fit(model, noise, start) for start in _starts(model, noise)), key=lambda found: found.objective).point
+    ends = in_threads(fit, [(model, noise, start) for start in _starts(model, noise)])
+    return min(ends, key=lambda found: found.objective).point
 
 
 def _from_coarse(model: Model, noise: Noise, near: Point) -> MapEstimate:
@@ -176,7 +178,8 @@ def places_of_prior(parameters: int) -> Array:
 
 def _starts(model: Model, noise: Noise) -> list[Point]:
     """The FITTED_POINTS with the least objective, of the places of the prior."""
-    found = [point for z in places_of_prior(len(model.names)) if (point := linearise(model, z)) is not None]
+    tried = in_threads(linearise, [(model, z) for z in places_of_prior(len(model.names))])
+    found = [point for point in tried if point is not None]
     if not found:
         raise InputError(f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior.")
     return sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vegglue.arrays import Array, Single
+from vegglue.parallel import in_threads
 from vegglue.screening import score_test
 
 # Draws of errors alone that are worked on together: what lies between them then fits the memory.
@@ -83,12 +84,15 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
     rows = kinds[0].projected.residual.size
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     drawn = np.hstack([errors, of_prior]).astype(np.float32)
-    count = 0
-    for first in range(0, len(drawn), NULL_DRAWS_TOGETHER):
-        part = drawn[first : first + NULL_DRAWS_TOGETHER]
-        sums = [logsumexp(_of_scores(kind, _drawn_scores(kind, part)), axis=1) for kind in kinds]
-        count += int(np.sum(logsumexp(sums, axis=0) >= found))
+    parts = [(kinds, drawn[k : k + NULL_DRAWS_TOGETHER]) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
+    count = sum(int(np.sum(sums >= found)) for sums in in_threads(_sums_of_draws, parts))
     return (1 + count) / (1 + len(errors))
+
+
+def _sums_of_draws(kinds: Sequence[HypothesisKind], drawn: Single) -> Array:
+    """ln of the sum over all kinds of each draw (draws, n) of errors alone, (draws,)."""
+    sums = [logsumexp(_of_scores(kind, _drawn_scores(kind, drawn)), axis=1) for kind in kinds]
+    return np.asarray(logsumexp(sums, axis=0))
 
 
 def _of_scores(kind: HypothesisKind, scores: Array) -> Array:
