@@ -43,8 +43,8 @@ from vegglue.version import VERSION
 # fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 # Members [-] up to which each is solved on coarser cells first. Of 64 on 9,600 cells that takes two thirds of the time
-# of one core, of 256 as long as neighbours alone (DECISIONS). Chunks then hold SPARSE_CHUNK at most: of 16 they share
-# less, 64 leave a core idle.
+# of one core, of 256 as long as neighbours alone (DECISIONS). Chunks then hold SPARSE_CHUNK at most, and half of the
+# members: smaller ones share less, larger ones leave a core idle.
 SPARSE_MEMBERS, SPARSE_CHUNK = 128, 32
 # Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
 READ_TOGETHER = 16
@@ -101,7 +101,7 @@ def refuse_too_many(case: Case, observations: Observations) -> None:
 def chunk_size(members: int) -> int:
     """Members solved by one task at most; it depends on nothing but the size of the ensemble."""
     if members <= SPARSE_MEMBERS:
-        return min(members, SPARSE_CHUNK)
+        return min(-(-members // 2), SPARSE_CHUNK)
     return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
 
 

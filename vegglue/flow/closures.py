@@ -129,7 +129,7 @@ def _plants_after_effects(
         patch=geometry.patch[column, row],
     )
     now = applied(problem.effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
-    return np.ascontiguousarray(now["phi"]), np.ascontiguousarray(now["canopy_height"])
+    return np.array(now["phi"]), np.array(now["canopy_height"])
 
 
 def _after_effects(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction) -> Closures:

@@ -114,7 +114,8 @@ def _boundaries(case: Case, site: Site, values: BoundaryValues, entering: Array)
     return Boundaries(
         inflows=tuple(_inflow(inflow, site, discharge, spread) for inflow, discharge, spread in inflows),
         outlet=centres_within(case.outlet.range, site.grid.y),
-        outlet_level=values.level,
+        # What effects hand on may not be written to: loops would be compiled once more for such arrays.
+        outlet_level=np.array(values.level),
         lateral_inflow=entering,
     )
 
@@ -146,7 +147,7 @@ def _entering(lateral: Array, added: Mapping[str, Array], geometry: ChannelGeome
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
     """Vegetated cells of the patches present; phi is proportional to stems."""
-    column, row = np.nonzero(np.isin(site.patch, patches_present(case, experiment)))
+    column, row = np.ascontiguousarray(np.nonzero(np.isin(site.patch, patches_present(case, experiment))))
     index = site.patch[column, row]
     fields, law = np.empty((3, column.size, members)), np.empty(column.size, dtype=np.int64)
     for patch in np.unique(index):
