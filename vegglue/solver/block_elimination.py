@@ -45,6 +45,22 @@ def collect(blocks, far, base, rates, colours, step):
 
 
 @compiled_exactly
+def put(into, values):
+    """into = values, entry by entry: to assign arrays takes seconds to compile, for the words of its error."""
+    for r in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            into[r, c] = values[r, c]
+
+
+@compiled_exactly
+def take_away(of, values):
+    """of -= values, entry by entry, as `put`."""
+    for r in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            of[r, c] -= values[r, c]
+
+
+@compiled_exactly
 def factor(blocks, far):
     """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i), so that solving is three products a
     column.
@@ -58,10 +74,10 @@ def factor(blocks, far):
                     for c in range(n):
                         blocks[i, 0, r, c] -= weight * blocks[i - 2, 2, r, c]
         if i > 0:
-            blocks[i, 1] -= np.dot(blocks[i, 0], blocks[i - 1, 2])
-        blocks[i, 1] = np.linalg.inv(blocks[i, 1])
+            take_away(blocks[i, 1], np.dot(blocks[i, 0], blocks[i - 1, 2]))
+        put(blocks[i, 1], np.linalg.inv(blocks[i, 1]))
         if i < nx - 1:
-            blocks[i, 2] = np.dot(blocks[i, 1], blocks[i, 2])
+            put(blocks[i, 2], np.dot(blocks[i, 1], blocks[i, 2]))
 
 
 @compiled_exactly
@@ -75,10 +91,10 @@ def solve(blocks, far, right):
                 for k in range(m):
                     part[r, k] -= far[i, r] * right[i - 2, r, k]
         if i > 0:
-            part -= np.dot(blocks[i, 0], right[i - 1])
-        right[i] = np.dot(blocks[i, 1], part)
+            take_away(part, np.dot(blocks[i, 0], right[i - 1]))
+        put(part, np.dot(blocks[i, 1], part))
     for i in range(nx - 2, -1, -1):
-        right[i] -= np.dot(blocks[i, 2], right[i + 1])
+        take_away(right[i], np.dot(blocks[i, 2], right[i + 1]))
 
 
 @compiled_exactly
@@ -150,13 +166,13 @@ def solve_transposed(blocks, far, right):
     """x with J' x = right, in place: the products of `solve`, transposed and in the opposite order."""
     nx, n, m = right.shape
     for i in range(1, nx):
-        right[i] -= np.dot(blocks[i - 1, 2].T, right[i - 1])
+        take_away(right[i], np.dot(blocks[i - 1, 2].T, right[i - 1]))
     for i in range(nx - 1, -1, -1):
         part = right[i]
         if i < nx - 1:
-            part -= np.dot(blocks[i + 1, 0].T, right[i + 1])
+            take_away(part, np.dot(blocks[i + 1, 0].T, right[i + 1]))
         if i < nx - 2:
             for r in range(n):
                 for k in range(m):
                     part[r, k] -= far[i + 2, r] * right[i + 2, r, k]
-        right[i] = np.dot(blocks[i, 1].T, part)
+        put(part, np.dot(blocks[i, 1].T, part))
