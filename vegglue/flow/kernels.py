@@ -269,15 +269,17 @@ def velocities(state, first, stop, cell, west, south, north):
     _, _, ny, m = state.shape
     u, v = np.empty((stop - first + 1, ny, m)), np.empty((stop - first, ny + 1, m))
     for i in range(first, stop):
-        u[i - first + 1] = state[i, 2]
-        v[i - first, 1:ny] = state[i, 1, 1:]
+        for j in range(ny):
+            for k in range(m):
+                u[i - first + 1, j, k] = state[i, 2, j, k]
+                if j > 0:
+                    v[i - first, j, k] = state[i, 1, j, k]
         for k in range(m):
             v[i - first, 0, k] = south[i, k] / cell[i - first, 0, k]
             v[i - first, ny, k] = -north[i, k] / cell[i - first, ny - 1, k]
-    if first > 0:
-        u[0] = state[first - 1, 2]
-    else:
-        u[0] = west / cell[0]
+    for j in range(ny):
+        for k in range(m):
+            u[0, j, k] = state[first - 1, 2, j, k] if first > 0 else west[j, k] / cell[0, j, k]
     return u, v
 
 

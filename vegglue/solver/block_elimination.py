@@ -157,7 +157,7 @@ def minimise(gram, right):
         if not (np.isfinite(matrix).all() and np.isfinite(right[:, k]).all()):
             weights[:, k] = 0.0
             continue
-        weights[:, k] = np.linalg.solve(matrix, np.ascontiguousarray(right[:, k]))
+        put(weights[:, k : k + 1], np.linalg.solve(matrix, np.ascontiguousarray(right[:, k : k + 1])))
     return weights
 
 
