@@ -176,9 +176,15 @@ def places_of_prior(parameters: int) -> Array:
     return np.asarray(0.7 * places)
 
 
+def _near_or_from_afar(model: Model, z: Array, near: Point | None) -> Point | None:
+    return linearise(model, z, near) or linearise(model, z)
+
+
 def _starts(model: Model, noise: Noise) -> list[Point]:
     """The FITTED_POINTS with the least objective, of the places of the prior."""
-    tried = in_threads(linearise, [(model, z) for z in places_of_prior(len(model.names))])
+    middle, *others = places_of_prior(len(model.names))
+    first = linearise(model, middle)
+    tried = [first, *in_threads(_near_or_from_afar, [(model, z, first) for z in others])]
     found = [point for point in tried if point is not None]
     if not found:
         raise InputError(f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior.")
