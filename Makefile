@@ -2,7 +2,7 @@
 PYTHON ?= python3
 JOBS ?= -1
 # Members of what the demo runs beside the paper's D3a, which has all 5,000: a first look.
-DEMO_MEMBERS ?= 64
+DEMO_MEMBERS ?= 32
 # What the demo's one page shows, the best thing first.
 DEMO_CONFIGS := runs/demo/willows.yaml $(addprefix configs/,d3a_refined.yaml d3a.yaml d0.yaml d3b.yaml)
 # How long the fuzzer runs, and how many kills the faults are tried with.

@@ -15,7 +15,7 @@ import vegglue
 
 WILLOWS = Path(__file__).parents[2] / "data" / "open_cases" / "open-b"
 # Members of the ensembles, the first of them those of the loop.
-SIZES = (64, 256)
+SIZES = (32, 64, 256)
 
 
 def seconds_of(words: str, work: Callable[[], Any]) -> Any:

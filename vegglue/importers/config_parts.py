@@ -19,9 +19,9 @@ MODEL_ERROR: Tree = {"model_error": {"friction": 0.05, "bed": 0.01}}
 VISCOSITY, VISCOSITY_FACTOR = "eddy_viscosity", 2.0
 # The same of a flume, whose floor was set with a level.
 MODEL_ERROR_OF_FLUME: Tree = {"model_error": {"friction": 0.05, "bed": 0.001}}
-# 64 members show what a case is like and where to begin; the posterior is drawn around the best of them. All errors
+# 32 members show what a case is like and where to begin; the posterior is drawn around the best of them. All errors
 # are those stated with the data.
-FIRST_LOOK: Tree = {"simulate": {"members": 64, "seed": 1}, "infer": {"sigma": "known"}, **MODEL_ERROR}
+FIRST_LOOK: Tree = {"simulate": {"members": 32, "seed": 1}, "infer": {"sigma": "known"}, **MODEL_ERROR}
 
 
 def normal_prior(mean: float, sd: float, unit: str, symbol: str, meaning: str, **cut: float) -> Tree:
