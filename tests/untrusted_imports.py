@@ -12,6 +12,7 @@ import openpyxl
 import shapefile
 import tifffile
 from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
+from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
 from scipy.io import savemat
 
 from vegglue.importers.confluence_mat import _loaded
@@ -34,6 +35,10 @@ GEOJSON = (
 )
 
 LINE = b'{"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[0, 0], [500, 0], [900, 30]]}}'
+SUMMARY = (
+    b'<?xml version="1.0"?><Channel QRevFilename="a"><ChannelSummary><Discharge><Total unitsCode="cms">2</Total>'
+    b"</Discharge><Uncertainty><Total>8</Total></Uncertainty></ChannelSummary></Channel>"
+)
 
 
 def _workbook() -> bytes:
@@ -65,6 +70,13 @@ def _matlab() -> bytes:
     content = BytesIO()
     savemat(content, {"X": np.ones((2, 2)), "Y": np.eye(2)}, do_compression=True)
     return content.getvalue()
+
+
+def _made(make: Callable[[Path], None]) -> bytes:
+    """What a function writes into a file."""
+    with TemporaryDirectory() as folder:
+        make(Path(folder) / "made")
+        return (Path(folder) / "made").read_bytes()
 
 
 def _gauging() -> bytes:
@@ -103,6 +115,10 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("patches.shp", SHAPES[".shp"], _beside),
     ("patches.dbf", SHAPES[".dbf"], _beside),
     ("patches.geojson", GEOJSON, lambda path: read_polygons(path, None)),
+    ("river.mat", _made(lambda path: riversurveyor_mat(path, "m")), _measured),
+    ("qrev.mat", _made(lambda path: qrev_mat(path, transects=1)), _measured),
+    ("profiler.mat", _made(lambda path: profiler_mat(path, np.full(2, 0.3))), _measured),
+    ("summary.xml", SUMMARY, _measured),
     ("maps.mat", _matlab(), lambda path: _loaded(path, "X", "Y")),
     ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("surveyor.dis", riversurveyor(PLACES, DEPTHS, VELOCITIES).encode(), _measured),

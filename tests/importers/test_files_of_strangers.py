@@ -15,8 +15,8 @@ from vegglue.errors import InputError
 from vegglue.importers.confluence_mat import _loaded
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import read_loosely
+from vegglue.importers.matlab_exports import read_matlab
 from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.riversurveyor_mat import read_riversurveyor
 from vegglue.importers.terrain_files import read_geotiff
 
 VALID = {name: content for name, content, _ in IMPORTS}
@@ -80,7 +80,7 @@ def test_a_matlab_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
         _loaded(tmp_path / "maps.mat", "X")
     savemat(tmp_path / "boat.mat", {"Summary": {"Track": np.zeros((4000, 4000))}}, do_compression=True)
     with pytest.raises(InputError, match=r"boat\.mat: expected at most 100,000,000 bytes, got 100,"):
-        read_riversurveyor(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
+        read_matlab(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
 
 
 @pytest.mark.parametrize(

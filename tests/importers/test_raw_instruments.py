@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from instrument_files import pd0, vector, winriver
 from reach import said_to
-from scipy.io import savemat
 
 import vegglue
 from vegglue.errors import InputError
@@ -17,7 +16,6 @@ from vegglue.importers.flowtracker2 import read_flowtracker2
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.nortek import read_vector
 from vegglue.importers.raw_transects import read_pd0
-from vegglue.importers.riversurveyor_mat import read_riversurveyor
 from vegglue.importers.winriver import read_winriver
 
 ALONG = np.linspace(0.0, 15.0, 151)  # 0.06 m/s east and 0.08 m/s north, whole millimetres as the format has them
@@ -83,57 +81,6 @@ def test_a_binary_record_of_a_vector_is_its_mean_without_spikes(tmp_path: Path) 
     assert taken.words["device"] == ["Vector"]
     with pytest.raises(InputError, match="expected where the probe stood"):
         read_vector(path, FileWords())
-
-
-def riversurveyor_mat(path: Path, unit: str, **setup: int) -> None:
-    """A boat of 40 samples, 36 of them within its transect, over 1.2 m of water; cells of 0.1 m from 0.2 m on."""
-    foot = 0.3048 if unit == "ft" else 1.0
-    samples, cells, depth, random = 40, 8, 1.2, np.random.default_rng(3)
-    below = 0.2 + 0.1 * (np.arange(cells) + 0.5)
-    shape = 7.0 / 6.0 * ((depth - below) / depth) ** (1.0 / 6.0)
-    velocity = np.zeros((10, 4, samples))  # the program fills up with zeros
-    for axis, mean in enumerate((0.64, -0.48)):
-        velocity[:cells, axis] = shape[:, None] * mean + 0.02 * random.standard_normal((cells, samples))
-    along = 0.1 * np.arange(samples)
-    units = {"length": {"Depth": unit, "Track": unit}, "cells": {"Cell_Start": unit, "Cell_Size": unit}}
-    every = np.ones(samples)
-    savemat(path, {
-        "Setup": {"coordinateSystem": 2, "trackReference": 1} | setup,
-        "Summary": {"Depth": depth / foot * every, "Cells": cells * every, "Units": units["length"],
-                    "Track": np.column_stack([0.6 * along, 0.8 * along]) / foot},
-        "System": {"Cell_Start": 0.2 / foot * every, "Cell_Size": 0.1 / foot * every, "Units": units["cells"],
-                   "Step": np.r_[2, 2, 3 * np.ones(36), 4, 4]},
-        "WaterTrack": {"Velocity": velocity / foot, "Units": {"Velocity": f"{unit}/s"}},
-    })  # fmt: skip
-
-
-@pytest.mark.parametrize("unit", ["m", "ft"])
-def test_a_transect_of_a_riversurveyor_becomes_stations(tmp_path: Path, unit: str) -> None:
-    path = tmp_path / "t.mat"
-    riversurveyor_mat(path, unit)
-    assert reader_of(path) is read_riversurveyor
-    taken = read_riversurveyor(path, FileWords(start=(100.0, 200.0)))
-    assert "RiverSurveyor MATLAB export, 36 ensembles" in taken.said[0]
-    assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
-    assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.03)
-    assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=1e-6)
-
-
-def test_another_mat_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
-    path = tmp_path / "t.mat"
-    riversurveyor_mat(path, "m", coordinateSystem=0)
-    with pytest.raises(InputError, match="expected velocities in ENU coordinates"):
-        read_riversurveyor(path, FileWords(start=(0.0, 0.0)))
-    savemat(path, {"meas_struct": {"a": 1.0}})
-    with pytest.raises(InputError, match="files that QRev saves are not read"):
-        read_riversurveyor(path, FileWords(start=(0.0, 0.0)))
-    savemat(path, {name: {"a": 1.0} for name in ("Setup", "Summary", "System", "WaterTrack")})
-    with pytest.raises(InputError, match="expected the structures of a MATLAB export of RiverSurveyor Live"):
-        read_riversurveyor(path, FileWords(start=(0.0, 0.0)))
-    for content in (b"MATLAB 5.0 MAT-file" + bytes(200), b"MATLAB 7.3 MAT-file, HDF5" + bytes(600)):
-        path.write_bytes(content)
-        with pytest.raises(InputError, match=r"t\.mat"):
-            reader_of(path)(path, FileWords(start=(0.0, 0.0)))
 
 
 def flowtracker2(path: Path, stations: object) -> None:

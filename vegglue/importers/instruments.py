@@ -7,10 +7,11 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
 from vegglue.importers.loose_table import readable_text
+from vegglue.importers.matlab_exports import MAT_73_BEGINS, MAT_BEGINS, read_matlab
 from vegglue.importers.measured_rows import Taken, read_rows
 from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
+from vegglue.importers.qrev_summary import is_qrev_summary, read_qrev_summary
 from vegglue.importers.raw_transects import PD0_BEGINS, read_pd0
-from vegglue.importers.riversurveyor_mat import MAT_73_BEGINS, MAT_BEGINS, read_riversurveyor
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
 from vegglue.importers.winriver import is_winriver, read_winriver
 
@@ -24,8 +25,8 @@ BY_BEGINNING: Mapping[bytes, InstrumentReader] = {
     PD0_BEGINS: read_pd0,
     VECTOR_BEGINS: read_vector,
     ZIP_BEGINS: read_flowtracker2,
-    MAT_BEGINS: read_riversurveyor,
-    MAT_73_BEGINS: read_riversurveyor,
+    MAT_BEGINS: read_matlab,
+    MAT_73_BEGINS: read_matlab,
 }
 LONGEST_MARK = max(map(len, BY_BEGINNING))
 
@@ -46,6 +47,8 @@ def reader_of(path: Path) -> InstrumentReader:
     text = readable_text(path)
     if is_winriver(text):
         return read_winriver
+    if is_qrev_summary(text):
+        return read_qrev_summary
     if is_tape_table(text):
         return read_tape_table
     return read_nortek if is_nortek(path, text) else read_rows

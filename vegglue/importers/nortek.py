@@ -48,7 +48,7 @@ def is_nortek(path: Path, text: str) -> bool:
 
 def read_nortek(path: Path, words: FileWords) -> Taken:
     """One row: the mean of an ASCII record at its `position`. Errors: InputError naming the file."""
-    _refuse_nowhere(path, words)
+    refuse_nowhere(path, words)
     layout, rows = _rows(path)
     velocity = rows[:, layout.velocity : layout.velocity + 3]
     return record_mean(path, words, layout.name, velocity, rows[:, layout.correlation], _rate(path))
@@ -59,7 +59,7 @@ def read_vector(path: Path, words: FileWords) -> Taken:
 
     Errors: InputError naming the file, for other axes, and without mhkit.
     """
-    _refuse_nowhere(path, words)
+    refuse_nowhere(path, words)
     most = path.stat().st_size // BYTES_OF_A_SAMPLE
     data = opened_raw(path, "ASCII data from Nortek's program, the .dat and the .hdr", most)
     axes = str(data.attrs.get("coord_sys"))
@@ -80,8 +80,7 @@ def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correl
     and spikes are left out, and counted. Errors: InputError where none is left.
     """
     u, v, w = velocity.T
-    sound = correlation.min(axis=1) >= LEAST_CORRELATION
-    trusted = sound & _no_spike(u) & _no_spike(v) & _no_spike(w)
+    trusted = trusted_samples(velocity, correlation)
     if not trusted.any():
         raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
     x, y, z = (np.array([one]) for one in words.position or ())
@@ -99,7 +98,17 @@ def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correl
                  dict.fromkeys("uvw", "m/s"), (said,))  # fmt: skip
 
 
-def _refuse_nowhere(path: Path, words: FileWords) -> None:
+def trusted_samples(velocity: Array, correlation: Array) -> Mask:
+    """Samples of sound correlation in all beams, and no spike in any direction (n,).
+
+    velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%].
+    """
+    sound = correlation.min(axis=1) >= LEAST_CORRELATION
+    return np.logical_and.reduce([sound, *(_no_spike(part) for part in velocity.T)])
+
+
+def refuse_nowhere(path: Path, words: FileWords) -> None:
+    """Errors: InputError where the site file does not say where a probe stood."""
     if words.position is None:
         raise InputError(
             f"{shown_path(path)}: expected where the probe stood, `position: [x, y, z]`, which no record says; add "

@@ -10,28 +10,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.importers.unit_words import si_factor
 
-# How a MATLAB file begins: version 5, which the program writes, and 7.3, which is HDF5.
-MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+RIVERSURVEYOR_VARIABLES = ("Setup", "Summary", "System", "WaterTrack")  # the variables by which such a file is known
 # Numbers of the manual: velocities as east, north and up; a boat that is told from the bottom or from satellites; the
 # step of a sample within the transect, between those at its edges.
 EAST_NORTH_UP, OVER_GROUND, IN_TRANSECT = 2, (1, 2, 3), 3
 
 
-def read_riversurveyor(path: Path, words: FileWords) -> Taken:
+def stations_of_riversurveyor(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
     """Stations of a transect. Errors: InputError naming the file."""
-    parts = _parts(path)
     try:
         return stations_of_transect(path, words, list(_profiles(path, parts)), "RiverSurveyor MATLAB export")
+    except InputError:
+        raise
     except (AttributeError, IndexError, ValueError, TypeError) as error:
         raise InputError(
             f"{shown_path(path)}: expected the structures of a MATLAB export of RiverSurveyor Live, got others "
@@ -39,22 +37,9 @@ def read_riversurveyor(path: Path, words: FileWords) -> Taken:
         ) from None
 
 
-def _parts(path: Path) -> dict[str, Any]:
-    with read_by_library(path, "a MATLAB file of version 5 from RiverSurveyor Live"):
-        refuse_larger_matlab(path)
-        found: dict[str, Any] = loadmat(path, struct_as_record=False, squeeze_me=True)
-    missing = [name for name in ("Setup", "Summary", "System", "WaterTrack") if name not in found]
-    if missing:
-        raise InputError(
-            f"{shown_path(path)}: expected a MATLAB export of RiverSurveyor Live, got one without "
-            f"{', '.join(missing)}; files that QRev saves are not read, export the transect from RiverSurveyor Live."
-        )
-    return found
-
-
 def _profiles(path: Path, parts: dict[str, Any]) -> Iterator[BoatProfile]:
     """One profile for each sample of the transect; cells counted as used for the discharge, others hold no velocity."""
-    setup, summary, system, water = (parts[name] for name in ("Setup", "Summary", "System", "WaterTrack"))
+    setup, summary, system, water = (parts[name] for name in RIVERSURVEYOR_VARIABLES)
     if int(setup.coordinateSystem) != EAST_NORTH_UP or int(setup.trackReference) not in OVER_GROUND:
         raise InputError(
             f"{shown_path(path)}: expected velocities in ENU coordinates with a track reference, got others; set both "

@@ -24,10 +24,10 @@ UNITS: dict[str, dict[str, float]] = {
 # Other spellings, after `_plain` has done its work.
 SPELLINGS = {
     "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "usft": "ft", "inch": "in",
-    "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "lps": "l/s",
+    "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "cms": "m3/s",
     "deg": "degrees", "degree": "degrees", "°": "degrees", "gon": "", "radians": "rad", "sec": "s", "seconds": "s",
     "minutes": "min", "hours": "h", "m/sec": "m/s", "cm/sec": "cm/s", "ft/sec": "ft/s", "ms": "m/s", "mps": "m/s",
-    "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s", "qm3/s": "m3/s",
+    "lps": "l/s", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s", "qm3/s": "m3/s",
 }  # fmt: skip
 
 
