@@ -11,6 +11,7 @@ import vegglue
 from vegglue.errors import InputError
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.measurements.observations import read_observations
+from vegglue.workflow.import_folder import assumptions_of
 
 # Where whoever develops it keeps the set, which is not part of the project.
 PUBLISHED = Path(__file__).parents[3] / "shared" / "real" / "confluence"
@@ -57,6 +58,7 @@ def test_the_set_becomes_a_case(tmp_path: Path) -> None:
     table = read_observations(case).table
     assert sorted(table.loc[table["kind"] == "velocity", "x"].unique()) == [-1.0, 1.0]
     assert (tmp_path / "made-flat.yaml").is_file()
+    assert "2 % and 0.01 m/s for velocities, 1 mm for levels" in assumptions_of(tmp_path / "set")[0]
 
 
 def test_a_broken_file_is_a_sentence(tmp_path: Path) -> None:

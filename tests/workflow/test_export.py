@@ -9,6 +9,7 @@ from reach import COARSE, said_to, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
+from vegglue.errors import InputError
 from vegglue.workflow.export import Exported, export
 
 FRAME = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"
@@ -74,6 +75,14 @@ def test_xarray_opens_the_mesh_with_the_same_numbers(done: Done) -> None:
     assert mesh["map"].attrs["epsg"] == 2056
     across, along = (np.diff(part, axis=1)[:, :2] for part in (mesh["node_y"].to_numpy()[mesh["face_nodes"]], corners))
     assert (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0] > 0.0).all(), "anticlockwise"
+
+
+def test_a_missing_library_is_named_before_anything_is_solved(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "xarray", None)
+    told: list[object] = []
+    with pytest.raises(InputError, match=r"the library xarray, .* 'vegglue\[field\]'`, or choose --only csv"):
+        export(done[0], runs=done[2].parent.parent, forms=("netcdf",), watch=told.append)
+    assert told == []
 
 
 def test_another_library_opens_the_mesh(done: Done) -> None:

@@ -46,6 +46,14 @@ BLOCKS, LEVEL_ERROR = 3, 0.001
 # Spread of the priors of what integration of the sections gives [-], and of the level at the outlet [m].
 UPSTREAM, SIDE, OUTLET = 0.05, 0.5, 0.002
 
+# What `import` says of the set.
+NOT_STATED = (
+    "The set states no discharges, no errors, no walls and no width of the side channel, and so is assumed: discharges "
+    f"by integration of sections, {100 * RULE:.0f} % and {BESIDES:g} m/s for velocities, {1000 * LEVEL_ERROR:.0f} mm "
+    f"for levels, n = {WALL:g} s m^(-1/3) for walls, {CONFLUENCE_WIDTH:g} m for the side channel.",
+    "Every second section is held out, to judge a model by. A second config, `-flat`, has a plane for the bed.",
+)
+
 
 def holds_confluence(folder: Path) -> bool:
     """Whether a folder is laid out as the confluence set."""

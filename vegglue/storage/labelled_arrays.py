@@ -40,11 +40,13 @@ def read_inference_data(path: Path) -> "arviz.InferenceData":
         return arviz.from_netcdf(path, engine=ENGINE)
 
 
-def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load") -> Any:
-    """A library that vegglue can do without. Errors: InputError, which names who asks and the extra that has it."""
+def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load", instead: str = "") -> Any:
+    """A library that vegglue can do without. Errors: InputError, which names who asks, the extra that has it, and what
+    else may be done.
+    """
     try:
         module: ModuleType = import_module(name)
     except ImportError:
-        remedy = f"run `pip install 'vegglue[{extra}]'`"
+        remedy = f"run `pip install 'vegglue[{extra}]'`" + (f", or {instead}" if instead else "")
         raise InputError(f"{asking}: expected the library {name}, which is not installed; {remedy}.") from None
     return module

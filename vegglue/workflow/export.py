@@ -20,6 +20,7 @@ from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.site.grid import build_grid
 from vegglue.storage.geotiff import write_geotiff
+from vegglue.storage.labelled_arrays import extra_library
 from vegglue.storage.mesh_file import quantities, write_mesh
 from vegglue.storage.point_tables import write_field_table, write_station_table
 from vegglue.storage.result_files import read_posterior, stored_hash
@@ -29,6 +30,8 @@ from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, known_place
 
 Form = Literal["csv", "geotiff", "netcdf"]
+# Libraries that each form needs, all of the extra `field`.
+NEEDED: dict[Form, tuple[str, ...]] = {"csv": (), "geotiff": ("tifffile",), "netcdf": ("xarray", "h5netcdf")}
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ def export(
     map, and velocities are turned to it.
     Errors: InputError when no flow is found, or a library is missing; StorageError.
     """
+    for library in (name for form in forms for name in NEEDED[form]):  # before minutes are spent on the flow
+        extra_library(library, "field", "vegglue export", "choose --only csv")
     folder = folder_of(runs, case)
     watch(Progress(f"solving the flow of {case.name}"))
     flows, predicted, words = _flow(case, folder)

@@ -11,7 +11,7 @@ from vegglue.case.config import load_case
 from vegglue.case.made_files import write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
-from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
+from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
@@ -38,9 +38,11 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
 
 
 def assumptions_of(folder: Path | str) -> list[str]:
-    """What `import` assumes of a folder because nobody said it, and what it does not read; nothing of a known set."""
+    """What `import` assumes of a folder because nobody said it, and what it does not read."""
     folder = Path(folder)
-    return left_open(folder) if site_file(folder).is_file() else []
+    if site_file(folder).is_file():
+        return left_open(folder)
+    return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 
 def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
