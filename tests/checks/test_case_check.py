@@ -87,7 +87,7 @@ def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
             "The canopy of reed, 1.3 m, reaches above the water of experiment low",
         ),
         ("canopy_height: 0.8", "canopy_height: h_d", "The canopy of reed, 0.717 to 1.38 m, may reach above the water"),
-        ("k_s: 0.5", "k_s: 5", r"At k_s = 5 m, 12 h/k_s falls below 1.3 and is held there where h < 0.54 m: in 50 %"),
+        ("k_s: 0.5", "k_s: 5", r"With k_s of class bank 5 m, water shallower than 0.54 m \(50 % of that class in exp"),
         ("outlet: {}", "outlet: {range: [4.01, 4.02]}", "The outlet holds no cell centre: no water can leave"),
         (
             "outlet: {}",
@@ -141,6 +141,12 @@ def test_an_odd_station_is_said(tmp_path, row, expected):
     assert [sentence for sentence in odd(tmp_path, rows=ROWS + row + "\n") if sentence.startswith(expected)]
 
 
+def test_many_stations_outside_are_one_sentence(tmp_path):
+    said = odd(tmp_path, rows=ROWS + "".join(f"low,A,-{x},0,0.3,0.01\n" for x in (1, 2)))
+    of_grid = [sentence for sentence in said if "outside the grid" in sentence]
+    assert of_grid == ["2 places of experiment low, the first at x = -1, y = 0 m, are outside the grid, and not used."]
+
+
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [
@@ -168,15 +174,20 @@ def test_too_few_observations_are_said(tmp_path):
 
 def test_the_papers_cases_are_sound_but_for_what_is_known():
     known = {
-        "d0": ["Note: 5000 members", "At k_s = 5 m"],
+        "d0": ["Note: 5000 members", "With k_s of class bank up to 5 m"],
         "d3a": [
             "Note: 5000 members",
             "The station at x = 402, y = 6.4 m",
-            "At k_s = 5 m",
+            "With k_s of class bank up to 5 m",
             "Stations of D3 at y = 4 and 5.5 m",
         ],
-        "d3b": ["Note: 5000 members", "At k_s = 5 m", "Stations of D3 at y = 4 m"],
-        "d3b_paper": ["Note: 5000 members", "The verticals of D3", "At k_s = 5 m", "Stations of D3 at y = 4 m"],
+        "d3b": ["Note: 5000 members", "With k_s of class bank up to 5 m", "Stations of D3 at y = 4 m"],
+        "d3b_paper": [
+            "Note: 5000 members",
+            "The verticals of D3",
+            "With k_s of class bank up to 5 m",
+            "Stations of D3 at y = 4 m",
+        ],
     }
     for name, beginnings in known.items():
         case = load_case(CONFIGS / f"{name}.yaml")

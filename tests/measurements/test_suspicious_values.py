@@ -92,6 +92,8 @@ def test_what_a_flow_may_show_is_passed_in_silence(tmp_path: Path, change: Chang
         (scaled(100), r"15 values of velocity \(all there are; .* in cm/s; .* and the discharge and outlet level"),
         (scaled(0.01, section="below"), r"5 values of velocity \(section below .*: at most 0.0\d+ times"),
         (replaced(15, 97.0), r"The level 97 m at x = 8, y = 0 m \(experiment June\): .* in cm; check the datum"),
+        (replaced(15, 9.5), r"The level 9.5 m at x = 8, .*: 8.6 m from .*, as if it were in dm, or mm taken for cm; c"),
+        (scaled(10), r"15 values of velocity .*, as if it were in dm/s, or mm/s taken for cm/s; check"),
         (replaced(15, 970.0), r"The level 970 m .* in mm; check the datum"),
         (scaled(1 / 0.3048, "level", x=20.0), r"The level 3.13\d* m at x = 20, y = 0 m .* in ft; check the datum"),
         (replaced(16, -9999.0), r"The level -9999 m at x = 14.5, y = 0 m .*marks a missing value"),

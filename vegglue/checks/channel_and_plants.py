@@ -15,6 +15,12 @@ from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.polygons import area_of, corners_of
 from vegglue.site.zones import cells_of_patch
 
+# By `numerics.emergent`: what is taken for plants that stand out of the water.
+DRAG_OF_EMERGENT = {
+    "constant": "phi is taken for the part in the water; `numerics.emergent: proportional` lets it fall with that part",
+    "proportional": "phi falls with the part in the water, as `numerics.emergent` says",
+}
+
 
 def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
     """Patches that the grid holds poorly: area of their cells against their own [m2], overlaps, unused stands."""
@@ -57,7 +63,7 @@ def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> I
                 reaches = "reaches" if height[0] >= deepest else "may reach"
                 yield (
                     f"{canopy} {reaches} above the water of experiment {name}, about {deepest:.2g} m deep: "
-                    f"`numerics.emergent` ({case.numerics.emergent}) then decides its drag."
+                    f"{DRAG_OF_EMERGENT[case.numerics.emergent]}."
                 )
             yield from _measured_canopy(observations, name, stand, height)
 
@@ -86,6 +92,7 @@ def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
         if friction_class.k_s is None:
             continue
         roughest = _largest(case, friction_class.k_s)
+        up_to = "up to " if isinstance(friction_class.k_s, str) else ""
         for experiment_name, experiment in case.experiments.items():
             now = in_experiment(site, experiment_name)
             depth = expected_depth(case, now, experiment)
@@ -93,9 +100,9 @@ def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
             share = float(np.mean(12.0 * wet / roughest < floor)) if wet.size else 0.0
             if share > 0:
                 yield (
-                    f"At k_s = {roughest:.3g} m, 12 h/k_s falls below {floor:g} and is held there where h < "
-                    f"{floor * roughest / 12:.2g} m: in {100 * share:.0f} % of the wet cells of class {name} "
-                    f"in experiment {experiment_name}."
+                    f"With k_s of class {name} {up_to}{roughest:.3g} m, water shallower than "
+                    f"{floor * roughest / 12:.2g} m ({100 * share:.0f} % of that class in experiment "
+                    f"{experiment_name}) gets the friction of that depth: 12 h/k_s is not let below {floor:g}."
                 )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import kind_of, velocity_rows
@@ -18,19 +19,23 @@ ON_THE_EDGE = 0.02
 
 
 def remarks_on_stations(case: Case, site: Site, observations: Observations) -> Iterator[str]:
-    """Stations outside the grid or above the expected water."""
-    for row in observations.table.to_dict("records"):
-        if row["reason"] == OUTSIDE:
-            yield f"The {station_in_words(row)} is outside the grid, and not used."
-            continue
-        if not kind_of(row["kind"]).at_point:
-            continue
-        i, j = np.abs(site.grid.x - row["x"]).argmin(), np.abs(site.grid.y - row["y"]).argmin()
-        depth = float(
-            expected_depth(case, in_experiment(site, row["experiment"]), case.experiments[row["experiment"]])[i, j]
-        )
-        if not row["depth"] > 0 and depth <= 0:
-            yield f"The {station_in_words(row)} is outside the wet channel, about {-depth:.2g} m above the water."
+    """Stations outside the grid or above the expected water; of each experiment in one sentence."""
+    table = observations.table
+    outside = (table["reason"] == OUTSIDE).to_numpy(bool)
+    for experiment, rows in table[outside].groupby("experiment", sort=False):
+        yield f"{_places_in_words(rows, str(experiment))} outside the grid, and not used."
+    inside = table[~outside & np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)]
+    for experiment, rows in inside.groupby("experiment", sort=False):
+        now = in_experiment(site, str(experiment))
+        depth = expected_depth(case, now, case.experiments[str(experiment)])
+        i, j = (np.abs(np.subtract.outer(rows[name].to_numpy(float), at)).argmin(axis=1)
+                for name, at in (("x", site.grid.x), ("y", site.grid.y)))  # fmt: skip
+        dry = rows.assign(above=-depth[i, j])[(depth[i, j] <= 0) & ~(rows["depth"].to_numpy(float) > 0)]
+        if len(dry):
+            yield (
+                f"{_places_in_words(dry, str(experiment))} outside the wet channel, about {dry['above'].iloc[0]:.2g} m "
+                "above the water."
+            )
 
 
 def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[str]:
@@ -56,6 +61,17 @@ def remarks_on_absurd_values(case: Case, site: Site, observations: Observations)
 def station_in_words(row: Mapping[Hashable, Any]) -> str:
     """A row of the table of stations as a phrase: place [m] and experiment."""
     return f"station at x = {row['x']:g}, y = {row['y']:g} m of experiment {row['experiment']}"
+
+
+def _places_in_words(rows: pd.DataFrame, experiment: str) -> str:
+    """`The station at x = 1, y = 2 m of experiment low is`, or how many are, with the first of them."""
+    places = rows.drop_duplicates(["x", "y"])
+    first = places.iloc[0]
+    if len(places) == 1:
+        return f"The {station_in_words(first.to_dict())} is"
+    return (
+        f"{len(places)} places of experiment {experiment}, the first at x = {first['x']:g}, y = {first['y']:g} m, are"
+    )
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -28,9 +28,15 @@ SPANNED = 2.0 / 3.0
 FEWEST_STATIONS = 3
 # Ratios to the SI value by which units are told: around 1 / 0.3048 and 1 / 0.278 for velocities, and a factor of three
 # around 100 and 1000, as a section may be that much slower than Q / A. Litres and cubic feet are told as well.
-VELOCITY_UNITS = {"ft/s or km/h": (2.6, 4.1), "cm/s": (30.0, 300.0), "mm/s": (300.0, 3000.0)}
+VELOCITY_UNITS = {
+    "ft/s or km/h": (2.6, 4.1), "dm/s, or mm/s taken for cm/s": (FURTHEST_MEAN, 30.0), "cm/s": (30.0, 300.0),
+    "mm/s": (300.0, 3000.0),
+}  # fmt: skip
 DISCHARGE_UNITS = {"ft3/s": (18.0, 70.0), "l/s": (300.0, 3000.0)}
-LEVEL_UNITS = {"ft": 0.3048, "cm": 0.01, "mm": 0.001}  # m
+TENFOLD = "dm, or mm taken for cm"
+LEVEL_UNITS = {"ft": 0.3048, TENFOLD: 0.1, "cm": 0.01, "mm": 0.001}  # m
+# Share of the depth [-] within which a tenth of a level must lie at the outlet's: another datum may do as much.
+NEAR_THE_OUTLET = 0.25
 # Depth over width of the grid [-] that no channel has: flumes reach 1.
 DEEPEST_CHANNEL = 2.0
 # Numbers that loggers write for a missing value, beside those of nines only; and what is larger than any measurement.
@@ -119,9 +125,14 @@ def _level_judged(flow: PlausibleFlow, column: int, level: float) -> Judged:
         return ("", 1.0)
     if is_mark(level):
         return ("mark", 1.0)
-    for unit, metres in LEVEL_UNITS.items():
-        if bounds[0] <= metres * level <= bounds[1]:
-            return (f"level {unit}", above)
+    off = {
+        unit: abs(metres * level - 0.5 * sum(flow.level))
+        for unit, metres in LEVEL_UNITS.items()
+        if bounds[0] <= metres * level <= bounds[1]
+    }
+    off = {unit: by for unit, by in off.items() if unit != TENFOLD or by < NEAR_THE_OUTLET * flow.depth}
+    if off:
+        return (f"level {min(off, key=lambda unit: off[unit])}", above)
     if level < flow.floor[column]:
         return ("bed", float(flow.floor[column]) - level)
     return ("high" if above > 0 else "low", abs(above))
