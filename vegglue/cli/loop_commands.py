@@ -68,6 +68,9 @@ def diagnose_command(
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
+    if not (quiet or as_object):
+        adds = found.steps or found.places
+        print(f"Next: vegglue extend {config} --auto" if adds else f"Next: vegglue next {config}")
 
 
 def discover_command(
