@@ -99,6 +99,12 @@ def test_no_colour_goes_into_a_pipe(tmp_path: Path) -> None:
         assert "\x1b" not in vegglue(tmp_path, *arguments).stdout, arguments
 
 
+def test_help_keeps_what_stands_in_brackets(tmp_path: Path) -> None:
+    """Help is marked up by brackets, too."""
+    assert "Length of the reach [m]." in vegglue(tmp_path, "new", "--help").stdout
+    assert "discharge_error[high]." in vegglue(tmp_path, "extend", "--help").stdout
+
+
 def test_help_lists_commands_as_they_are_used(tmp_path: Path) -> None:
     said = vegglue(tmp_path, "--help").stdout
     names = re.findall(r"^│ ([a-z]+) ", said, re.MULTILINE)

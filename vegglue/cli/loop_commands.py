@@ -97,7 +97,7 @@ def discover_command(
 def extend_command(
     config: Config,
     add: Annotated[
-        list[str] | None, typer.Option(help="Effect to add, e.g. streamlining or discharge_error[high].")
+        list[str] | None, typer.Option(help=r"Effect to add, e.g. streamlining or discharge_error\[high].")
     ] = None,
     shape: Annotated[list[str] | None, typer.Option(help="Value of a shape of it, NAME=NUMBER.")] = None,
     auto: Annotated[

@@ -16,11 +16,11 @@ FORMS: tuple[Literal["csv", "geotiff", "netcdf"], ...] = ("csv", "geotiff", "net
 
 def new_command(
     name: Annotated[str, typer.Argument(help="Name of the folder to be made.", show_default=False)],
-    length: Annotated[float, typer.Option(help="Length of the reach [m].")] = 40.0,
-    width: Annotated[float, typer.Option(help="Width of its floor [m].")] = 3.0,
+    length: Annotated[float, typer.Option(help=r"Length of the reach \[m].")] = 40.0,
+    width: Annotated[float, typer.Option(help=r"Width of its floor \[m].")] = 3.0,
     slope: Annotated[float, typer.Option(help="Fall of the bed per length [-].")] = 0.001,
-    depth: Annotated[float, typer.Option(help="Depth of the water at the outlet [m].")] = 0.9,
-    discharge: Annotated[float, typer.Option(help="Discharge [m3/s].")] = 1.5,
+    depth: Annotated[float, typer.Option(help=r"Depth of the water at the outlet \[m].")] = 0.9,
+    discharge: Annotated[float, typer.Option(help=r"Discharge \[m3/s].")] = 1.5,
     plants: Annotated[bool, typer.Option(help="Whether there is a patch of plants.")] = True,
     folder: Annotated[Path, typer.Option(help="Folder to make it in.")] = Path("."),
     as_object: Json = False,
