@@ -25,6 +25,8 @@ ROWS_START, ROWS_END = 10.0, 430.0
 DOT_RADIUS = 6.5
 # Errors closer than this [px] have their numbers on both sides of the dots.
 CROWDED = 46.0
+# Width of a digit of a number [px], bold; and the height of the dots in a row.
+DIGIT, DOTS_IN_ROW = 8.0, 38.0
 # The axis ends this much beyond the largest error: room for its number.
 BEYOND = 1.12
 # Numbers stand out from what lies under them.
@@ -39,23 +41,51 @@ def draw_error_rows(rows: Mapping[str, Sequence[float]], floor: float, unit: str
     end, foot = BEYOND * float(np.nanmax(shown)), ROW_HEIGHT * len(rows)
     scale = linear_scale(0.0, end, ROWS_START, ROWS_END)
     ticks = round_ticks(0.0, end, 5)
-    parts = [*axis_below(scale, ticks, tick_labels(ticks), foot, ROWS_WIDTH, unit), *_floor(scale, floor, foot)]
+    crossed = [_crossed(scale, values, floor) for values in rows.values()]
+    parts = [*axis_below(scale, ticks, tick_labels(ticks), foot, ROWS_WIDTH, unit), *_floor(scale, floor, crossed)]
     for place, (words, values) in enumerate(rows.items()):
-        parts += _row(scale, words, values, ROW_HEIGHT * place + 38.0)
+        parts += _row(scale, words, values, ROW_HEIGHT * place + DOTS_IN_ROW)
     return svg_document(ROWS_WIDTH, foot + ROWS_FOOT, parts, title, ROWS_LETTERS)
 
 
-def _floor(scale: Scale, floor: float, foot: float) -> list[str]:
-    """A line where errors of measuring alone lie, named below the axis, and broken where the words of rows stand."""
+def _floor(scale: Scale, floor: float, crossed: Sequence[bool]) -> list[str]:
+    """A line where errors of measuring alone lie, named below the axis; broken where words of a row stand, and where a
+    number does: crossed, of each row.
+    """
     if not np.isfinite(floor):
         return []
-    at = float(scale(floor))
-    rows = round(foot / ROW_HEIGHT)
-    beside_words = "".join(f"M{at:.1f},{ROW_HEIGHT * row + 24:g}v26" for row in range(rows))
-    line = svg_element("path", d=f"{beside_words}M{at:.1f},{foot:g}v26", stroke=COLOUR["ink"], stroke_dasharray="3 3")
+    at, foot = float(scale(floor)), ROW_HEIGHT * len(crossed)
+    tops = [ROW_HEIGHT * row + 24 for row in range(len(crossed))]
+    pieces = "".join(
+        f"M{at:.1f},{top:g}v6M{at:.1f},{top + 22:g}v4" if broken else f"M{at:.1f},{top:g}v26"
+        for top, broken in zip(tops, crossed, strict=True)
+    )
+    line = svg_element("path", d=f"{pieces}M{at:.1f},{foot:g}v26", stroke=COLOUR["ink"], stroke_dasharray="3 3")
     words = f"errors of measuring alone: {short(floor, 2)}"
     right = at > 0.5 * ROWS_WIDTH
     return [line, svg_words(at - 5 if right else at + 5, foot + 40, words, text_anchor="end" if right else "start")]
+
+
+def _crossed(scale: Scale, values: Sequence[float], floor: float) -> bool:
+    """Whether a number of a row stands where the errors of measuring lie."""
+    at = float(scale(floor))
+    for place, value, to_the_left in _numbered(scale, values):
+        start, anchor = _beside(place, to_the_left)
+        width = DIGIT * len(short(value, 2))
+        left = start - width if anchor == "end" else start
+        if left - 2 <= at <= left + width + 2:
+            return True
+    return False
+
+
+def _numbered(scale: Scale, values: Sequence[float]) -> list[tuple[float, float, bool]]:
+    """Place [px] and value of the first and the last known error of a row, and whether its number is to the left."""
+    known = [float(value) for value in values if np.isfinite(value)]
+    if not known:
+        return []
+    first, last = float(scale(known[0])), float(scale(known[-1]))
+    ends = [(last, known[-1], len(known) > 1 and last <= first)]
+    return [(first, known[0], first < last), *ends] if len(known) > 1 else ends
 
 
 def _row(scale: Scale, words: str, values: Sequence[float], height: float) -> list[str]:
@@ -76,11 +106,12 @@ def _row(scale: Scale, words: str, values: Sequence[float], height: float) -> li
         svg_element("path", d=f"M{at:.1f},{height - 6:g}v12", stroke=COLOUR["model"], stroke_width=2)
         for at in places[1:-1]
     ]
-    if len(known) > 1:
-        parts.append(_dot(places[0], height, COLOUR["paper"], "muted"))
-        parts.append(_number(places[0], known[0], height, "muted", places[0] < places[-1]))
-    parts.append(_dot(places[-1], height, COLOUR["model"], "model"))
-    parts.append(_number(places[-1], known[-1], height, "model", len(known) > 1 and places[-1] <= places[0]))
+    *before, (last, value, to_the_left) = _numbered(scale, values)
+    for first, error, left in before:
+        parts.append(_dot(first, height, COLOUR["paper"], "muted"))
+        parts.append(_number(first, error, height, "muted", left))
+    parts.append(_dot(last, height, COLOUR["model"], "model"))
+    parts.append(_number(last, value, height, "model", to_the_left))
     return parts
 
 
@@ -89,7 +120,10 @@ def _dot(at: float, height: float, face: str, colour: str) -> str:
 
 
 def _number(at: float, value: float, height: float, colour: str, to_the_left: bool) -> str:
-    """The error beside its dot, away from the other; over the line between both where there is no room on the left."""
-    left = to_the_left and at > CROWDED + ROWS_START
-    place, anchor = (at - 11, "end") if left else (at + 11, "start")
+    place, anchor = _beside(at, to_the_left)
     return svg_words(place, height + 5, short(value, 2), colour, text_anchor=anchor, font_weight="bold", **NUMBER_HALO)
+
+
+def _beside(at: float, to_the_left: bool) -> tuple[float, str]:
+    """Where a number begins or ends beside its dot, away from the other; to the right where there is no room."""
+    return (at - 11, "end") if to_the_left and at > CROWDED + ROWS_START else (at + 11, "start")
