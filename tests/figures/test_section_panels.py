@@ -78,7 +78,7 @@ def test_the_rows_of_a_ladder_name_the_first_and_the_last_error() -> None:
 
 
 def test_the_line_of_measuring_breaks_where_a_number_stands() -> None:
-    far, near = (draw_error_rows({"a": [0.039, last]}, 0.012, "m/s", "errors") for last in (0.02, 0.007))
+    far, near = (draw_error_rows({"a": [0.063, last]}, 0.012, "m/s", "errors") for last in (0.03, 0.0033))
     (apart,), (broken,) = ([one.get("d") for one in parsed(svg).iter(f"{SVG}path") if one.get("stroke-dasharray")]
                            for svg in (far, near))  # fmt: skip
     assert [apart.count("M"), broken.count("M")] == [2, 3]

@@ -31,7 +31,7 @@ from vegglue.workflow.run_folder import folder_of, known_place
 
 Form = Literal["csv", "geotiff", "netcdf"]
 # Libraries that each form needs, all of the extra `field`.
-NEEDED: dict[Form, tuple[str, ...]] = {"csv": (), "geotiff": ("tifffile",), "netcdf": ("xarray", "h5netcdf")}
+LIBRARIES_OF_FORM: dict[Form, tuple[str, ...]] = {"csv": (), "geotiff": ("tifffile",), "netcdf": ("xarray", "h5netcdf")}
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def export(
     map, and velocities are turned to it.
     Errors: InputError when no flow is found, or a library is missing; StorageError.
     """
-    for library in (name for form in forms for name in NEEDED[form]):  # before minutes are spent on the flow
+    for library in (name for form in forms for name in LIBRARIES_OF_FORM[form]):  # before minutes are spent on the flow
         extra_library(library, "field", "vegglue export", "choose --only csv")
     folder = folder_of(runs, case)
     watch(Progress(f"solving the flow of {case.name}"))
