@@ -36,7 +36,7 @@ def plain(words: str) -> str:
     ("found", "said"),
     [
         (NOTHING, "Nothing is missing from this model that these data could show."),
-        (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.30 m2/s"),
+        (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.300 m2/s"),
         (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
          "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
@@ -76,9 +76,9 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
     assert '<a href="../toy-eddies/report.html">' in better
     assert "Measure <b>a gauge at x = 5 m</b>, to tell eddies from &lt;wind&gt;: 1 station" in measure
     nothing = next_steps(replace(toy, diagnosis=NOTHING, loop=replace(loop, questions=())))
-    assert any("what that model leaves open stands in its report" in step for step in nothing)
+    assert any("What that model leaves open stands in its report" in step for step in nothing)
     alone = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=())))
-    assert any("nothing is left to be told apart" in step for step in alone)
+    assert any("No further measurement is needed" in step for step in alone)
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
     assert any("vegglue extend toy.yaml --auto" in step for step in asked)
     assert any("vegglue next toy.yaml" in step for step in asked)

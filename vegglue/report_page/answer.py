@@ -21,7 +21,7 @@ from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.run import Run, published_svg
 from vegglue.report_page.section_pictures import SectionPanels, section_panels
 
-STAND_IN = "They are those of the model as it is, and may stand in for what is missing."
+STAND_IN = "These parameters are of the model as it is: they may stand in for what is missing."
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
+from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
 from vegglue.report_page.findings import FAILED_TOLERATED
@@ -84,8 +84,10 @@ def _effect_in_words(found: Diagnosis, name: str, rivals: bool) -> str:
 def _amplitude_in_words(amplitude: AmplitudeEstimate) -> str:
     """'size −0.67, 95 % in −0.79 to −0.54' (HTML)."""
     unit = unit_html(amplitude.unit)
-    value = f"size {short(amplitude.value, 2)}"
-    return f"{value}{f'{NARROW}{unit}' if unit else ''}, 95{NARROW}% in {interval(*amplitude.interval95)}"
+    low, high = amplitude.interval95
+    places = decimals((high - low) / 4) if high > low else 3  # as the interval has them
+    value = f"size {fixed(amplitude.value, places)}"
+    return f"{value}{f'{NARROW}{unit}' if unit else ''}, 95{NARROW}% in {interval(low, high)}"
 
 
 def of_which_model(run: Run) -> str:
@@ -239,9 +241,9 @@ def _measurements(run: Run, command: str) -> Iterator[str]:
         yield f"<code>vegglue next {command}</code> says what to measure next."
         return
     if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
-        yield "Nothing is left to be told apart in what was found; what that model leaves open stands in its report."
+        yield "What was found needs no further measurement. What that model leaves open stands in its report."
     elif not questions:
-        yield "No further measurement is needed: nothing is left to be told apart."
+        yield "No further measurement is needed."
     settled = [one for one in questions if one.measurements and one.measurements[0].enough]
     measurements = {one.measurements[0].name: one.measurements[0] for one in reversed(settled)}
     for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
