@@ -21,6 +21,7 @@ from vegglue.site.gridded_site import in_experiment
 
 # What makes two rows of two tables one station.
 STATION_KEY = ["experiment", "kind", "section", "x", "y"]
+CENTIMETRES = 2  # decimals of places [m]: no tape tells more, and places turned from a map have more
 # Edges of the bands of a posterior: 95 %, 50 %, and 95 % with the residual error.
 EDGES = ["low", "high", "low50", "high50", "total_low", "total_high"]
 # What HTML would take for markup, as JSON writes it too.
@@ -130,7 +131,7 @@ def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> Sectio
         for low, high in zip(EDGES[::2], EDGES[1::2], strict=True)
     )
     return SectionPanel(
-        title=f"{rows['section'].iloc[0]}, x = {x:g} m",
+        title=f"{rows['section'].iloc[0]}, x = {round(x, CENTIMETRES):g} m",
         y=values["y"],
         measured=values["value"],
         error=1.96 * rows["standard_error"].to_numpy(float),
@@ -159,9 +160,10 @@ def panel_words(panel: SectionPanel) -> str:
     first = left if panel.before is None else np.where(counted, np.abs(panel.measured - panel.before), -1.0)
     worst = int(np.argmax(first))
     after = "" if panel.before is None else f", with it by {short(float(left[worst]), 2)}"
+    y = as_given(round(float(panel.y[worst]), CENTIMETRES))
     missed = "misses most" if panel.before is None else "missed most"
     held = "" if panel.total is None else f"; {_held(panel, panel.total)}"
-    return f"{missed} at y = {as_given(float(panel.y[worst]))} m: by {short(float(first[worst]), 2)}{after} m/s{held}"
+    return f"{missed} at y = {y} m: by {short(float(first[worst]), 2)}{after} m/s{held}"
 
 
 def _held(panel: SectionPanel, total: Edges) -> str:
