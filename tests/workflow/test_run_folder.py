@@ -1,6 +1,7 @@
 """A calibrated model is the same whatever command ran before it. Places are two wells; no flow is solved."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -93,6 +94,14 @@ def test_the_same_again_gives_the_same(case: Case, tmp_path: Path, monkeypatch: 
     first = place(case, tmp_path / "runs", None)
     again = run_folder.calibrated(case, tmp_path / "runs", excluded_by())
     assert float(again.fitted.point.z[0]) == first
+
+
+def test_a_case_has_as_many_members_as_were_solved(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So a report, and an export, of a run with other `--members` than the config needs no such option."""
+    assert run_folder.as_solved(case, tmp_path) is case
+    (tmp_path / "ensemble.h5").touch()
+    monkeypatch.setattr("vegglue.workflow.run_folder.read_ensemble", lambda path: SimpleNamespace(status=np.zeros(12)))
+    assert run_folder.as_solved(case, tmp_path).simulate.members == 12
 
 
 @pytest.mark.parametrize("members", [0, -1, 2**30])

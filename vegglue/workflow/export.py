@@ -27,7 +27,7 @@ from vegglue.storage.result_files import read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
 from vegglue.workflow.median_flow import median_flow
-from vegglue.workflow.run_folder import folder_of, known_place
+from vegglue.workflow.run_folder import as_solved, folder_of, known_place
 
 Form = Literal["csv", "geotiff", "netcdf"]
 # Libraries that each form needs, all of the extra `field`.
@@ -70,11 +70,12 @@ def export(
 
 def _flow(case: Case, folder: Path) -> tuple[dict[str, FlowFields], Array | None, str]:
     """The flow by experiment, predictions at the stations where they are kept, and whose parameters these are."""
-    wanted = case_hash(case)
+    sized = as_solved(case, folder)
+    wanted = case_hash(sized)
     if stored_hash(folder / "posterior.h5") == wanted:
         posterior = read_posterior(folder / "posterior.h5", wanted)
         predicted = posterior.station["value"].to_numpy(float) - posterior.fit.residual
-        return median_flow(case, posterior, folder), predicted, "the medians of the posterior"
+        return median_flow(sized, posterior, folder), predicted, "the medians of the posterior"
     best = known_place(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}

@@ -8,11 +8,9 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.overview import write_overview
-from vegglue.report_page.run import Run
 from vegglue.storage.kept_words import ladder_that_fits
-from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.report import results_of
-from vegglue.workflow.run_folder import folder_of, of_size
+from vegglue.workflow.run_folder import as_solved, folder_of
 
 
 def overview(cases: Sequence[Case], *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
@@ -26,7 +24,8 @@ def overview(cases: Sequence[Case], *, runs: Path | str = "runs", watch: Watch =
     known = []
     for case in cases:
         watch(Progress(f"reading {case.name}"))
-        known.append(_results_of(_with_posterior(case, runs), runs))
+        shown = _with_posterior(case, runs)
+        known.append(results_of(as_solved(shown, folder_of(runs, shown)), shown, runs, above=""))
     watch(Progress("drawing the overview"))
     return write_overview(Path(runs) / "overview.html", known)
 
@@ -38,9 +37,3 @@ def _with_posterior(case: Case, runs: Path | str) -> Case:
         return case
     child = case.source.with_name(ladder.steps[-1].config)
     return load_case(child, trust=case.effect_file is not None) if child.exists() else case
-
-
-def _results_of(case: Case, runs: Path | str) -> Run:
-    """The results of a case with as many members as were solved."""
-    members = len(read_ensemble(folder_of(runs, case) / "ensemble.h5").status)
-    return results_of(of_size(case, members), case, runs, above="")

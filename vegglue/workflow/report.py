@@ -15,17 +15,19 @@ from vegglue.site.gridded_site import build_site
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.workflow.median_flow import median_flow
-from vegglue.workflow.run_folder import folder_of, of_size
+from vegglue.workflow.run_folder import as_solved, folder_of, of_size
 
 
 @one_thread()
 def report(case: Case, *, runs: Path | str = "runs", members: int | None = None, watch: Watch = silent) -> Path:
     """Write runs/<name>/report.html and figures/ from the ensemble, the posterior and, where they fit, the diagnosis,
-    the comparison and the questions kept there; returns the page. members: size of the ensemble instead of the case's.
+    the comparison and the questions kept there; returns the page. members: size of the ensemble, if not given that of
+    the one there is.
 
     Errors: InputError when there is no ensemble or posterior of this case; StorageError when a file cannot be written.
     """
-    known = results_of(of_size(case, members), case, runs)
+    sized = as_solved(case, folder_of(runs, case)) if members is None else of_size(case, members)
+    known = results_of(sized, case, runs)
     watch(Progress(f"solving the flow of {case.name} at its medians"))
     flow = median_flow(known.case, known.posterior, known.folder)
     watch(Progress(f"drawing the figures of {case.name}"))

@@ -26,7 +26,7 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import Watch, silent
-from vegglue.storage.result_files import read_posterior, stored_hash
+from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 from vegglue.workflow.command_model import unseen_with_command, with_command
 
@@ -49,6 +49,15 @@ def of_size(case: Case, members: int | None) -> Case:
     if not 0 < members <= MOST_MEMBERS:
         raise InputError(f"members: expected 1 to {MOST_MEMBERS:,}, got {members:,}; give another number.")
     return case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
+
+
+def as_solved(case: Case, folder: Path) -> Case:
+    """The case with as many members as the ensemble in the folder of its run has, or as it is where there is none.
+
+    Errors: StorageError.
+    """
+    path = folder / "ensemble.h5"
+    return of_size(case, len(read_ensemble(path).status)) if path.exists() else case
 
 
 def model_in(case: Case) -> Model:
