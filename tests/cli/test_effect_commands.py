@@ -61,7 +61,7 @@ def test_the_example_on_a_page_can_be_pasted(tmp_path, monkeypatch, capsys):
     config = write_reach(tmp_path, COARSE, *pasted(example))
     told = said_to_text(monkeypatch, capsys, "effects", "wind", "--config", config)
     assert "as `wind`: speed = wind (normal)" in told
-    assert "Not at work" in said_to_text(monkeypatch, capsys, "effects", "elder", "--config", config)
+    assert "brook does not have it." in said_to_text(monkeypatch, capsys, "effects", "elder", "--config", config)
 
 
 def test_an_effect_of_ones_own_is_checked(tmp_path, monkeypatch, capsys):

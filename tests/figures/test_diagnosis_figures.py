@@ -114,11 +114,12 @@ def test_alike_effects_stand_together_in_a_frame() -> None:
 def test_fingerprint_draws_each_experiment_across_each_section() -> None:
     station = a_diagnosis().predictions.station
     trace = np.array([0.1, 0.2, 0.003, 0.3, 0.4, 0.004])
-    section, gauges = draw_fingerprint(trace, station, "m2/s").axes
+    section, gauges = draw_fingerprint(trace, station, "wind, speed 5 m/s").axes
     lines = [list(line.get_ydata()) for line in section.lines if line.get_marker() == "."]
     assert sorted(lines) == [[0.1, 0.2], [0.3, 0.4]]
-    assert section.get_ylabel() == "change of u [m/s per m2/s]"
-    assert gauges.get_ylabel() == "change of level [m per m2/s]"
+    assert section.get_ylabel() == "change of u [m/s]"
+    assert gauges.get_ylabel() == "change of level [m]"
+    assert section.figure.get_suptitle() == "by wind, speed 5 m/s"
 
 
 @pytest.mark.parametrize("kind", ["velocity", "level"])

@@ -136,29 +136,27 @@ def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
 
 
 @styled
-def draw_fingerprint(trace: Array, station: pd.DataFrame, unit: str) -> Figure:
-    """What one unit of an effect changes: velocities across each section, a line for each experiment; levels and
-    discharges along x.
+def draw_fingerprint(trace: Array, station: pd.DataFrame, size: str) -> Figure:
+    """What an effect changes: velocities across each section, a line for each experiment; else values along x.
 
-    trace: (station,) [unit of the kind per unit]; station: experiment, kind, section, x, y; unit: of the amplitude, as
-    text.
+    trace: (station,) [unit of the kind]; station: experiment, kind, section, x, y; size: of the effect, in words.
     """
     table = station.assign(change=trace)
     parts = [part for kind in KINDS.values() for part in _parts_of(kind, table[table["kind"] == kind.name])]
     figure, grid = _panels(len(parts))
     lines = dict(zip(dict.fromkeys(table["experiment"]), LINE_STYLES * len(table), strict=False))
-    per = "" if unit in ("-", "") else f" per {no_formula(unit)}"
     for place, (axes, (part, title, kind)) in enumerate(zip(grid, parts, strict=False)):
         _paint_traces(axes, part, "y" if kind.velocity else "x", lines)
         axes.set_title(title, fontsize=8.5)
         if place % FINGERPRINT_COLUMNS == 0 or kind != parts[place - 1][2]:
-            formula_labels(axes, upward=f"change of {kind.column} [{unit_math(kind.unit)}{per}]")
+            formula_labels(axes, upward=f"change of {kind.column} [{unit_math(kind.unit)}]")
         if kind.velocity:
             axes.set_ylim(*_range(table.loc[table["kind"] == kind.name, "change"]))
     handles = [
         Line2D([], [], linestyle=line, color=COLOUR["model"], label=experiment) for experiment, line in lines.items()
     ]
     figure.legend(handles=handles, loc="outside upper left", ncols=4, frameon=False, fontsize=SMALL + 0.5)
+    figure.suptitle(no_formula(f"by {size}"), x=0.995, ha="right", fontsize=SMALL + 0.5, color=COLOUR["muted"])
     return figure
 
 

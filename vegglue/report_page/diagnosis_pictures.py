@@ -48,9 +48,16 @@ def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
     save(draw_diagnosis(diagnosis, outlines(case)), path, dots_per_inch=130)
 
 
-def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, unit: str, path: Path) -> None:
-    """Write what one unit of an effect changes at the stations, trace (station,); PNG or SVG by its ending."""
-    save(draw_fingerprint(trace, station, unit), path)
+# What the parts of the picture of a diagnosis show.
+TITLES = (
+    "What would improve the fit, alone", "What leaves a like trace",
+    "Where the model misses, in standard errors", "Where a spot would help",
+)  # fmt: skip
+
+
+def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, size: str, path: Path) -> None:
+    """Write what an effect of some size changes at the stations, trace (station,); PNG or SVG by its ending."""
+    save(draw_fingerprint(trace, station, size), path)
 
 
 @styled
@@ -63,6 +70,8 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
+    for part, words in zip((suspects, alike, zones, lower), TITLES, strict=True):
+        part.suptitle(words, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
     paint_suspects(scores, visible, _suspect_table(diagnosis), diagnosis.first_screening.threshold)
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)

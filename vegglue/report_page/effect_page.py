@@ -73,7 +73,7 @@ def work_in_case(case: Case, effect: Effect) -> Iterator[str]:
     """What a case does with an effect, one line for each entry of `effects`."""
     entries = [(key, working) for key, working in case.effects.items() if (working.effect or key) == effect.name]
     if not entries:
-        yield f"Not at work in {case.name}."
+        yield f"{case.name} does not have it."
     for key, working in entries:
         yield f"At work in {case.name} as `{key}`: {_values(case, working)}{_where(working)}."
 

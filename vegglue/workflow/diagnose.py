@@ -47,18 +47,19 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
 
 @one_thread()
 def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
-    """Draw what an effect would change at the stations of the calibrated case, before calibration takes its part; in
-    runs/<name>/fingerprint_<effect>.png, which is returned.
+    """Draw what an effect of plausible size would change at the stations of the calibrated case, before calibration
+    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned.
     """
     folder = folder_of(runs, case)
     path = folder / f"fingerprint_{effect.name}.png"
     watch(Progress(f"calibrating {case.name}"))
     trace, station = fingerprint_of(case, folder, effect, watch)
     amplitude = effect.amplitude
-    unit = amplitude.unit if amplitude.power == 1 else f"{amplitude.unit}^{amplitude.power}"
+    plausible = amplitude.off + amplitude.scale
+    size = f"{effect.name}, {amplitude.name} {plausible:g}{'' if amplitude.unit == '-' else f' {amplitude.unit}'}"
     from vegglue.report_page.diagnosis_pictures import save_fingerprint_figure
 
-    save_fingerprint_figure(trace, station, unit, path)
+    save_fingerprint_figure(amplitude.gain(plausible) * trace, station, size, path)
     return path
 
 
