@@ -259,3 +259,14 @@ def test_directions_with_speeds_become_components(tmp_path: Path) -> None:
     taken = in_the_channel(read_rows(tmp_path / "a.csv", words), Placement(FRAME), words)
     assert taken.numbers["u"][0] == pytest.approx(0.5)
     assert taken.numbers["v"][0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_nines_that_may_be_a_mark_are_said_and_kept(tmp_path: Path) -> None:
+    rows = "x;y;u [cm/s];level [m]\n1;0;35,1;9,99\n1;1;99,99;9,99\n1;2;-999;9,99\n"
+    (tmp_path / "v.csv").write_text(rows, encoding="utf-8")
+    taken = read_rows(tmp_path / "v.csv", FileWords())
+    assert [words for words in taken.said if "no value" in words] == [
+        "kept 99.99 in u [cm/s] (if it marks no value, say `missing: [99.99]`)", "1 mark for no value in u [cm/s]",
+    ]  # fmt: skip
+    assert taken.numbers["u"][1] == pytest.approx(0.9999)
+    assert np.isnan(read_rows(tmp_path / "v.csv", FileWords(missing=(99.99,))).numbers["u"][1])

@@ -18,6 +18,7 @@ from vegglue.in_short import so_many
 # Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
 # 99 m may be a level. Others are named by `missing` in the site file.
 MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
+FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
@@ -77,6 +78,8 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
         units[role] = _unit(path, table, place, role, words)
         values, marked = _numbers(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
+        if ROLES[role].quantity == "velocity":
+            said += _doubted(values, table.headings[place])
         if marked:
             said.append(f"{so_many(marked, 'mark')} for no value in {table.headings[place]}")
     if not numbers:
@@ -206,6 +209,16 @@ def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]
 def _nines(value: float) -> bool:
     """-99, -999.9 and the like: no level, and no velocity in any unit that comes near to it."""
     return bool(value <= -99.0) and set(f"{-value:g}") <= set("9.")
+
+
+def _doubted(values: Array, heading: str) -> list[str]:
+    """That velocities of nines only, 99.99, may be marks; they may be velocities, too, and are kept."""
+    nines = {f"{value:g}" for value in values if value > 0.0 and set(f"{value:g}") <= set("9.")}
+    return [
+        f"kept {nine} in {heading} (if it marks no value, say `missing: [{nine}]`)"
+        for nine in sorted(nines)
+        if nine.count("9") >= FEWEST_NINES
+    ]
 
 
 def _components(taken: Taken) -> Taken:
