@@ -88,22 +88,27 @@ def _measured_canopy(observations: Observations, name: str, stand: str, height: 
 def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
     """Where 12 h / k_s of the law of the banks falls below its floor [-] and is held there."""
     floor = case.numerics.bank_argument_minimum
-    for index, (name, friction_class) in enumerate(case.friction.classes.items()):
+    for index, (class_name, friction_class) in enumerate(case.friction.classes.items()):
         if friction_class.k_s is None:
             continue
         roughest = _largest(case, friction_class.k_s)
         up_to = "up to " if isinstance(friction_class.k_s, str) else ""
-        for experiment_name, experiment in case.experiments.items():
-            now = in_experiment(site, experiment_name)
-            depth = expected_depth(case, now, experiment)
-            wet = depth[(now.friction_class == index) & (site.patch < 0) & (depth > 0)]
-            share = float(np.mean(12.0 * wet / roughest < floor)) if wet.size else 0.0
-            if share > 0:
-                yield (
-                    f"With k_s of class {name} {up_to}{roughest:.3g} m, water shallower than "
-                    f"{floor * roughest / 12:.2g} m ({100 * share:.0f} % of that class in experiment "
-                    f"{experiment_name}) gets the friction of that depth: 12 h/k_s is not let below {floor:g}."
-                )
+        shares = {name: _share_held(case, site, name, index, roughest) for name in case.experiments}
+        held = ", ".join(f"{100 * share:.0f} % in {name}" for name, share in shares.items() if share > 0)
+        if held:
+            yield (
+                f"With k_s of class {class_name} {up_to}{roughest:.3g} m, water shallower than "
+                f"{floor * roughest / 12:.2g} m gets the friction of that depth, as 12 h/k_s is not let below "
+                f"{floor:g}. Of the wet cells of that class: {held}."
+            )
+
+
+def _share_held(case: Case, site: Site, experiment: str, friction_class: int, k_s: float) -> float:
+    """Share of the wet cells of a class, without those of plants, in which 12 h / k_s lies below its floor [-]."""
+    now = in_experiment(site, experiment)
+    depth = expected_depth(case, now, case.experiments[experiment])
+    wet = depth[(now.friction_class == friction_class) & (site.patch < 0) & (depth > 0)]
+    return float(np.mean(12.0 * wet / k_s < case.numerics.bank_argument_minimum)) if wet.size else 0.0
 
 
 def _largest(case: Case, value: Value) -> float:
