@@ -305,10 +305,10 @@ def test_errors_that_are_not_as_stated_are_remarked() -> None:
 def test_the_model_error_that_is_allowed_is_remarked() -> None:
     used = ModelErrorUsed(0.05, 0.01, needed=0.5, log_ratio=1.0)
     assert (
-        "by 5% of its friction and 1 cm of its bed everywhere, and its site as the config says; it needs 50% of what is"
+        "by 5% of its friction and 1 cm of its bed everywhere, and its site as the config says; the misfit asks for 50%"
         in said(grounds(model_error=used))[2]
     )
-    assert "it needs none of it" in said(grounds(model_error=replace(used, needed=0.0)))[2]
+    assert "the misfit asks for none of that" in said(grounds(model_error=replace(used, needed=0.0)))[2]
 
 
 def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:

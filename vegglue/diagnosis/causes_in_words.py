@@ -108,7 +108,7 @@ def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
 
 
 def model_error_in_words(used: ModelErrorUsed) -> str:
-    """The model is allowed to be wrong by 5 % of its friction everywhere; it needs 60 % of what is allowed."""
+    """The model may be wrong by 5 % of its friction everywhere; the misfit asks for 60 % of that."""
     allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
-    needs = "none of it" if used.needed == 0.0 else f"{used.needed:.0%} of what is allowed"
-    return f"The model is allowed to be wrong {allowed}, and its site as the config says; it needs {needs}."
+    needs = "none" if used.needed == 0.0 else f"{used.needed:.0%}"
+    return f"The model may be wrong {allowed}, and its site as the config says; the misfit asks for {needs} of that."
