@@ -78,6 +78,7 @@ def profiler_mat(path: Path, means: np.ndarray, beams: bool = False, bed: float 
     weak[:40] = True
     weak[:300, -1] = True
     xyz[weak] = -0.9
+    xyz[50, 3] = np.nan  # as whoever cleaned the file may mark it
     names = [f"VelBeam{beam}" for beam in range(1, 5)] if beams else ["VelX", "VelY", "VelZ1", "VelZ2"]
     parts = np.einsum("ij,ncj->nci", np.linalg.inv(TURN), xyz) if beams else xyz
     data = {f"Profiles_{name}": parts[..., number].astype("f4") for number, name in enumerate(names)}

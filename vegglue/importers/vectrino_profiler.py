@@ -71,8 +71,13 @@ def _velocity(data: Any, config: Any) -> Array:
 
 
 def _trusted(velocity: Array, correlation: Array) -> Mask:
-    cells = (trusted_samples(velocity[:, cell], correlation[:, cell]) for cell in range(velocity.shape[1]))
-    return np.column_stack(list(cells))
+    """Samples that count (samples, cells); none of those that are no numbers, as whoever cleaned a file marks them."""
+    known: Mask = np.asarray(np.isfinite(velocity).all(axis=2))
+    trusted: Mask = np.zeros_like(known)
+    for cell in np.flatnonzero(known.any(axis=0)):
+        here = known[:, cell]
+        trusted[here, cell] = trusted_samples(velocity[here, cell], correlation[here, cell])
+    return trusted
 
 
 def _above_the_bed(data: Any, away: Array) -> Mask:
