@@ -42,7 +42,8 @@ def reader_of(path: Path) -> InstrumentReader:
     if begin.startswith(NORTEK_BEGINS) or path.suffix.lower() in BINARY_ENDINGS:
         raise InputError(
             f"{shown_path(path)}: expected an export as text, got {_binary_words(path, begin)}, which is not read; "
-            "convert it to ASCII in the maker's program (Nortek: .dat with .hdr; WinRiver: classic ASCII output)."
+            "convert it to ASCII in the maker's program (Nortek: .dat with .hdr, MIDAS: .mat; WinRiver: classic ASCII "
+            "output)."
         )
     text = readable_text(path)
     if is_winriver(text):
