@@ -43,6 +43,8 @@ def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
     low, high = laws["law_floor_depth_ramp"].seen
     assert 0.5 < low < high < 1.3
     assert high - low > LEAST_SPREAD
+    low, high = laws["law_plants_front_fading"].seen
+    assert 0.0 < low < high < 4.0, "no section crosses a patch; what is in it is seen all the same"
 
 
 def searched(model: Model, hidden: list[str], seed: int) -> Discovery:

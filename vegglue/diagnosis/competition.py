@@ -54,11 +54,11 @@ class Contender:
     what: Refit | Instrument
 
 
-def contenders_of(screening: Screening, watch: Watch) -> list[Contender]:
-    """Everything that was tried, most evidence first."""
+def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Contender]:
+    """Everything that was tried, most evidence first; elsewhere: ln evidence of what competes besides."""
     by_name, second = {kind.name: kind for kind in screening.kinds}, second_look(screening)
     linear = _linear_evidence(by_name["effect"], second)
-    best = max(*(kind.total for kind in screening.kinds), float(linear.max()))
+    best = max(*(kind.total for kind in screening.kinds), float(linear.max()), elsewhere)
     effects = _worth_refitting(screening, linear, best)
     places = [one for one in screening.fingerprints.places if _within_reach(by_name[one.term].total, best)]
     spots = [(one, spot) for one in places for spot in _promising_spots(one, by_name[one.term], best)]

@@ -1,7 +1,8 @@
 """Laws of the grammar as candidates of a case: which of them have something to act on, with references from its flow.
 
 A law is measured by what its term has seen: the quantity in the cells of the term that lie under water at the measured
-sections, at the calibrated flow. Of these the references and the range of validity are quantiles.
+sections, at the calibrated flow; in all cells of the term under water where hardly any lie there, for what is beside a
+section shows in it too. Of these the references and the range of validity are quantiles.
 """
 
 from collections.abc import Sequence
@@ -30,8 +31,8 @@ DIGITS = 2
 
 @dataclass(frozen=True)
 class LawInCase:
-    """A law, its candidate with the references to be tried, and the values of its quantity from 5 to 95 % of the cells
-    of its term at the measured sections [unit of the quantity].
+    """A law, its candidate with the references to be tried, and the values of its quantity from 5 to 95 % of what its
+    term has seen [unit of the quantity].
     """
 
     law: Law
@@ -42,11 +43,14 @@ class LawInCase:
 def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
     """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
     flows = [_cells(model, point, experiment) for experiment in model.case.experiments]
+    measured = [_at_sections(model, cells, name) for cells, name in zip(flows, model.case.experiments, strict=True)]
     found = []
     for law in LAWS.values():
         if SAME_AS.get(law.name) in listed or law.name in model.case.effects:
             continue
-        values = np.concatenate([_values(law, cells) for cells in flows])
+        values = np.concatenate([_values(law, cells) for cells in measured])
+        if values.size < FEWEST_SEEN:
+            values = np.concatenate([_values(law, cells) for cells in flows])
         if values.size < FEWEST_SEEN:
             continue
         low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
@@ -90,18 +94,13 @@ def _values(law: Law, cells: Cells) -> Array:
 
 
 def _cells(model: Model, point: Point, experiment: str) -> Cells:
-    """The flow at cell centres of one experiment, dry but for the columns in which velocities were measured."""
+    """The flow at cell centres of one experiment."""
     flow = flow_at_centres(model, point, experiment)
     geometry = channel_geometry(model.case, model.site, experiment)
-    station = model.station_of(experiment)
-    x = station["x"].to_numpy(float)[velocity_rows(station)]
-    grid = model.site.grid
-    measured = np.zeros((grid.x.size, 1), dtype=bool)
-    measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
     depth, nothing = flow.depth[..., None], np.zeros_like(flow.depth)[..., None]
     return Cells(
         geometry=geometry,
-        depth=np.where(measured[..., None], depth, 0.0),
+        depth=depth,
         level=depth + geometry.bed,
         u=flow.u[..., None],
         v=flow.v[..., None],
@@ -110,3 +109,12 @@ def _cells(model: Model, point: Point, experiment: str) -> Cells:
         viscosity=nothing,
         shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9,
     )
+
+
+def _at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
+    """The same, dry but for the columns in which velocities were measured."""
+    station, grid = model.station_of(experiment), model.site.grid
+    x = station["x"].to_numpy(float)[velocity_rows(station)]
+    measured = np.zeros((grid.x.size, 1, 1), dtype=bool)
+    measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
+    return replace(cells, depth=np.where(measured, cells.depth, 0.0))

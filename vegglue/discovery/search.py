@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import baseline
+from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempered_chances, tempering
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
@@ -37,12 +37,16 @@ def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = sile
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
     watch(Progress("calibrating the model as it is"))
-    base = baseline(model)
+    return laws_beyond(baseline(model), without, watch)
+
+
+def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
+    """The same of a model that is calibrated."""
     watch(Progress("looking for a law"))
     screening = screen_laws(base, tuple(without))
     if screening.p > FALSE_ALARMS or not screening.laws:
         return Discovery(screening.p, len(screening.laws), (), {})
-    ranked = [*contenders_of(screening.listed, watch), *_laws(screening, watch)]
+    ranked = [*contenders_of(screening.listed, watch, screening.kind.total), *_laws(screening, watch)]
     return _discovery(screening, sorted(ranked, key=lambda one: -one.log_evidence))
 
 
