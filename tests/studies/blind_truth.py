@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import second_effects as effects
 from second_channel import PAPER, SHORT, Channel, lie_of
+from second_hidden_laws import LAW_DRAG, LAW_MIXING
 from second_kernels import GRAVITY, KARMAN
 from second_laws import Formulation
 from second_solver import Field, Flow
@@ -105,17 +106,23 @@ def _moved(
     )
 
 
-def true_values(site: Site, case: Case, study: str, station: pd.DataFrame, hidden: Mapping[str, Numbers]) -> Field:
-    """What error-free instruments would show (station,), with numbers of each hidden effect by its name."""
+def true_values(
+    site: Site, case: Case, study: str, station: pd.DataFrame, hidden: Mapping[str, Numbers],
+    cells: tuple[float, float] | None = None, settled: float = SETTLED,
+) -> Field:  # fmt: skip
+    """What error-free instruments would show (station,), with numbers of each hidden effect by its name; cells [m] and
+    change at which a flow is steady [m/s2], where not those of the study.
+    """
+    cells = cells or CELLS[study]
     value = np.full(len(station), np.nan)
     for name, setting in case.experiments.items():
         here = (station["experiment"] == name).to_numpy()
         discharge = float(next(iter(setting.discharge.values()))) * site.discharges[name]
         truth, discharge, level = _hiding(site.truth, name, discharge, float(setting.level), hidden)
-        flow = steady_flow(truth, discharge, level, CELLS[study], SETTLED)
+        flow = steady_flow(truth, discharge, level, cells, settled)
         shifts = np.zeros(len(station))
         shifts[: site.shifts.size] = site.shifts
-        value[here] = _readings(truth, flow, level, CELLS[study], station[here], shifts[here], hidden)
+        value[here] = _readings(truth, flow, level, cells, station[here], shifts[here], hidden)
     return value
 
 
@@ -144,7 +151,7 @@ def _hiding(
 
 
 TABLES: tuple[Mapping[str, object], ...] = (
-    effects.PLANTS, effects.DRAG, effects.MIXING, effects.STRESS, effects.FORCE, effects.BED,
+    effects.PLANTS, effects.DRAG, effects.MIXING, effects.STRESS, effects.FORCE, effects.BED, LAW_DRAG, LAW_MIXING,
 )  # fmt: skip
 KNOWN_TO_THE_FLOW = {name for table in TABLES for name in table}
 SENSORS = ("probe_gain", "station_shift", "partial_depth", "among_plants", "gauge_datum", "gauge_head")

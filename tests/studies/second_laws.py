@@ -15,6 +15,7 @@ import numpy as np
 import second_effects as effects
 from second_channel import Channel, Lie
 from second_effects import State, changes
+from second_hidden_laws import LAW_DRAG, LAW_MIXING
 from second_kernels import DRY, GRAVITY, KARMAN
 from second_solver import Closure, Field, Flow
 
@@ -89,10 +90,11 @@ def _plants(formulation: Formulation, state: State) -> Field:
 
 
 def _acting(ground: Ground, state: State, extra: Field) -> Closure:
+    drag = effects.DRAG | LAW_DRAG
     for name, numbers in ground.effects.items():
-        if name in effects.DRAG:
-            state = replace(state, k=effects.DRAG[name](state, **numbers))
-    nu = sum(changes(effects.MIXING, ground.effects, state), state.nu)
+        if name in drag:
+            state = replace(state, k=drag[name](state, **numbers))
+    nu = sum(changes(effects.MIXING | LAW_MIXING, ground.effects, state), state.nu)
     push_x, push_y = np.zeros_like(state.k), np.zeros_like(state.k)
     for along, across in changes(effects.FORCE, ground.effects, state):
         push_x, push_y = push_x + state.flow.h * along, push_y + state.flow.h * across

@@ -1,0 +1,145 @@
+"""Data sets of the study of laws: what is hidden in each, at which size, and the measurements that come of it.
+
+The truth is the second solver's, on a site with small imperfections drawn anew for each set, as in the blind study. One
+experiment more is held out.
+"""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import hidden_laws
+import numpy as np
+import pandas as pd
+from blind_sets import PLACES, hash_of, model_of, place_of
+from blind_truth import perfect_site, site_of_nature, true_values
+
+from vegglue.arrays import Array
+from vegglue.calibration.noise import noise_of, with_grid_error, with_model_error
+from vegglue.case.parameter_space import theta_at
+from vegglue.case.schema import Case, Experiment
+from vegglue.engine.interface import Model
+from vegglue.measurements.kinds import velocity_rows
+from vegglue.screening.candidates import Candidate, candidates_of
+from vegglue.twins.hidden_effect import TwinBase, VisibilityError, chosen_effect
+from vegglue.twins.sealed_answer import Hidden
+
+STUDY = "twin"
+# Standard errors that are left of what is hidden after calibration; a listed effect that cannot be as visible is hidden
+# at the next one.
+RATIOS = {"law": (8.0,), "listed": (8.0, 5.0, 3.0)}
+# Cells of the truth [m] and change at which a flow is steady [m/s2]: with cells of 0.125 m across and half the change
+# predictions move by 0.001 m/s, a tenth of the error of a probe, and cost 2.4 times as much.
+CELLS_OF_TRUTH, STEADY_ENOUGH = (0.5, 0.1875), 2e-5
+# Between the discharges that are measured: what a law says there is no guess. Level as h ~ Q^0.6.
+HELD_OUT, LIKE = "held out", "mid"
+HELD_OUT_SETTING = Experiment(discharge={"upstream": 2.6}, level=1.0)
+# How often each hidden law is drawn anew, and data sets with nothing hidden.
+TIMES, NOTHING = 4, 25
+# Stages of effects that change a term of the grammar: those hidden as listed effects, and left out in turn.
+STAGES = ("plants", "resistance", "exchange")
+# What is not off on a site where it would be of the kind that is hidden, see `site_of_nature`.
+SAME_KIND = {"plants": ("patch_density", "emergent_part"), "viscosity": ("viscosity",)}
+
+
+@dataclass(frozen=True)
+class LawTrial:
+    """One data set. group: law, listed or nothing; hide: the name of what is hidden, or empty."""
+
+    group: str
+    number: int
+    hide: str
+
+    @property
+    def key(self) -> str:
+        return f"{self.group}/{self.number}"
+
+
+@dataclass(frozen=True)
+class LawDataSet:
+    """A model with what was measured; hidden: what was hidden, with its size; held_out: stations of the experiment that
+    was held out with what is true there; case: that of the model with that experiment; also_true: what may rightly be
+    named besides.
+    """
+
+    model: Model
+    hidden: dict[str, Any] | None
+    held_out: pd.DataFrame
+    case: Case
+    also_true: Mapping[str, float]
+
+
+def law_trials() -> list[LawTrial]:
+    """All data sets, mixed so that a study that is stopped has some of each kind."""
+    laws, listed = [law.name for law in hidden_laws.HIDDEN_LAWS], hidden_listed()
+    hidden = {"law": laws * TIMES, "listed": listed, "nothing": [""] * NOTHING}
+    mixed = [
+        ((number + 0.5) / len(names), LawTrial(group, number, name))
+        for group, names in hidden.items()
+        for number, name in enumerate(names)
+    ]
+    return [trial for _, trial in sorted(mixed, key=lambda pair: pair[0])]
+
+
+def hidden_listed() -> list[str]:
+    """Listed effects on resistance, plants and exchange in the short channel."""
+    model = model_of(STUDY)
+    found = [one for one in candidates_of(model.case, model.station) if one.effect.stage in STAGES]
+    return [one.name for one in found]
+
+
+def knowing_hidden(case: Case) -> Case:
+    """The case with the effect file of hidden laws."""
+    return case.model_copy(update={"effect_file": Path(hidden_laws.__file__)})
+
+
+def law_data_set(trial: LawTrial) -> LawDataSet:
+    """The data set of a trial. Errors: VisibilityError where it cannot be made visible, RuntimeError where the second
+    solver finds no steady flow.
+    """
+    base, columns = place_of(STUDY, (7 * trial.number + len(trial.group)) % PLACES)
+    seed = hash_of(f"laws: {trial.key}")
+    random = np.random.default_rng((seed, 2))
+    errors = noise_of(base.model.station)
+    hidden = _hidden_in(base, columns, trial, random) if trial.hide else None
+    station, held_out = base.model.station, held_out_stations(base.model)
+    experiments = {**base.model.case.experiments, HELD_OUT: HELD_OUT_SETTING}
+    case = base.model.case.model_copy(update={"experiments": experiments})
+    theta = {name: float(values[0]) for name, values in theta_at(case, base.here.z).items()}
+    of_kind = SAME_KIND.get(hidden_laws.BY_NAME[trial.hide].term, ()) if trial.group == "law" else (trial.hide,)
+    site = site_of_nature(perfect_site(case, STUDY, theta, len(station)), case, seed % 2**31, of_kind)
+    numbers = {hidden["name"]: {hidden["parameter"]: hidden["amplitude"], **hidden["shapes"]}} if hidden else {}
+    everywhere = pd.concat([station, held_out], ignore_index=True)
+    truly = true_values(site, case, STUDY, everywhere, numbers, CELLS_OF_TRUTH, STEADY_ENOUGH)
+    value = truly[: len(station)].copy()
+    value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
+    model = replace(base.model, station=station.assign(value=value))
+    return LawDataSet(model, hidden, held_out.assign(value=truly[len(station) :]), case, site.also_true)
+
+
+def held_out_stations(model: Model) -> pd.DataFrame:
+    """Velocities where they are measured at the next lower discharge, in the experiment that is held out."""
+    velocity = model.station[velocity_rows(model.station) & model.station["used"].to_numpy(bool)]
+    return velocity[velocity["experiment"] == LIKE].assign(experiment=HELD_OUT)
+
+
+def _hidden_in(base: TwinBase, columns: Array, trial: LawTrial, random: np.random.Generator) -> dict[str, Any]:
+    """What is hidden, at the size that RATIOS ask for."""
+    sizing = with_model_error(with_grid_error(noise_of(base.model.station), base.difference), columns)
+    if trial.group == "law":
+        base = replace(base, model=replace(base.model, case=knowing_hidden(base.model.case)))
+    *first, last = RATIOS[trial.group]
+    for ratio in first:
+        with suppress(VisibilityError):
+            return _told(*chosen_effect(base, sizing, trial.hide, None, ratio, random))
+    return _told(*chosen_effect(base, sizing, trial.hide, None, last, random))
+
+
+def _told(candidate: Candidate, one: Hidden) -> dict[str, Any]:
+    parameter = candidate.effect.amplitude.name
+    return {
+        "name": one.name, "parameter": parameter, "amplitude": one.amplitude, "shapes": one.shapes,
+        "signal": one.signal,
+    }  # fmt: skip

@@ -1,0 +1,141 @@
+"""The study behind docs/discover_study.md: laws that stand in no list and not in the grammar, hidden and searched.
+
+    python tests/studies/laws.py [--most N] [--page] [--runs FOLDER]
+
+One line of JSON for each data set in runs/laws/records.jsonl: what stands there, or in data/blind/laws.jsonl, is not
+done again, so that the study may be stopped and go on.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from blind import records_in
+from law_sets import LawDataSet, LawTrial, knowing_hidden, law_data_set, law_trials
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.case.parameter_space import z_of
+from vegglue.case.schema import Case
+from vegglue.diagnosis.child_config import candidate_named
+from vegglue.discovery.discovered import Discovery
+from vegglue.discovery.search import laws_beyond
+from vegglue.engine.interface import linearise
+from vegglue.errors import InputError
+from vegglue.inference.likelihood import root_mean_square
+from vegglue.parallel import at_most
+from vegglue.screening.candidates import Candidate, start_amplitude, with_effect
+from vegglue.twins.hidden_effect import VisibilityError
+
+ROOT = Path(__file__).parents[2]
+RUNS = ROOT / "runs" / "laws"
+KEPT = ROOT / "data" / "blind" / "laws.jsonl"
+
+
+def study_of_laws(trial: LawTrial) -> dict[str, Any]:
+    """The record of one data set: what was hidden, what was found, and errors in an experiment that was held out."""
+    record: dict[str, Any] = {"key": trial.key, "group": trial.group, "hide": trial.hide}
+    began = time.process_time()
+    try:
+        data = law_data_set(trial)
+    except (VisibilityError, InputError, RuntimeError) as error:
+        return record | {"left_out": str(error)}
+    truth_seconds = time.process_time() - began
+    record |= {"hidden": data.hidden, "also_true": dict(data.also_true)}
+    try:
+        base = baseline(data.model)
+        found = laws_beyond(base)
+        record |= _found_in(found)
+        record["seconds"], record["truth_seconds"] = time.process_time() - began - truth_seconds, truth_seconds
+        record["held_out"] = _errors_held_out(trial, data, base, found)
+        if trial.group == "listed":
+            without = laws_beyond(base, [trial.hide])
+            record["without"] = _found_in(without)
+            record["held_out_without"] = _errors_held_out(trial, data, base, without)
+    except Exception as error:  # a crash is counted, and stops no study of hours
+        return record | {"left_out": f"no search: {type(error).__name__}: {error}"}
+    return record
+
+
+def _found_in(found: Discovery) -> dict[str, Any]:
+    """What was found, best first."""
+    return {
+        "p": found.p,
+        "tried": found.tried,
+        "best": "" if found.best is None else found.best.law.name,
+        "laws": [
+            {"term": one.law.term.name, "quantity": one.law.quantity.name, "form": one.law.form.name,
+             "chance": one.chance, "strength": one.strength, "reference": one.reference, "same_as": one.same_as}
+            for one in found.laws
+        ],
+        "others": found.others,
+    }  # fmt: skip
+
+
+def _errors_held_out(trial: LawTrial, data: LawDataSet, base: Baseline, found: Discovery) -> dict[str, float | None]:
+    """Root mean square errors of predictions in the experiment that was held out [m/s], without errors of probes: of
+    the model as it is, with the law that was found, and with what was hidden.
+    """
+    model, z, best = data.model, base.fitted.point.z, found.best
+    after = truth = None
+    if best is not None:
+        law = Candidate(best.law.effect, scale=best.scale)
+        shapes = {} if best.reference is None else {"reference": best.reference}
+        after = _error_with(data, replace(base, model=model), law, shapes, best.strength)
+    if data.hidden is not None:
+        known = replace(model, case=knowing_hidden(model.case)) if trial.group == "law" else model
+        one = candidate_named(known.case, model.station, trial.hide)
+        truth = _error_with(data, replace(base, model=known), one, data.hidden["shapes"], data.hidden["amplitude"])
+    return {"before": _error_of(data, model.case, z), "after": after, "truth": truth}
+
+
+def _error_with(
+    data: LawDataSet, base: Baseline, one: Candidate, shapes: dict[str, float], amplitude: float
+) -> float | None:
+    """Of the model with one effect more, calibrated from about that amplitude; None where no flow is found."""
+    case = with_effect(base.model.case, one, shapes)
+    off = one.amplitude.off
+    start = start_amplitude(one.amplitude, one.amplitude.gain(off + 0.7 * (amplitude - off)))
+    z = np.append(base.fitted.point.z, z_of(case.parameters[one.parameter], start))
+    try:
+        there = baseline(replace(base.model, case=case), z).fitted.point.z
+    except InputError:
+        return None
+    return _error_of(data, case, there)
+
+
+def _error_of(data: LawDataSet, case: Case, z: Array) -> float | None:
+    other = case.model_copy(update={"experiments": data.case.experiments})
+    point = linearise(replace(data.model, case=other, station=data.held_out), z)
+    if point is None:
+        return None
+    error = data.held_out["value"].to_numpy(float) - point.prediction
+    return float(root_mean_square(error[np.isfinite(error)]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--most", type=int, default=None, help="data sets to do at most")
+    parser.add_argument("--runs", type=Path, default=RUNS)
+    given = parser.parse_args()
+    path = given.runs / "records.jsonl"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    done = {record["key"] for record in (*records_in(KEPT), *records_in(path))}
+    todo = [trial for trial in law_trials() if trial.key not in done][: given.most]
+    with path.open("a", encoding="utf-8") as file, at_most(1):
+        for count, trial in enumerate(todo, 1):
+            record = study_of_laws(trial)
+            file.write(json.dumps(record) + "\n")
+            file.flush()
+            said = record.get("left_out") or record["best"] or ", ".join(record["others"]) or "nothing"
+            print(f"{count} of {len(todo)}: {record['key']} {trial.hide}: {said}", flush=True)
+
+
+if __name__ == "__main__":
+    from laws import main  # by its name, so that places are known between data sets
+
+    main()
