@@ -13,7 +13,7 @@ from typing import Any
 import hidden_laws
 import numpy as np
 import pandas as pd
-from blind_sets import PLACES, hash_of, model_of, place_of
+from blind_sets import PLACES, hash_of, place_of
 from blind_truth import perfect_site, site_of_nature, true_values
 
 from vegglue.arrays import Array
@@ -22,7 +22,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.screening.candidates import Candidate, candidates_of
+from vegglue.screening.candidates import Candidate
 from vegglue.twins.hidden_effect import TwinBase, VisibilityError, chosen_effect
 from vegglue.twins.sealed_answer import Hidden
 
@@ -37,9 +37,14 @@ CELLS_OF_TRUTH, STEADY_ENOUGH = (0.5, 0.1875), 2e-5
 HELD_OUT, LIKE = "held out", "mid"
 HELD_OUT_SETTING = Experiment(discharge={"upstream": 2.6}, level=1.0)
 # How often each hidden law is drawn anew, and data sets with nothing hidden.
-TIMES, NOTHING = 4, 25
-# Stages of effects that change a term of the grammar: those hidden as listed effects, and left out in turn.
-STAGES = ("plants", "resistance", "exchange")
+TIMES, NOTHING = 3, 25
+# Listed effects that change a term of the grammar: hidden, and left out in turn.
+LISTED = (
+    "streamlining", "depth_dependent_bank", "viscosity", "bed_trend", "canopy_deflection", "bank_vegetation",
+    "mixing_length", "debris_screen", "bank_trend", "edge_mixing", "depth_dependent_bed", "undergrowth",
+    "bank_difference", "elder", "density_trend", "steep_bank", "smagorinsky", "foliage", "stem_blockage",
+    "coherent_structures", "edge_thinning", "wake_mixing",
+)  # fmt: skip
 # What is not off on a site where it would be of the kind that is hidden, see `site_of_nature`.
 SAME_KIND = {"plants": ("patch_density", "emergent_part"), "viscosity": ("viscosity",)}
 
@@ -73,21 +78,14 @@ class LawDataSet:
 
 def law_trials() -> list[LawTrial]:
     """All data sets, mixed so that a study that is stopped has some of each kind."""
-    laws, listed = [law.name for law in hidden_laws.HIDDEN_LAWS], hidden_listed()
-    hidden = {"law": laws * TIMES, "listed": listed, "nothing": [""] * NOTHING}
+    laws = [law.name for law in hidden_laws.HIDDEN_LAWS]
+    hidden = {"law": laws * TIMES, "listed": list(LISTED), "nothing": [""] * NOTHING}
     mixed = [
         ((number + 0.5) / len(names), LawTrial(group, number, name))
         for group, names in hidden.items()
         for number, name in enumerate(names)
     ]
     return [trial for _, trial in sorted(mixed, key=lambda pair: pair[0])]
-
-
-def hidden_listed() -> list[str]:
-    """Listed effects on resistance, plants and exchange in the short channel."""
-    model = model_of(STUDY)
-    found = [one for one in candidates_of(model.case, model.station) if one.effect.stage in STAGES]
-    return [one.name for one in found]
 
 
 def knowing_hidden(case: Case) -> Case:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from blind_sets import model_of
 from hidden_laws import BY_NAME, EFFECTS, HIDDEN_LAWS, RANGES, acting
-from law_sets import NOTHING, TIMES, held_out_stations, hidden_listed, law_trials
+from law_sets import LISTED, NOTHING, TIMES, held_out_stations, law_trials
 from second_hidden_laws import LAW_DRAG, LAW_MIXING
 
 from vegglue.effects.grammar import LAWS
@@ -15,12 +15,15 @@ from vegglue.screening.candidates import candidates_of
 
 
 def test_every_set_is_planned_once_and_all_kinds_begin_early() -> None:
-    trials, listed = law_trials(), hidden_listed()
-    assert len({one.key for one in trials}) == len(trials) == TIMES * len(HIDDEN_LAWS) + NOTHING + len(listed)
+    trials = law_trials()
+    assert len({one.key for one in trials}) == len(trials) == TIMES * len(HIDDEN_LAWS) + NOTHING + len(LISTED)
     assert {one.group for one in trials[:12]} == {"law", "listed", "nothing"}
     assert {one.hide for one in trials if one.group == "law"} == set(BY_NAME)
-    assert "streamlining" in listed
-    assert "wind" not in listed
+
+
+def test_listed_effects_that_are_hidden_are_listed() -> None:
+    model = model_of("twin")
+    assert set(LISTED) <= {one.name for one in candidates_of(model.case, model.station)}
 
 
 def test_hidden_laws_are_in_no_list_and_no_search() -> None:
