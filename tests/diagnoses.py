@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
@@ -76,6 +77,19 @@ def a_field(**fields: Any) -> FieldFound:
     return replace(usual, **fields)
 
 
+def laws_suspected_of(*names: str, **fields: Any) -> LawsSuspected:
+    """Laws of the speed on the banks, of these names and chances that fall by half; fields: to be changed."""
+    laws = tuple(
+        LawSuspected(
+            name=name, term="friction of the banks", quantity="the speed",
+            title="Friction of the banks changes at one value of the speed", equation="k -> k exp(a g)",
+            reference=0.4, scale=0.5, strength=-0.8, chance=0.5 ** (number + 1),
+        )
+        for number, name in enumerate(names)
+    )  # fmt: skip
+    return replace(LawsSuspected(p=1 / 3001, tried=65, chance=sum(one.chance for one in laws), laws=laws), **fields)
+
+
 def a_diagnosis(
     suspects: tuple[Suspect, ...] | None = None, steps: tuple[Step, ...] | None = None, **parts: dict[str, Any]
 ) -> Diagnosis:
@@ -144,4 +158,5 @@ EVERY_KIND = replace(
     places=(a_location(term="inflow", effect="unlisted_inflow", unit="m3/s"), a_location(term="bed", odds={})),
     instruments=(an_instrument(), an_instrument(kind="probe", x=np.nan, stations=(0, 3), interval95=(-np.inf, 0.2))),
     field=a_field(),
+    laws=laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp"),
 )

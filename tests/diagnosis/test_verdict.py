@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import a_field, a_location, a_suspect, an_instrument
+from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspected_of
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.conclusion import chance_of_misfit
@@ -235,6 +235,36 @@ def test_a_field_is_none_of_the_known_effects() -> None:
     bed = a_field(term="bed", value=-0.12)
     assert "the bed level that differs" in said(grounds(misfit=MISSES, field=bed))[1]
     assert "(-0.12 m)" in said(grounds(misfit=MISSES, field=bed))[1]
+
+
+# What competed last and led to nothing.
+UNSURE = (Contender("effect", "wind", 3.0, 0, None),)  # type: ignore[arg-type]
+LIKELY = laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp")
+
+
+def test_a_law_is_none_of_the_known_effects() -> None:
+    kind, sentence, remarks = said(grounds(laws=LIKELY, misfit=MISSES))
+    assert kind == "none-of-these"
+    assert "a law of the speed in friction of the banks would explain it, with a chance of 75% among all" in sentence
+    assert "`vegglue discover`" in sentence
+    assert "still larger than the errors allow" not in remarks, "it is that without the law"
+    assert said(grounds(laws=LIKELY, undecided=UNSURE))[0] == "none-of-these"
+
+
+def test_where_laws_stand_out_nothing_missing_is_never_said() -> None:
+    """Not where they are less likely than all else together either, nor where a parameter lies far off its prior."""
+    for told in (grounds(laws=laws_suspected_of("a", chance=0.2)), grounds(laws=LIKELY, strained=("k_s", 4.5))):
+        kind, sentence, _ = said(told)
+        assert kind == "cannot-tell"
+        assert "a law of the speed" in sentence
+        assert "`vegglue discover`" in sentence
+
+
+def test_a_law_beside_what_was_found_is_a_remark() -> None:
+    for beside in ({"places": (a_location(),)}, {"undecided": UNSURE, "strained": ("k_s", 4.5)}):
+        _, sentence, remarks = said(grounds(laws=LIKELY, **beside))
+        assert "a law of" not in sentence
+        assert "To first order a law of the speed in friction of the banks" in remarks
 
 
 AT_ITS_END = {"value": 1.0, "support": (-1.0, 1.0), "scale": 0.5}

@@ -11,10 +11,10 @@ import pytest
 
 from vegglue.case.config import load_case
 from vegglue.discovery.discovered import Discovery
-from vegglue.discovery.laws_in_case import LEAST_SPREAD, laws_in_case
 from vegglue.discovery.search import discover_laws
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
+from vegglue.screening.laws_in_case import LEAST_SPREAD, laws_in_case
 from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
 

@@ -43,6 +43,8 @@ def plain(words: str) -> str:
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m"),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "I cannot tell <it>."}), "cannot tell &lt;it&gt;."),
         (replace(EVERY_KIND, field=a_field()), "over some 15 m along"),
+        (replace(EVERY_KIND, field=None, places=()),
+         "missing from this model that is in no list: friction of the banks changes at one value of the speed."),
     ],
 )  # fmt: skip
 def test_every_verdict_is_one_plain_sentence(toy: Run, found, said: str) -> None:

@@ -18,8 +18,8 @@ from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, wr
 HASH = "d" * 64
 ATTRIBUTES = {
     "chi2", "chi2_first", "config", "config_hash", "correlation", "field", "first_parameters", "first_scores",
-    "flagged", "format", "freedom", "grid_error", "instruments", "locations", "mapped_term", "model_error", "name",
-    "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "threshold", "verdict",
+    "flagged", "format", "freedom", "grid_error", "instruments", "laws", "locations", "mapped_term", "model_error",
+    "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "threshold", "verdict",
     "version", "where",
 }  # fmt: skip
 OF_STATIONS = [
@@ -45,7 +45,8 @@ DATASETS = {
 }
 IN_JSON = [
     "verdict", "sentence", "set", "groups", "not_excluded", "where", "effects", "steps", "remarks", "chi2", "threshold",
-    "noise", "flagged", "parameters", "first_parameters", "places", "instruments", "field", "model_error", "zones",
+    "noise", "flagged", "parameters", "first_parameters", "places", "instruments", "field", "model_error", "laws",
+    "zones",
 ]  # fmt: skip
 
 

@@ -6,11 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from diagnoses import a_diagnosis
+from diagnoses import a_diagnosis, laws_suspected_of
 from reach import vegglue
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
+from vegglue.results.causes import LawsSuspected
 from vegglue.workflow import run as whole_way
 
 ROOT = Path(__file__).parents[2]
@@ -62,10 +63,12 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> N
     assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}
 
 
-def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch) -> tuple[list[str], list[str]]:
+def gone(
+    kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch, laws: LawsSuspected | None = None
+) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
     found = a_diagnosis(verdict={"kind": kind})
-    found = SimpleNamespace(verdict=found.verdict, places=found.places[:1] * places)
+    found = SimpleNamespace(verdict=found.verdict, places=found.places[:1] * places, laws=laws)
     rungs = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
     alone = SimpleNamespace(rungs=(TWIN.name,), left_out=None)
     made, shown, kept = list[str](), list[str](), list[str]()
@@ -97,6 +100,12 @@ def gone(kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPa
 
 def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(monkeypatch: pytest.MonkeyPatch) -> None:
     assert gone("none-of-these", 0, 0.01, monkeypatch) == (["twin-law"], ["law"])
+
+
+@pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("cannot-tell", 0)])
+def test_a_law_that_stands_out_is_searched(kind: str, places: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = laws_suspected_of("law_bank_speed_step")
+    assert gone(kind, places, 0.01, monkeypatch, laws) == (["twin", "twin-law"], ["law"])
 
 
 def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:

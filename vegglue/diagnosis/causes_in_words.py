@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vegglue.diagnosis.findings import Findings
+from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
     FieldFound,
@@ -60,6 +61,16 @@ def field_sentence(field: FieldFound) -> str:
     return (
         f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
         f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
+    )
+
+
+def law_in_words(laws: LawsSuspected) -> str:
+    """Which quantity in which term, and how likely."""
+    best, chance = laws.laws[0], sum(one.chance for one in laws.alike)
+    told = "over 99%" if chance > 0.99 else f"{chance:.0%}"
+    return (
+        f"a law of {best.quantity} in {best.term} would explain it, with a chance of {told} among all that was "
+        f"compared to first order; errors alone make laws stand out as much in {100 * laws.p:.1g}% of cases"
     )
 
 

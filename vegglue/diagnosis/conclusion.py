@@ -1,6 +1,7 @@
 """What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import scipy.stats
@@ -13,6 +14,7 @@ from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
+from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
 from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged
 from vegglue.engine.interface import Model
@@ -45,23 +47,13 @@ def concluded(
     first: Screening, last: Screening, found: Findings, suspects: Mapping[str, Suspect], unseen: Model | None
 ) -> Diagnosis:
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
+    laws = laws_suspected(first, last, found)
+    if found.places and not found.instruments and clearly_a_law(laws):
+        last, found = first, replace(found, places=(), explained=0.0, log_prior=0.0)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
-    misfit, errors = _misfit(first, last, found), _errors(last, found)
-    model_error = _model_error(last)
-    field, field_map = _field(first, last, found, misfit)
-    silent = not (found.steps or found.places or found.undecided)
-    grounds = Grounds(
-        errors=errors,
-        misfit=misfit,
-        findings=found,
-        field=field,
-        model_error=model_error,
-        not_excluded=() if found.absurd else not_excluded(last),
-        unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
-        neighbours=_neighbours_aside(last, found),
-        strained=_strained(last),
-        between=largest_error_between(last.base) if silent else 1.0,
-    )
+    misfit = _misfit(first, last, found)
+    field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
+    grounds = replace(_grounds(last, found, misfit, unseen), field=field, laws=laws)
     base, before = last.base, first.base
     return Diagnosis(
         name=before.model.case.name,
@@ -70,7 +62,7 @@ def concluded(
         suspects=ranked,
         steps=found.steps,
         misfit=misfit,
-        errors=errors,
+        errors=grounds.errors,
         first_screening=_first_screening(first),
         parameters=_parameters(before, base),
         predictions=Predictions(
@@ -83,8 +75,26 @@ def concluded(
         places=found.places,
         instruments=found.instruments,
         field=field,
-        model_error=model_error,
+        model_error=grounds.model_error,
         field_map=field_map,
+        laws=laws,
+    )
+
+
+def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | None) -> Grounds:
+    """What the verdict rests on, but for fields and laws."""
+    silent = not (found.steps or found.places or found.undecided)
+    return Grounds(
+        errors=_errors(last, found),
+        misfit=misfit,
+        findings=found,
+        field=None,
+        model_error=_model_error(last),
+        not_excluded=() if found.absurd else not_excluded(last),
+        unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
+        neighbours=_neighbours_aside(last, found),
+        strained=_strained(last),
+        between=largest_error_between(last.base) if silent else 1.0,
     )
 
 

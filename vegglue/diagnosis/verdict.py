@@ -12,11 +12,13 @@ from vegglue.diagnosis.causes_in_words import (
     causes_in_words,
     field_sentence,
     instruments_in_words,
+    law_in_words,
     model_error_in_words,
     with_their_chances,
 )
 from vegglue.diagnosis.findings import Findings
-from vegglue.results.causes import FaultyInstrument
+from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
+from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import (
     EstimatedErrors,
     FieldFound,
@@ -56,13 +58,15 @@ ABSURD, FAR_OFF = 4.0, 4.0
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = 0.01
+TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
 
 
 @dataclass(frozen=True)
 class Grounds:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
     neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
-    far; between: errors between the sections that were measured, over those of the data [-], at most.
+    far; between: errors between the sections that were measured, over those of the data [-], at most; laws: those that
+    stand out.
     """
 
     errors: EstimatedErrors
@@ -75,6 +79,7 @@ class Grounds:
     neighbours: bool
     strained: tuple[str, float]
     between: float = 1.0
+    laws: LawsSuspected | None = None
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
@@ -82,8 +87,9 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     found, misfit = grounds.findings, grounds.misfit
     open_still = _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     kind, sentence = _sentence(grounds, suspects)
+    law = grounds.laws is not None and law_in_words(grounds.laws) in sentence
     remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
-    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR:
+    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."
         )
@@ -97,6 +103,9 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         return "cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}"
     doubt = _doubt(grounds, suspects)
     named = causes_in_words(found, suspects)
+    nothing = not (found.places or found.steps or found.undecided or grounds.field)
+    if grounds.laws is not None and (nothing or (not doubt and law_goes_first(grounds.laws, found))):
+        return _with_a_law(grounds.laws, misfit, doubt)
     if grounds.field is not None:
         words = field_sentence(grounds.field) + (f", rather than {named}" if named else "")
         return "none-of-these", f"None of the known effects: {words} ({_told(misfit)} without it)."
@@ -116,6 +125,16 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         names = " or ".join(one.name for one in found.undecided[:3])
         return "cannot-tell", f"These data cannot tell: {names} stands out, but none of them surely ({_told(misfit)})."
     return _without_findings(grounds, suspects)
+
+
+def _with_a_law(laws: LawsSuspected, misfit: Misfit, doubt: str) -> tuple[VerdictKind, str]:
+    """A law where no known effect explains the misfit."""
+    law = f"{law_in_words(laws)} ({_told(misfit)} without it)"
+    if doubt:
+        return "cannot-tell", f"These data cannot tell: {doubt}. To first order {law}. {TO_DISCOVER}"
+    if is_likelier(laws):
+        return "none-of-these", f"None of the known effects: {law}. {TO_DISCOVER}"
+    return "cannot-tell", f"These data cannot tell whether anything is missing: {law}. {TO_DISCOVER}"
 
 
 def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
@@ -232,6 +251,8 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> li
     errors, remarks = grounds.errors, []
     if grounds.model_error is not None:
         remarks.append(model_error_in_words(grounds.model_error))
+    if grounds.laws is not None and (law := law_in_words(grounds.laws)) not in sentence:
+        remarks.append(f"To first order {law}. {TO_DISCOVER}")
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:

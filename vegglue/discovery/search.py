@@ -16,19 +16,16 @@ from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempe
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.discovery.discovered import Discovery, LawFound
-from vegglue.discovery.law_screening import LawScreening, screen_laws
 from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent
-from vegglue.screening.evidence import prior_shrinkage
+from vegglue.screening.law_screening import LawScreening, screen_laws
 from vegglue.screening.score_test import ALIKE
 
 # Laws that are calibrated at most; as many as listed effects in a diagnosis. Chosen, not measured: each costs a fit.
 MOST_LAWS_REFITTED = 8
 # Chance that the set of laws and other causes holds together [-].
 HELD = 0.95
-# Largest size that a fit starts from, over the plausible one [-]: beyond, a flow may not be found.
-LARGEST_START = 3.0
 
 
 def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
@@ -53,7 +50,7 @@ def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = sile
 def _laws(screening: LawScreening, watch: Watch) -> list[Contender]:
     """The most promising laws, calibrated, with their evidence."""
     evidence = screening.kind.log_evidence
-    best = np.array([columns[np.argmax(evidence[columns])] for columns in screening.columns])
+    best = np.array([screening.best_column(j) for j in range(len(screening.laws))])
     order = np.argsort(-evidence[best])[:MOST_LAWS_REFITTED]
     top = max(float(evidence[best].max()), *(kind.total for kind in screening.listed.kinds))
     reach = [int(j) for j in order if (top - evidence[best[j]]) / tempering(np.array(top)) < REACH]
@@ -68,12 +65,9 @@ def _laws(screening: LawScreening, watch: Watch) -> list[Contender]:
 
 def _trial(screening: LawScreening, law: int, column: int) -> RefitTrial:
     """A law at its best reference, from the best place and the size of its score."""
-    kind, search, one = screening.kind, screening.listed.search, screening.laws[law].candidate
-    length = max(float(kind.projected.length[column]), 1e-300)
-    gain = float(kind.scores[column] / length * prior_shrinkage(kind.size[column]))
-    gain = float(np.clip(gain, -LARGEST_START * one.amplitude.scale, LARGEST_START * one.amplitude.scale))
-    shapes = screening.settings[column]
-    return RefitTrial(one, shapes, (start_with(search.model.case, one, shapes, search.point.z, gain),))
+    search, one, shapes = screening.listed.search, screening.laws[law].candidate, screening.settings[column]
+    start = start_with(search.model.case, one, shapes, search.point.z, screening.gain(law))
+    return RefitTrial(one, shapes, (start,))
 
 
 def _charge(screening: LawScreening, law: int) -> float:

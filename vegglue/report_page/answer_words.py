@@ -49,6 +49,9 @@ def headline(run: Run) -> str:
         return f"The model is sound, but an instrument is off: {which}."
     if kind == "none-of-these" and found.field is not None:
         return f"Something is missing that is in no list: {field_in_words(found)}."
+    if kind == "none-of-these" and found.laws is not None and not found.places:
+        title = html.escape(found.laws.laws[0].title)
+        return f"Something {tense} missing from {model} that is in no list: {title[:1].lower()}{title[1:]}."
     if kind in ("identified", "one-of", "none-of-these"):
         return _what_is_missing(found, model, tense)
     return html.escape(found.verdict.sentence)
@@ -120,7 +123,9 @@ def why_not_to_rely(run: Run) -> str:
 
 
 def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
-    if found is not None and found.misfit.p < UNBELIEVED and found.verdict.kind != "cannot-tell":
+    if found is None or (found.laws is not None and not found.places):  # the misfit is that without the law
+        return
+    if found.misfit.p < UNBELIEVED and found.verdict.kind != "cannot-tell":
         yield "what is left of the misfit is still larger than the errors allow"
 
 

@@ -1,4 +1,4 @@
-"""Causes other than listed effects that a diagnosis found: places, instruments, fields, the model's own error."""
+"""Causes other than listed effects that a diagnosis found: places, instruments, fields, laws, the model's own error."""
 
 from dataclasses import dataclass
 
@@ -94,6 +94,48 @@ class FieldMapKept:
     y: Array
     value: Array
     error: Array
+
+
+@dataclass(frozen=True)
+class LawSuspected:
+    """A law of the grammar, to first order: its name in the library, the term it changes and the quantity it depends on
+    in words, its equation, reference r (None: none), a plausible strength a and the one found [-], and its chance among
+    all that was compared [-].
+    """
+
+    name: str
+    term: str
+    quantity: str
+    title: str
+    equation: str
+    reference: float | None
+    scale: float
+    strength: float
+    chance: float
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """The shapes of its effect."""
+        return {} if self.reference is None else {"reference": self.reference}
+
+
+@dataclass(frozen=True)
+class LawsSuspected:
+    """Laws that stand out where no listed effect was accepted. p: chance that errors alone make laws stand out as much;
+    tried: how many; chance: of all of them together among all that was compared [-]; laws: the likeliest first, those
+    that hold 95 % of it.
+    """
+
+    p: float
+    tried: int
+    chance: float
+    laws: tuple[LawSuspected, ...]
+
+    @property
+    def alike(self) -> tuple[LawSuspected, ...]:
+        """Laws of the same term and quantity as the likeliest."""
+        best = self.laws[0]
+        return tuple(one for one in self.laws if (one.term, one.quantity) == (best.term, best.quantity))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,15 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.in_short import in_short, interval_in_short
 from vegglue.measurements.kinds import stations_in_short
-from vegglue.results.causes import FaultyInstrument, FieldFound, FieldMapKept, Location, ModelErrorUsed, PlaceMap
+from vegglue.results.causes import (
+    FaultyInstrument,
+    FieldFound,
+    FieldMapKept,
+    LawsSuspected,
+    Location,
+    ModelErrorUsed,
+    PlaceMap,
+)
 
 # instrument: nothing is missing but that some readings are off.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
@@ -183,7 +191,9 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found in the case `name`, by which version; field_map: where there is a field."""
+    """Everything a diagnosis found in the case `name`, by which version; field_map: where there is a field; laws:
+    where they stand out.
+    """
 
     name: str
     version: str
@@ -201,6 +211,7 @@ class Diagnosis:
     field: FieldFound | None = None
     model_error: ModelErrorUsed | None = None
     field_map: FieldMapKept | None = None
+    laws: LawsSuspected | None = None
 
     @property
     def set(self) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter
 
+from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
@@ -130,6 +131,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "instruments": [asdict(one) for one in diagnosis.instruments],
         "field": None if diagnosis.field is None else asdict(diagnosis.field),
         "model_error": None if diagnosis.model_error is None else asdict(diagnosis.model_error),
+        "laws": None if diagnosis.laws is None else asdict(diagnosis.laws),
     }
     return plain | {name: json.dumps(value) for name, value in composed.items()}
 
@@ -167,6 +169,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         field=_parsed(FieldFound | None, attributes["field"]),
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
+        laws=_parsed(LawsSuspected | None, attributes["laws"]),
     )
     _refuse_strays(found)
     return found

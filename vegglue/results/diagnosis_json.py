@@ -32,6 +32,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "instruments": [asdict(one) for one in diagnosis.instruments],
         "field": None if diagnosis.field is None else asdict(diagnosis.field),
         "model_error": None if diagnosis.model_error is None else asdict(diagnosis.model_error),
+        "laws": None if diagnosis.laws is None else asdict(diagnosis.laws),
         "zones": misfit.zones.to_dict("records"),
     }
     return {name: _plain(value) for name, value in tree.items()}

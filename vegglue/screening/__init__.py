@@ -1,4 +1,4 @@
-"""Candidates for effects that a calibrated model lacks, their fingerprints, score tests and evidence.
+"""Candidates for effects and laws that a calibrated model lacks, their fingerprints, score tests and evidence.
 
 May import: effects, case, site, measurements, flow, engine, calibration.
 Open first: candidates.py, residual_screening.py, evidence.py.

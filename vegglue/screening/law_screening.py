@@ -10,19 +10,21 @@ from itertools import pairwise
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, search_model
-from vegglue.discovery.laws_in_case import LawInCase, laws_in_case
 from vegglue.engine.interface import responses
 from vegglue.screening import score_test
 from vegglue.screening.candidates import cause_of
-from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses
+from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses, prior_shrinkage
 from vegglue.screening.family_wise_p import family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
+from vegglue.screening.laws_in_case import LawInCase, laws_in_case
 from vegglue.screening.residual_screening import GROUPS, Screening, kind_of_listed, screen
 from vegglue.site.channel_geometry import half_width
 
 # All listed effects together are so many times as likely before the data as all laws together: strong evidence, as
 # between kinds elsewhere, is asked of a law before it is preferred to an effect that others have seen in nature.
 LISTED_ODDS = 10.0
+# Largest strength to first order, over the plausible one [-]: beyond, a flow may not be found.
+LARGEST_GAIN = 3.0
 LAW_SEED = 1  # of the draws of errors alone, as in `screen`
 
 
@@ -42,18 +44,43 @@ class LawScreening:
     cosine: np.ndarray
 
     @property
+    def of_each(self) -> np.ndarray:
+        """ln evidence of each law, all its references together (law,) [-]."""
+        evidence = self.kind.log_evidence
+        return np.array([np.logaddexp.reduce(evidence[columns]) for columns in self.columns])
+
+    def best_column(self, law: int) -> int:
+        """Of the fingerprint of a law with the most evidence, in `kind`."""
+        columns = self.columns[law]
+        return int(columns[np.argmax(self.kind.log_evidence[columns])])
+
+    def gain(self, law: int) -> float:
+        """Its strength to first order, not beyond LARGEST_GAIN plausible ones [-]."""
+        column, scale = self.best_column(law), self.laws[law].candidate.amplitude.scale
+        length = max(float(self.kind.projected.length[column]), 1e-300)
+        gain = float(self.kind.scores[column] / length * prior_shrinkage(self.kind.size[column]))
+        return float(np.clip(gain, -LARGEST_GAIN * scale, LARGEST_GAIN * scale))
+
+    @property
     def of_listed(self) -> int:
         """The number of columns of listed effects."""
         return len(self.listed.fingerprints.settings)
 
 
-def screen_laws(base: Baseline, without: tuple[str, ...] = ()) -> LawScreening:
-    """Score tests of a calibrated model with laws; without: listed effects that are left out."""
+def screen_laws(
+    base: Baseline,
+    without: tuple[str, ...] = (),
+    flagged: tuple[int, ...] = (),
+    known: Fingerprints | None = None,
+) -> LawScreening:
+    """Score tests of a calibrated model with laws; without: listed effects that are left out; flagged, known: readings
+    set aside, and fingerprints of what is listed, see `screen`.
+    """
     search = search_model(base)
-    listed = _left(fingerprints_of(search, half_width(base.model.site)), without)
+    listed = _left(known or fingerprints_of(search, half_width(base.model.site)), without)
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
     every = _with_laws(listed, laws, base)
-    full = screen(base, (), every, LAW_SEED)
+    full = screen(base, flagged, every, LAW_SEED)
     count = len(listed.settings)
     columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
     kind = _kind_of_laws(full, columns, count)

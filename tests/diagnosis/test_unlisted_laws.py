@@ -1,0 +1,91 @@
+"""Laws beside everything listed: their alarm, what they are compared with, and what a diagnosis says of them."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnoses import a_location, laws_suspected_of
+
+from vegglue.case.config import load_case
+from vegglue.diagnosis import unlisted_laws
+from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_suspected
+from vegglue.effects.grammar import LAWS
+from vegglue.results.causes import LawsSuspected
+from vegglue.results.diagnosis import Step
+from vegglue.twins.twin import measured_twin, true_place, twin_base
+from vegglue.workflow.run_folder import model_in
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
+
+
+def suspected(
+    patched: pytest.MonkeyPatch, found: Findings, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,)
+) -> LawsSuspected | None:
+    """What is said of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences."""
+    laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
+            for name in NAMES]  # fmt: skip
+    screening = SimpleNamespace(
+        p=p, of_each=np.array([9.0, 7.0, 1.0]), laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
+        best_column=lambda law: law, gain=lambda law: -0.5,
+    )  # fmt: skip
+    patched.setattr(unlisted_laws, "screen_laws", lambda *_: screening)
+    kinds = tuple(SimpleNamespace(total=one) for one in rivals)
+    last: Any = SimpleNamespace(base=None, flagged=(), fingerprints=None, kinds=kinds)
+    return laws_suspected(last, last, found)
+
+
+def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = suspected(monkeypatch, Findings())
+    assert laws is not None
+    assert [one.name for one in laws.laws] == list(NAMES[:2])
+    assert laws.chance > 0.95
+    assert laws.alike == laws.laws, "of the same term and quantity"
+    assert laws.laws[0].shapes == {"reference": 0.4}
+    assert "|U|/0.4 m/s" in laws.laws[0].equation
+
+
+def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = suspected(monkeypatch, Findings(), rivals=(0.0, 20.0))
+    assert laws is not None
+    assert laws.chance < 0.1
+    assert not clearly_a_law(laws)
+
+
+def test_their_alarm_keeps_its_rate_and_listed_effects_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
+    assert suspected(monkeypatch, Findings(), p=LAW_ALARMS) is None
+    assert suspected(monkeypatch, Findings(steps=(step,))) is None
+    assert suspected(monkeypatch, Findings(absurd=("levels lie below the bed.",))) is None
+
+
+def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To explain more than laws it has to have gained more evidence."""
+    monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
+    chances = []
+    for gained in (1.0, 30.0):
+        laws = suspected(monkeypatch, Findings(places=(a_location(),), log_prior=gained))
+        assert laws is not None
+        chances.append(laws.chance)
+    assert chances[0] > 0.9 > 0.1 > chances[1]
+    assert clearly_a_law(laws_suspected_of("a", chance=0.92))
+    assert not clearly_a_law(laws_suspected_of("a", chance=0.9))
+
+
+@pytest.mark.slow
+def test_a_law_that_is_in_no_list_is_not_nothing() -> None:
+    """The example of docs/discover.md. `diagnose` alone once said that nothing was missing."""
+    model = model_in(load_case(CONFIG))
+    ground = twin_base(model, true_place(len(model.names), 2))
+    station, _ = measured_twin(ground, ["law_viscosity_offset_step=-1.12"], 8.0, "white", 2)
+    found = diagnose_model(replace(model, station=station))
+    assert found.laws is not None
+    assert found.verdict.kind == "none-of-these"
+    best = found.laws.laws[0]
+    assert (best.term, best.quantity) == ("the eddy viscosity", "the distance from the axis")
+    assert best.strength < 0.0

@@ -1,0 +1,81 @@
+"""Laws that would explain what no listed effect does, to first order; `discover` calibrates them and writes one down.
+
+    p_j ~ exp((E_j - max E) / w_j)   over laws and all else that was compared, see `competition`
+
+They have an alarm of their own, which is asked after that of everything listed, and only where no listed effect was
+accepted: the listed library goes first.
+"""
+
+import numpy as np
+
+from vegglue.calibration.baseline import log_evidence
+from vegglue.diagnosis.competition import LEAST_ODDS, tempered_chances
+from vegglue.diagnosis.findings import Findings
+from vegglue.results.causes import LawsSuspected, LawSuspected
+from vegglue.screening.law_screening import LawScreening, screen_laws
+from vegglue.screening.residual_screening import Screening
+
+# How often errors alone sound the alarm of laws [-]: it comes on top of that of everything listed, which is sounded at
+# 5 %. Share of the chance of all laws that those told hold together.
+LAW_ALARMS, LAWS_HELD = 0.01, 0.95
+
+
+def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSuspected | None:
+    """Laws that stand out against the last model, or the first one where something at a place was accepted; None where
+    errors alone leave as much, or a listed effect explains the misfit.
+    """
+    if found.absurd or found.steps:
+        return None
+    at = first if found.places else last
+    screening = screen_laws(at.base, (), at.flagged, at.fingerprints)
+    if screening.p >= LAW_ALARMS:
+        return None
+    of_laws = screening.of_each
+    chances = tempered_chances(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
+    order = np.argsort(-chances)
+    count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
+    laws = tuple(_law(screening, int(j), float(chances[j])) for j in order[:count])
+    return LawsSuspected(screening.p, of_laws.size, float(chances.sum()), laws)
+
+
+def law_goes_first(laws: LawsSuspected | None, found: Findings) -> bool:
+    """Whether a law is told rather than what else may be said where nothing listed was accepted."""
+    return laws is not None and is_likelier(laws) and not found.places
+
+
+def is_likelier(laws: LawsSuspected) -> bool:
+    """Whether laws are likelier than all else together."""
+    return laws.chance > 0.5
+
+
+def clearly_a_law(laws: LawsSuspected | None) -> bool:
+    """Whether laws are LEAST_ODDS times as likely as all else together: a place then stands in for one."""
+    return laws is not None and laws.chance > LEAST_ODDS * (1.0 - laws.chance)
+
+
+def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
+    """ln evidence of what laws are compared with: what was accepted, else what was calibrated, else all that was
+    tested.
+    """
+    if found.places:
+        return [log_evidence(last.base) - log_evidence(first.base) + found.log_prior]
+    if found.undecided:
+        return [one.log_evidence for one in found.undecided]
+    return [kind.total for kind in last.kinds]
+
+
+def _law(screening: LawScreening, law: int, chance: float) -> LawSuspected:
+    one = screening.laws[law]
+    reference = screening.settings[screening.best_column(law)].get("reference")
+    unit = "" if one.law.quantity.unit == "-" else f" {one.law.quantity.unit}"
+    return LawSuspected(
+        name=one.law.name,
+        term=one.law.term.words,
+        quantity=one.law.quantity.words,
+        title=one.law.title,
+        equation=one.law.equation("" if reference is None else f"{reference:g}{unit}"),
+        reference=reference,
+        scale=one.candidate.amplitude.scale,
+        strength=screening.gain(law),
+        chance=chance,
+    )
