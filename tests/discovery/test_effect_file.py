@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from vegglue.case.config import load_case
+from vegglue.case.schema import Experiment
 from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.discovery.effect_file import effect_name, effect_text
 from vegglue.effects.grammar import LAWS, Law
 from vegglue.errors import InputError
 from vegglue.workflow import discover as verb
-from vegglue.workflow.check import check_effects
+from vegglue.workflow.check import check_effects, doubts_of
 from vegglue.workflow.discover import DiscoveredCase, discover
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -72,6 +73,32 @@ def test_the_law_becomes_a_file_and_a_child(monkeypatch: pytest.MonkeyPatch, tmp
     assert result.child is not None
     assert list(result.child.effects) == ["bank_speed_step"]
     assert "bank_speed_step_strength" in result.child.parameters
+
+
+@pytest.mark.parametrize(
+    ("seen", "doubted"), [((0.1, 0.9), []), ((0.1, 0.35), ["mid", "high"]), ((0.5, 0.9), ["low", "mid", "high"])]
+)
+def test_a_law_beyond_its_range_is_doubted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, seen: tuple[float, float], doubted: list[str]
+) -> None:
+    """In the experiments whose measured cells lie outside, by the numbers that its file holds."""
+    child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=seen)).child
+    assert child is not None
+    said = doubts_of(child)
+    assert [name for name in child.experiments if any(f"`{name}`" in one for one in said)] == doubted
+    for one in said:
+        assert one.startswith(
+            f"`bank_speed_step` was seen for |U| from {seen[0]:g} to {seen[1]:g} m/s; in experiment `"
+        )
+        assert "of the cells that it acts on under its measured sections lie outside, where it is a guess." in one
+
+
+def test_a_law_is_doubted_where_nothing_is_measured_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
+    assert child is not None
+    dry = Experiment(discharge={"upstream": 0.3}, level=0.4)
+    said = doubts_of(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}}))
+    assert any("`dry summer`" in one and "on under water lie outside" in one for one in said)
 
 
 def test_a_file_of_the_case_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -9,14 +9,11 @@ from vegglue.discovery.discovered import LawFound, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 
-IMPORTS = "import numpy as np\nfrom vegglue.effects.definition import Amplitude, Effect\n"
+IMPORTS = "import numpy as np\nfrom vegglue.effects.definition import Amplitude, Effect, SeenRange\n"
 TEXT = '''
 
 def {name}(cells, strength):
-    """{equation}.
-
-    Seen for {seen}; elsewhere it is a guess.
-    """
+    """{equation}."""
     g = {g}
     return {change}
 
@@ -27,6 +24,7 @@ EFFECTS = ({others}Effect(
     equation="{equation}",
     source="found by `vegglue discover`; seen for {seen}",
     amplitude=Amplitude("strength", "-", "strength a of the law", scale={scale:.2g}, low={low:g}, high={high:g}),
+    seen=SeenRange("{symbol}", "{unit}", lambda cells: {quantity}, {least:.2g}, {most:.2g}),
 ),)
 '''
 
@@ -52,5 +50,6 @@ def effect_text(found: LawFound, own: Path | None) -> str:
     return before + TEXT.format(
         name=name, equation=found.equation, seen=found.range_seen, g=g, change=change, stage=law.term.stage,
         others="" if own is None else "*EFFECTS, ", title=law.title, scale=found.scale, low=-law.form.strongest,
-        high=law.form.strongest,
+        high=law.form.strongest, symbol=law.quantity.symbol, unit=law.quantity.unit, quantity=law.quantity.written,
+        least=found.seen[0], most=found.seen[1],
     )  # fmt: skip

@@ -99,12 +99,26 @@ class Shape:
 
 
 @dataclass(frozen=True)
+class SeenRange:
+    """Where an effect was found to hold: its quantity as it is written, and the values that the data have seen of it
+    [unit]. of: the quantity of cells, or what else its stage gets to see.
+    """
+
+    symbol: str
+    unit: str
+    of: Callable[..., Array]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Effect:
     """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`.
 
     each: whether it is one cause for the whole case, or a cause of its own in each experiment, section, device
     or patch (a shape `patch` is then its number).
     mirrored: whether a mirrored flow feels the mirrored effect; if not, `equation` says what breaks the mirror.
+    seen: where it was found to hold, of a law that was discovered; elsewhere it is a guess, and commands say so.
     """
 
     name: str
@@ -120,6 +134,7 @@ class Effect:
     each: Literal["case", "experiment", "section", "device", "patch"] = "case"
     mirrored: bool = True
     tags: tuple[str, ...] = ()
+    seen: SeenRange | None = None
 
     @property
     def parameters(self) -> tuple[Amplitude | Shape, ...]:

@@ -42,8 +42,8 @@ class LawInCase:
 
 def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
     """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
-    flows = [_cells(model, point, experiment) for experiment in model.case.experiments]
-    measured = [_at_sections(model, cells, name) for cells, name in zip(flows, model.case.experiments, strict=True)]
+    flows = [centre_cells(model, point, experiment) for experiment in model.case.experiments]
+    measured = [at_sections(model, cells, name) for cells, name in zip(flows, model.case.experiments, strict=True)]
     found = []
     for law in LAWS.values():
         if SAME_AS.get(law.name) in listed or law.name in model.case.effects:
@@ -93,25 +93,25 @@ def _values(law: Law, cells: Cells) -> Array:
     return np.asarray(values[np.isfinite(values)])
 
 
-def _cells(model: Model, point: Point, experiment: str) -> Cells:
-    """The flow at cell centres of one experiment."""
+def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
+    """The flow at cell centres of one experiment, with friction and viscosity of 1."""
     flow = flow_at_centres(model, point, experiment)
     geometry = channel_geometry(model.case, model.site, experiment)
-    depth, nothing = flow.depth[..., None], np.zeros_like(flow.depth)[..., None]
+    depth, of_one = flow.depth[..., None], np.ones_like(flow.depth)[..., None]
     return Cells(
         geometry=geometry,
         depth=depth,
         level=depth + geometry.bed,
         u=flow.u[..., None],
         v=flow.v[..., None],
-        rate=nothing,
-        bed_rate=nothing,
-        viscosity=nothing,
+        rate=of_one,
+        bed_rate=of_one,
+        viscosity=of_one,
         shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9,
     )
 
 
-def _at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
+def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
     """The same, dry but for the columns in which velocities were measured."""
     station, grid = model.station_of(experiment), model.site.grid
     x = station["x"].to_numpy(float)[velocity_rows(station)]

@@ -3,17 +3,22 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.checks.case_check import check_case, doubts_about
 from vegglue.effects.library import effects_of
-from vegglue.engine.model import model_of
+from vegglue.engine.interface import linearise
+from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
+from vegglue.screening.beyond_seen import laws_beyond_their_range
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow.command_model import command_tried
-from vegglue.workflow.run_folder import folder_of
+from vegglue.workflow.run_folder import folder_of, model_in, validation_of
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
     """
     observations, site = read_observations(case), build_site(case)
     picture = folder_of(runs, case) / "channel.png"
-    remarks = check_case(case, site, observations)
+    remarks = [*check_case(case, site, observations), *_beyond_seen(case)]
     save_channel_figure(case, site, observations, picture)
     if case.engine is not None:
         remarks.append(command_tried(model_of(case, observations), picture.parent))
@@ -50,7 +55,22 @@ def doubts_of(case: Case) -> list[str]:
 
     Errors: InputError for a file that cannot be read.
     """
-    return doubts_about(case, build_site(case), read_observations(case))
+    return [*doubts_about(case, build_site(case), read_observations(case)), *_beyond_seen(case)]
+
+
+def _beyond_seen(case: Case) -> list[str]:
+    """Laws that are used where nobody has seen them, in the experiments of the case and of its validation.
+
+    Told of the flow in the middle of the prior on coarse cells: depths and speeds hang on discharge and outlet most.
+    """
+    if not any(effect_of(case, key).seen for key in case.effects) or case.engine is not None:
+        return []
+    found: list[str] = []
+    for model in filter(None, (model_in(case), validation_of(case))):
+        cheap = coarser(model) or model
+        point = linearise(cheap, np.zeros(len(cheap.names)))
+        found += [] if point is None else list(laws_beyond_their_range(cheap, point))
+    return list(dict.fromkeys(found))
 
 
 @one_thread()
