@@ -10,11 +10,14 @@ from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
+from vegglue.effects.grammar import LAWS
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
+from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.screening.candidates import Candidate
 from vegglue.storage.kept_words import write_questions
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import calibrated, folder_of
@@ -23,6 +26,8 @@ from vegglue.workflow.run_folder import calibrated, folder_of
 HIDDEN = 4
 # Measurements shown of each question, and kept for the page: more than these nobody plans in one season.
 KEPT = 4
+# Laws that one question is about at most: of more, two that are alike decide what no measurement answers.
+MOST_LAWS = 3
 # A measurement that raises D^2 by less than a tenth is said to add nothing.
 ADDS = 1.1
 
@@ -64,16 +69,18 @@ def next_measurement(
 ) -> list[Question]:
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
-    between: names of effects, else those that the diagnosis could not tell apart, step by step; where it found nothing,
-    the strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept,
-    in questions.json. Errors: InputError for a name that is not in the diagnosis.
+    between: names of effects or laws, else those that the diagnosis could not tell apart, step by step; where a law
+    stands out, the laws that could be it; where it found nothing, the strongest of those it could not test, each by
+    itself at a plausible size. Only questions nobody chose are kept, in questions.json. Errors: InputError for a name
+    that is not in the diagnosis.
     """
     wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
-    by_name = {one.name: one for one in found.suspects}
-    unknown = [name for name in between if name not in by_name]
+    by_name = [one.name for one in found.suspects]
+    possible = [*by_name, *_laws_by_name(found)]
+    unknown = [name for name in between if name not in possible]
     if unknown:
-        raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(by_name)}.")
+        raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(possible)}.")
     asked = _asked(case, found, between) if between else _questions(case, found)
     questions: list[Question] = []
     if asked:
@@ -104,6 +111,9 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     """What the diagnosis leaves open, in words, and the rivals of each question."""
     if found.steps:
         return [one for step in found.steps if len(step.rivals) > 1 for one in _asked(case, found, step.rivals)]
+    laws = laws_to_tell_apart(found.laws)
+    if len(laws) > 1:
+        return _asked(case, found, laws)
     # What calibration hides best, of all that would leave a trace without it.
     hidden = [one for one in found.suspects if not one.detectability.testable]
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
@@ -114,8 +124,24 @@ def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str
     """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
     if len(names) > 1:
         return [(" from ".join(names), rivals_of(case, found, names))]
+    if names[0] in _laws_by_name(found):
+        return [(f"{names[0]} from what calibration makes of it", rivals_of(case, found, names))]
     single = next(one for one in found.suspects if one.name == names[0])
     return [(_what_hides(single), rivals_of(case, found, names, plausible=True))]
+
+
+def laws_to_tell_apart(laws: LawsSuspected | None) -> list[str]:
+    """Laws that could be what is missing, the likeliest of each term and quantity: the forms of one leave traces that
+    hardly differ.
+    """
+    likeliest: dict[tuple[str, str], str] = {}
+    for one in () if laws is None else laws.laws:
+        likeliest.setdefault((one.term, one.quantity), one.name)
+    return list(likeliest.values())[:MOST_LAWS]
+
+
+def _laws_by_name(found: Diagnosis) -> dict[str, LawSuspected]:
+    return {} if found.laws is None else {one.name: one for one in found.laws.laws}
 
 
 def _what_hides(suspect: Suspect) -> str:
@@ -132,11 +158,14 @@ def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
-    """Effects of a diagnosis by name, at the size it found or a plausible one."""
+    """Effects of a diagnosis by name, at the size it found or a plausible one; laws at their size to first order."""
     rivals: list[Rival] = []
     for suspect in (one for one in found.suspects if one.name in names):
         candidate = candidate_named(case, found.predictions.station, suspect.name)
         amplitude = candidate.effect.amplitude
         gain = amplitude.plausible_gain if plausible else amplitude.gain(suspect.amplitude.value)
         rivals.append((candidate, suspect.shapes, gain))
+    for name, law in _laws_by_name(found).items():
+        if name in names:
+            rivals.append((Candidate(LAWS[name].effect, scale=law.scale), law.shapes, law.strength))
     return rivals
