@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from blind import records_in
+from law_page import write_law_page
 from law_sets import LawDataSet, LawTrial, knowing_hidden, law_data_set, law_trials
 
 from vegglue.arrays import Array
@@ -120,12 +121,22 @@ def _error_of(data: LawDataSet, case: Case, z: Array) -> float | None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--most", type=int, default=None, help="data sets to do at most")
+    parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
     parser.add_argument("--runs", type=Path, default=RUNS)
     given = parser.parse_args()
     path = given.runs / "records.jsonl"
+    if not given.page:
+        _make(path, given.most)
+    write_law_page(
+        list({record["key"]: record for record in (*records_in(KEPT), *records_in(path))}.values()), ROOT / "docs"
+    )
+
+
+def _make(path: Path, most: int | None) -> None:
+    """Do what is not yet done, `most` data sets at most."""
     path.parent.mkdir(parents=True, exist_ok=True)
     done = {record["key"] for record in (*records_in(KEPT), *records_in(path))}
-    todo = [trial for trial in law_trials() if trial.key not in done][: given.most]
+    todo = [trial for trial in law_trials() if trial.key not in done][:most]
     with path.open("a", encoding="utf-8") as file, at_most(1):
         for count, trial in enumerate(todo, 1):
             record = study_of_laws(trial)
