@@ -34,6 +34,7 @@ def suspected(
         p=p, of_each=np.array([9.0, 7.0, 1.0]), laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
         best_column=lambda law: law, gain=lambda law: -0.5,
     )  # fmt: skip
+    patched.setattr(unlisted_laws, "law_fingerprints", lambda *_: None)
     patched.setattr(unlisted_laws, "screen_laws", lambda *_: screening)
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
     last: Any = SimpleNamespace(base=None, flagged=(), fingerprints=None, kinds=kinds)

@@ -9,7 +9,9 @@ import pytest
 STUDIES = Path(__file__).parent
 
 
-@pytest.mark.parametrize("name", ["bench", "blind", "confluence", "fuzz", "laws", "scale", "loop", "startup"])
+@pytest.mark.parametrize(
+    "name", ["bench", "blind", "confluence", "fuzz", "laws", "law_alarms", "scale", "loop", "startup"]
+)
 def test_a_script_is_read_by_itself(name: str) -> None:
     whole = f"import runpy, sys; sys.path[0] = {str(STUDIES)!r}; runpy.run_path({str(STUDIES / name)!r} + '.py')"
     done = subprocess.run([sys.executable, "-c", whole], capture_output=True, text=True, check=False)

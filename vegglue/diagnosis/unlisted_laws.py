@@ -12,7 +12,7 @@ from vegglue.calibration.baseline import log_evidence
 from vegglue.diagnosis.competition import LEAST_ODDS, tempered_chances
 from vegglue.diagnosis.findings import Findings
 from vegglue.results.causes import LawsSuspected, LawSuspected
-from vegglue.screening.law_screening import LawScreening, screen_laws
+from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.residual_screening import Screening
 
 # How often errors alone sound the alarm of laws [-]: it comes on top of that of everything listed, which is sounded at
@@ -27,7 +27,7 @@ def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSu
     if found.absurd or found.steps:
         return None
     at = first if found.places else last
-    screening = screen_laws(at.base, (), at.flagged, at.fingerprints)
+    screening = screen_laws(at.base, law_fingerprints(at.base, (), at.fingerprints), at.flagged)
     if screening.p >= LAW_ALARMS:
         return None
     of_laws = screening.of_each

@@ -19,7 +19,7 @@ from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent
-from vegglue.screening.law_screening import LawScreening, screen_laws
+from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.score_test import ALIKE
 
 # Laws that are calibrated at most; as many as listed effects in a diagnosis. Chosen, not measured: each costs a fit.
@@ -40,7 +40,7 @@ def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = sile
 def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
     """The same of a model that is calibrated."""
     watch(Progress("looking for a law"))
-    screening = screen_laws(base, tuple(without))
+    screening = screen_laws(base, law_fingerprints(base, tuple(without)))
     if screening.p > FALSE_ALARMS or not screening.laws:
         return Discovery(screening.p, len(screening.laws), (), {})
     ranked = [*contenders_of(screening.listed, watch, screening.kind.total), *_laws(screening, watch)]

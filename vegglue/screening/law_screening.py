@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.engine.interface import responses
 from vegglue.screening import score_test
 from vegglue.screening.candidates import cause_of
@@ -67,19 +67,28 @@ class LawScreening:
         return len(self.listed.fingerprints.settings)
 
 
-def screen_laws(
-    base: Baseline,
-    without: tuple[str, ...] = (),
-    flagged: tuple[int, ...] = (),
-    known: Fingerprints | None = None,
-) -> LawScreening:
-    """Score tests of a calibrated model with laws; without: listed effects that are left out; flagged, known: readings
-    set aside, and fingerprints of what is listed, see `screen`.
-    """
+@dataclass(frozen=True)
+class LawFingerprints:
+    """Fingerprints of what is listed, the laws of a case, and fingerprints of both, listed effects first."""
+
+    listed: Fingerprints
+    laws: list[LawInCase]
+    every: Fingerprints
+
+
+def law_fingerprints(
+    base: Baseline, without: tuple[str, ...] = (), known: Fingerprints | None = None
+) -> LawFingerprints:
+    """Of a calibrated model; without: listed effects that are left out; known: fingerprints of what is listed."""
     search = search_model(base)
     listed = _left(known or fingerprints_of(search, half_width(base.model.site)), without)
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
-    every = _with_laws(listed, laws, base)
+    return LawFingerprints(listed, laws, _with_laws(listed, laws, search))
+
+
+def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
+    """Score tests of a calibrated model with laws; flagged: readings that were set aside."""
+    listed, laws, every = found.listed, found.laws, found.every
     full = screen(base, flagged, every, LAW_SEED)
     count = len(listed.settings)
     columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
@@ -111,9 +120,9 @@ def _left(found: Fingerprints, without: tuple[str, ...]) -> Fingerprints:
     )
 
 
-def _with_laws(listed: Fingerprints, laws: list[LawInCase], base: Baseline) -> Fingerprints:
+def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel) -> Fingerprints:
     """Fingerprints of listed effects, then of laws."""
-    search, first = search_model(base), len(listed.settings)
+    first = len(listed.settings)
     columns, settings, amplitudes, causes = list(listed.columns), list(listed.settings), list(listed.amplitudes), []
     for one in laws:
         tried = one.candidate.settings()
