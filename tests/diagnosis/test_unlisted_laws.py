@@ -37,7 +37,8 @@ def suspected(
     patched.setattr(unlisted_laws, "law_fingerprints", lambda *_: None)
     patched.setattr(unlisted_laws, "screen_laws", lambda *_: screening)
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
-    last: Any = SimpleNamespace(base=None, flagged=(), fingerprints=None, kinds=kinds)
+    base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
+    last: Any = SimpleNamespace(base=base, flagged=(), fingerprints=None, kinds=kinds)
     return laws_suspected(last, last, found)
 
 

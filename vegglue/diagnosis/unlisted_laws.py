@@ -24,7 +24,7 @@ def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSu
     """Laws that stand out against the last model, or the first one where something at a place was accepted; None where
     errors alone leave as much, or a listed effect explains the misfit.
     """
-    if found.absurd or found.steps:
+    if found.absurd or found.steps or last.base.model.case.engine is not None:  # `discover` refuses a command
         return None
     at = first if found.places else last
     screening = screen_laws(at.base, law_fingerprints(at.base, (), at.fingerprints), at.flagged)
