@@ -59,11 +59,16 @@ def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> No
     assert not clearly_a_law(laws)
 
 
-def test_their_alarm_keeps_its_rate_and_listed_effects_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
+def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     assert suspected(monkeypatch, Findings(), p=LAW_ALARMS) is None
-    assert suspected(monkeypatch, Findings(steps=(step,))) is None
     assert suspected(monkeypatch, Findings(absurd=("levels lie below the bed.",))) is None
+
+
+def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
+    step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
+    assert suspected(monkeypatch, Findings(steps=(step,), log_prior=8.0)) is None
+    assert suspected(monkeypatch, Findings(steps=(step,), log_prior=1.0)) is not None
 
 
 def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -265,6 +265,9 @@ def test_a_law_beside_what_was_found_is_a_remark() -> None:
         _, sentence, remarks = said(grounds(laws=LIKELY, **beside))
         assert "a law of" not in sentence
         assert "To first order a law of the speed in friction of the banks" in remarks
+    kind, _, remarks = said(grounds(step("a"), laws=LIKELY), [a_suspect("a")])
+    assert kind == "identified"
+    assert "rather than a. `vegglue discover`" in remarks
 
 
 AT_ITS_END = {"value": 1.0, "support": (-1.0, 1.0), "scale": 0.5}

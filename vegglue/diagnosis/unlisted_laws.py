@@ -2,8 +2,8 @@
 
     p_j ~ exp((E_j - max E) / w_j)   over laws and all else that was compared, see `competition`
 
-They have an alarm of their own, which is asked after that of everything listed, and only where no listed effect was
-accepted: the listed library goes first.
+They have an alarm of their own, which is asked after that of everything listed: the listed library goes first. Beside a
+listed effect that was accepted they are told where they clearly explain more.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ LAW_ALARMS, LAWS_HELD = 0.01, 0.95
 
 
 def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSuspected | None:
-    """Laws that stand out against the last model, or the first one where something at a place was accepted; None where
-    errors alone leave as much, or a listed effect explains the misfit.
+    """Laws that stand out against the last model, or against the first one where something was accepted; None where
+    errors alone leave as much, or listed effects explain the misfit nearly as well.
     """
-    if found.absurd or found.steps or last.base.model.case.engine is not None:  # `discover` refuses a command
+    if found.absurd or last.base.model.case.engine is not None:  # `discover` refuses a command
         return None
-    at = first if found.places else last
+    at = first if found.accepted else last
     screening = screen_laws(at.base, law_fingerprints(at.base, (), at.fingerprints), at.flagged)
     if screening.p >= LAW_ALARMS:
         return None
@@ -35,12 +35,13 @@ def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSu
     order = np.argsort(-chances)
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
     laws = tuple(_law(screening, int(j), float(chances[j])) for j in order[:count])
-    return LawsSuspected(screening.p, of_laws.size, float(chances.sum()), laws)
+    suspected = LawsSuspected(screening.p, of_laws.size, float(chances.sum()), laws)
+    return None if found.steps and not clearly_a_law(suspected) else suspected
 
 
 def law_goes_first(laws: LawsSuspected | None, found: Findings) -> bool:
     """Whether a law is told rather than what else may be said where nothing listed was accepted."""
-    return laws is not None and is_likelier(laws) and not found.places
+    return laws is not None and is_likelier(laws) and not found.accepted
 
 
 def is_likelier(laws: LawsSuspected) -> bool:
@@ -57,7 +58,7 @@ def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
     """ln evidence of what laws are compared with: what was accepted, else what was calibrated, else all that was
     tested.
     """
-    if found.places:
+    if found.accepted:
         return [log_evidence(last.base) - log_evidence(first.base) + found.log_prior]
     if found.undecided:
         return [one.log_evidence for one in found.undecided]

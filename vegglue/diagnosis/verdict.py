@@ -252,7 +252,8 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> li
     if grounds.model_error is not None:
         remarks.append(model_error_in_words(grounds.model_error))
     if grounds.laws is not None and (law := law_in_words(grounds.laws)) not in sentence:
-        remarks.append(f"To first order {law}. {TO_DISCOVER}")
+        rather = f", rather than {' and '.join(_accepted(grounds.findings))}" if grounds.findings.steps else ""
+        remarks.append(f"To first order {law}{rather}. {TO_DISCOVER}")
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:

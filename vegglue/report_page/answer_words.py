@@ -123,7 +123,7 @@ def why_not_to_rely(run: Run) -> str:
 
 
 def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
-    if found is None or (found.laws is not None and not found.places):  # the misfit is that without the law
+    if found is None or (found.laws and not (found.places or found.steps)):  # the misfit is that without the law
         return
     if found.misfit.p < UNBELIEVED and found.verdict.kind != "cannot-tell":
         yield "what is left of the misfit is still larger than the errors allow"
