@@ -20,7 +20,7 @@ SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo paper test check bench blind faults confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper test check bench blind laws faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -76,6 +76,9 @@ bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
 
 blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)
+
+laws: $(READY)  # the study of docs/discover_study.md: hours; goes on where it was stopped
+	nice $(BIN)/python tests/studies/laws.py
 
 faults: $(READY)  # every command killed at random moments, counted in docs/faults.md: half an hour
 	$(BIN)/python tests/kills.py $(KILLS)

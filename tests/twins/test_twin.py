@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_diagnosis, a_location, a_suspect
+from diagnoses import a_diagnosis, a_location, a_suspect, laws_suspected_of
 from reach import said_to
 
 from vegglue.calibration.noise import noise_of, with_grid_error
@@ -203,6 +203,15 @@ def test_what_reveal_says() -> None:
     assert "found with width = 0.1 instead of 0.6, on which sizes" in guess_in_words(an_answer(wide), a_diagnosis())[-1]
     alike = Hidden("mixing[D3]", 0.3, {"width": 0.101}, 6.0)
     assert guess_in_words(an_answer(alike), a_diagnosis())[-1].endswith("the true size.")
+
+
+def test_a_hidden_law_is_told_by_its_term_and_quantity() -> None:
+    """Its form is not asked for: those of one quantity leave traces that hardly differ."""
+    told = replace(a_diagnosis(steps=()), laws=laws_suspected_of("law_bank_speed_step"))
+    ramp, other = (Hidden(name, 0.3, {}, 6.0) for name in ("law_bank_speed_ramp", "law_floor_speed_ramp"))
+    assert [one.found for one in marks(an_answer(ramp, other), told)] == [True, False]
+    assert guess_in_words(an_answer(ramp), told)[-1].endswith("tells of a law of that quantity in that term.")
+    assert guess_in_words(an_answer(ramp), a_diagnosis())[-1].endswith("tells of no such law.")
 
 
 def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.effects.grammar import LAWS, Law
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.twins.sealed_answer import BAD_PROBE, Answer, Hidden
 
@@ -39,6 +40,9 @@ def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
         away = _away(hidden, diagnosis)
         found = diagnosis.verdict.kind == "none-of-these"
         return Mark(hidden, False, False, False, None, away, found)
+    if hidden.name in LAWS:
+        told = _tells_of(LAWS[hidden.name], diagnosis)
+        return Mark(hidden, False, told, False, None, float("nan"), told)
     inside = hidden.name in diagnosis.set
     named = diagnosis.verdict.kind == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
     still = hidden.name in [name for group in diagnosis.verdict.not_excluded for name in group]
@@ -47,6 +51,12 @@ def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
         low, high = diagnosis.suspect(hidden.name).amplitude.interval95
         amplitude = bool(low <= hidden.amplitude <= high)
     return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
+
+
+def _tells_of(law: Law, diagnosis: Diagnosis) -> bool:
+    """Whether a law of the same quantity in the same term is among those that a diagnosis tells."""
+    laws = () if diagnosis.laws is None else diagnosis.laws.laws
+    return any((one.term, one.quantity) == (law.term.words, law.quantity.words) for one in laws)
 
 
 def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
@@ -95,6 +105,9 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     if not mark.hidden.listed:
         told = f"The verdict was {diagnosis.verdict.kind}"
         return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")
+    if mark.hidden.name in LAWS:
+        which = "tells of a law of that quantity in that term" if mark.found else "tells of no such law"
+        return f"{truth}The diagnosis said {diagnosis.verdict.kind}; it {which}."
     if mark.open:
         return truth + f"The diagnosis said {diagnosis.verdict.kind}, and lists it among what is not excluded."
     if not mark.inside:
