@@ -5,6 +5,7 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -14,13 +15,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
+from functools import lru_cache
 from itertools import count
 from multiprocessing import resource_tracker
 from threading import Semaphore
 from typing import Any
 
 from joblib import Parallel, cpu_count, delayed
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from vegglue.errors import InputError, StorageError
 from vegglue.progress import silent
@@ -118,7 +120,7 @@ def in_threads(
     if spare is None:
         with at_most(-1):
             return in_threads(work, tasks, finished)
-    with threadpool_limits(1):
+    with one_thread():
         return _shared_out(work, list(tasks), spare, finished)
 
 
@@ -157,16 +159,22 @@ def _shared_out(
     return found
 
 
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """The libraries with threads of their own, looked for (5 ms) when a module was imported since."""
+    return ThreadpoolController()
+
+
 @contextmanager
 def one_thread() -> Iterator[None]:
     """One thread for linear algebra in this process: its matrices are small, and the cores have tasks of their own."""
-    with threadpool_limits(1):
+    with _libraries(len(sys.modules)).limit(limits=1):
         yield
 
 
 def one_thread_for_good() -> None:
     """The same for the rest of this process: its threads may work on several tasks at once, and none may undo it."""
-    threadpool_limits(1)
+    _libraries(len(sys.modules)).limit(limits=1)
 
 
 def keep_folder_out() -> None:
