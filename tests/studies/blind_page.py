@@ -31,8 +31,9 @@ FEW_SETS = 20
 # What the study could not do for want of time, to be said by hand.
 AFFORDED = """more than half of the sets that are planned for the small channel, three quarters of those of the own
 equations, and the field campaign (173 sets, some two and a half hours on two cores). 150 sets of nothing hidden are
-wanted of either kind of site: a third of that is here, so that intervals are wide. Laws in no list, and water that
-enters at a place, are not hidden at all. The records are in `data/blind`, and `make blind` goes on from them."""
+wanted of either kind of site: a third of that is here, so that intervals are wide. Laws in no list
+are hidden in [a study of their own](discover_study.md); water that enters at a place is not hidden at all. The records
+are in `data/blind`, and `make blind` goes on from them."""
 CASES = {"twin": "the small channel", "campaign": "the field campaign"}
 ROWS = 30
 

@@ -66,7 +66,8 @@ def test_the_page_tells_shares_with_their_intervals(tmp_path: Path) -> None:
     left_out = {"key": "law/1", "group": "law", "hide": "x", "left_out": "never as visible as asked"}
     write_law_page([record(SPEED), listed, nothing, left_out], tmp_path)
     text = (tmp_path / "discover_study.md").read_text(encoding="utf-8")
-    assert "3 sets: 1 with a law hidden, 1 with nothing and 1 with a listed effect; 1 sets were" in text
+    assert "3 sets: 1 with a law hidden, 1 with nothing and 1 with a listed effect, of" in text
+    assert "Left out were 1 since at no plausible size" in " ".join(text.split())
     assert "| the likeliest cause changes the right term | at least 80 % | 1 | 100 % | 2 to 100 % |" in text
     assert "| floor | speed | threshold | 1 | 1 | 1 | 1 |" in text
     assert "| `bank_trend` | 8 | 80 % | floor: speed, step (60 %) | 0.0200 | 0.0120 | 0.0100 |" in text
