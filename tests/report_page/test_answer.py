@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_instrument
+from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_instrument, laws_suspected_of
 from posteriors import changed
 from report_runs import a_toy, told_of, written
 
@@ -84,6 +84,12 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
     assert any("vegglue extend toy.yaml --auto" in step for step in asked)
     assert any("vegglue next toy.yaml" in step for step in asked)
+
+
+def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:
+    found = replace(NOTHING, laws=laws_suspected_of("law_bank_speed_step"))
+    assert "vegglue discover toy.yaml" in next_steps(replace(toy, diagnosis=found))[0]
+    assert "discover" not in "".join(next_steps(replace(toy, diagnosis=NOTHING)))
 
 
 def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:

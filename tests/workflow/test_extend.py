@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from diagnoses import a_diagnosis, a_suspect
+from diagnoses import a_diagnosis, a_suspect, laws_suspected_of
 from reach import said_to
 
 from vegglue.case.config import load_case
@@ -120,6 +120,12 @@ def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
     assert said in words
     assert words.startswith("Nothing is added: ")
     assert words.count(".") == 1
+
+
+def test_a_law_that_stands_out_is_left_to_discover() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    found = replace(found_in(case, "none-of-these"), laws=laws_suspected_of("law_bank_speed_step"))
+    assert "`vegglue discover` adds one" in in_words(found, Choice(((),), {}))
 
 
 def test_doubt_is_a_verdict_that_cannot_tell() -> None:

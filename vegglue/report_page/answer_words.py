@@ -221,6 +221,9 @@ def _of_instruments(found: Diagnosis) -> Iterator[str]:
 def _better_model(run: Run) -> Iterator[str]:
     ladder, found = run.loop.ladder, run.behind
     assert found is not None
+    if found.laws is not None and (ladder is None or len(ladder.steps) == 1):
+        command = html.escape(run.case.source.name)
+        yield f"<code>vegglue discover {command}</code> calibrates laws that are in no list, and writes the best."
     if ladder is None:
         if found.steps or found.places:
             command = html.escape(run.case.source.name)

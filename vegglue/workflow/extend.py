@@ -43,6 +43,7 @@ NOTHING_TO_ADD = {
     "none-of-these": "what is missing differs from place to place, and is no effect of the library",
     "cannot-tell": "the diagnosis cannot tell what is missing",
 }
+LAW_TO_DISCOVER = "what stands out is a law that is in no list; `vegglue discover` adds one"
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 
 
@@ -161,7 +162,8 @@ def in_words(found: Diagnosis, choice: Choice) -> str:
     """What was added, or why nothing is, and why each of the others is not."""
     kept = choice.stages[-1]
     if not kept and not choice.refused:
-        return f"Nothing is added: {NOTHING_TO_ADD.get(found.verdict.kind, 'all that was found is at work already')}."
+        why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
+        return f"Nothing is added: {LAW_TO_DISCOVER if found.laws is not None else why}."
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
     return " ".join([first, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
 
