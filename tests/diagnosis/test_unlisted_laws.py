@@ -34,7 +34,7 @@ def suspected(
         p=p, of_each=np.array([9.0, 7.0, 1.0]), laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
         best_column=lambda law: law, gain=lambda law: -0.5,
     )  # fmt: skip
-    patched.setattr(unlisted_laws, "law_fingerprints", lambda *_: None)
+    patched.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=laws))
     patched.setattr(unlisted_laws, "screen_laws", lambda *_: screening)
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
     base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
@@ -50,6 +50,13 @@ def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.Monke
     assert laws.alike == laws.laws, "of the same term and quantity"
     assert laws.laws[0].shapes == {"reference": 0.4}
     assert "|U|/0.4 m/s" in laws.laws[0].equation
+
+
+def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None))),
+                                fingerprints=None)  # fmt: skip
+    monkeypatch.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
+    assert laws_suspected(last, last, Findings()) is None
 
 
 def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,10 @@ def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSu
     if found.absurd or last.base.model.case.engine is not None:  # `discover` refuses a command
         return None
     at = first if found.accepted else last
-    screening = screen_laws(at.base, law_fingerprints(at.base, (), at.fingerprints), at.flagged)
+    traces = law_fingerprints(at.base, (), at.fingerprints)
+    if not traces.laws:
+        return None
+    screening = screen_laws(at.base, traces, at.flagged)
     if screening.p >= LAW_ALARMS:
         return None
     of_laws = screening.of_each

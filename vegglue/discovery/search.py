@@ -40,8 +40,11 @@ def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = sile
 def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
     """The same of a model that is calibrated."""
     watch(Progress("looking for a law"))
-    screening = screen_laws(base, law_fingerprints(base, tuple(without)))
-    if screening.p > FALSE_ALARMS or not screening.laws:
+    traces = law_fingerprints(base, tuple(without))
+    if not traces.laws:
+        return Discovery(1.0, 0, (), {})
+    screening = screen_laws(base, traces)
+    if screening.p > FALSE_ALARMS:
         return Discovery(screening.p, len(screening.laws), (), {})
     ranked = [*contenders_of(screening.listed, watch, screening.kind.total), *_laws(screening, watch)]
     return _discovery(screening, sorted(ranked, key=lambda one: -one.log_evidence))

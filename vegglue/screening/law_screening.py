@@ -83,11 +83,11 @@ def law_fingerprints(
     search = search_model(base)
     listed = _left(known or fingerprints_of(search, half_width(base.model.site)), without)
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
-    return LawFingerprints(listed, laws, _with_laws(listed, laws, search))
+    return LawFingerprints(listed, laws, _with_laws(listed, laws, search) if laws else listed)
 
 
 def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
-    """Score tests of a calibrated model with laws; flagged: readings that were set aside."""
+    """Score tests of a calibrated model with laws, one at least; flagged: readings that were set aside."""
     listed, laws, every = found.listed, found.laws, found.every
     full = screen(base, flagged, every, LAW_SEED)
     count = len(listed.settings)
