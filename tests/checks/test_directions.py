@@ -35,6 +35,14 @@ def test_the_whole_stream_reversed(tmp_path: Path) -> None:
     assert "`flip: [x]`" in said
 
 
+def test_a_centreline_drawn_upstream_is_to_be_reversed(tmp_path: Path) -> None:
+    case = load_case(write_reach(tmp_path, ("cell: ", "centreline: {parts: [{length: 30}]}, cell: ")))
+    (tmp_path / "velocities.csv").write_text("section,x,y,u\nA,8,-1,-0.4\nA,8,0,-0.5\nB,20,0,-0.4\n", encoding="utf-8")
+    (said,) = remarks_on_directions(case, read_observations(case))
+    assert "`reverse: true`" in said
+    assert "flip" not in said
+
+
 def test_one_section_reversed(tmp_path: Path) -> None:
     rows = "section,x,y,u\n" + "".join(f"A,8,{y},-0.2\nB,14,{y},0.4\nC,20,{y},0.5\n" for y in (-1, 0, 1))
     (said,) = said_of(tmp_path, rows)

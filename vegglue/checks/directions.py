@@ -14,6 +14,13 @@ FEWEST_OF_A_SECTION = 3
 # Rise of the water downstream [m], and over its standard error [-], from which levels run uphill: velocity heads,
 # which a widening gives back, are 5 mm at 0.3 m/s.
 RISE, SURE = 0.01, 4.0
+# What is likely where all of it runs upstream, and what mends it.
+OF_A_FRAME = (
+    "x or u is reversed, or components of a map were not turned; `flip: [x]` and `frame` of `vegglue import` mend that"
+)
+OF_A_LINE = (
+    "the centreline is drawn from its lower end, which `reverse: true` of `vegglue import` mends, or u is reversed"
+)
 
 
 def remarks_on_directions(case: Case, observations: Observations) -> Iterator[str]:
@@ -22,19 +29,19 @@ def remarks_on_directions(case: Case, observations: Observations) -> Iterator[st
     used = table[table["used"].astype(bool)]
     for name in case.experiments:
         own = used[used["experiment"] == name]
-        yield from _upstream(name, own[own["kind"] == STREAMWISE])
+        yield from _upstream(name, own[own["kind"] == STREAMWISE], case.grid.centreline is not None)
         yield from _across(name, own)
         yield from _uphill(name, own[own["kind"] == WATER_LEVEL])
 
 
-def _upstream(name: str, rows: pd.DataFrame) -> Iterator[str]:
-    """All of it, or whole sections, against the way downstream."""
+def _upstream(name: str, rows: pd.DataFrame, on_a_line: bool) -> Iterator[str]:
+    """All of it, or whole sections, against the way downstream. on_a_line: whether the grid follows a centreline."""
     mean = rows.groupby("section")["value"].agg(["mean", "size", "max"])
     against = mean[(mean["max"] < 0.0) & (mean["size"] >= FEWEST_OF_A_SECTION)]
     if len(rows) and rows["value"].median() < 0.0:  # one mark for a missing value is told elsewhere
         yield (
-            f"Velocities of experiment {name} run upstream, {rows['value'].median():.2g} m/s in the middle: x or u is "
-            "reversed, or components of a map were not turned; `flip: [x]` and `frame` of `vegglue import` mend that."
+            f"Velocities of experiment {name} run upstream, {rows['value'].median():.2g} m/s in the middle: "
+            f"{OF_A_LINE if on_a_line else OF_A_FRAME}."
         )
     elif len(against):
         yield (
