@@ -1,9 +1,10 @@
 """How often errors alone sound the alarms of a diagnosis: that of everything listed, and that of laws.
 
-    python tests/studies/law_alarms.py [--draws N]
+    python tests/studies/law_alarms.py [--draws N] [--whole]
 
 The model of the short channel as an import writes it, calibrated to its own predictions at true places of the prior.
-Errors of the data are drawn, and the model calibrated to them to first order: screening needs no further flow.
+Errors of the data are drawn, or all that the noise allows, and the model is calibrated to them to first order:
+screening needs no further flow.
 """
 
 import argparse
@@ -61,13 +62,14 @@ def moved(base: Baseline, errors: Array) -> Baseline:
     )
 
 
-def alarms_drawn(place: int, draws: int) -> AlarmsDrawn:
-    """At one true place of the prior."""
+def alarms_drawn(place: int, draws: int, whole: bool = False) -> AlarmsDrawn:
+    """At one true place of the prior; whole: errors are drawn of the grid and of the model itself, too, as allowed."""
     ground, _ = place_of("twin", place)
     base = baseline(
         replace(ground.model, station=ground.model.station.assign(value=ground.here.prediction)), ground.here.z
     )
-    random, lower = np.random.default_rng((place, 17)), noise_of(ground.model.station).lower
+    random = np.random.default_rng((place, 17))
+    lower = (base.noise if whole else noise_of(ground.model.station)).lower
     first = screen(base)
     traces = law_fingerprints(base, (), first.fingerprints)
     p = []
@@ -80,10 +82,11 @@ def alarms_drawn(place: int, draws: int) -> AlarmsDrawn:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--whole", action="store_true", help="errors of the grid and of the model, too, as allowed")
     parser.add_argument("--draws", type=int, default=50, help="draws at each true place")
     given = parser.parse_args()
     with at_most(1):
-        drawn = [alarms_drawn(place, given.draws) for place in range(PLACES)]
+        drawn = [alarms_drawn(place, given.draws, given.whole) for place in range(PLACES)]
     both = AlarmsDrawn(*(np.concatenate([getattr(one, name) for one in drawn]) for name in ("listed", "laws")))
     for words, count in both.rates:
         low, high = interval(count, both.laws.size)
