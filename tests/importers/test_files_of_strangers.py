@@ -83,6 +83,17 @@ def test_a_matlab_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
         read_matlab(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
 
 
+@pytest.mark.parametrize(("place", "byte"), [(320, 0x91), (241, 2)])
+def test_a_matlab_file_that_crashes_its_reader_is_refused(tmp_path: Path, place: int, byte: int) -> None:
+    """One byte of a structure is another: scipy reads memory that is not its own, or asks for any."""
+    savemat(tmp_path / "boat.mat", {"S": {"a": np.arange(3.0), "b": 1.0}})
+    content = bytearray((tmp_path / "boat.mat").read_bytes())
+    content[place] = byte
+    (tmp_path / "boat.mat").write_bytes(content)
+    with pytest.raises(InputError, match=r"boat\.mat cannot be read as a MATLAB file of version 5: .*; save it anew"):
+        read_matlab(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
+
+
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [

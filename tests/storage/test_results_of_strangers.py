@@ -24,9 +24,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from stored import ALL, HASH, a_header, append, assert_whole, start, write_chunks
 
+from vegglue import first_look
 from vegglue.errors import StorageError
-from vegglue.storage import first_look
 from vegglue.storage.digest import state_of, with_digest
+from vegglue.storage.hdf5_reading import READ_HDF5
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import ensemble_writer, part_file
 
@@ -176,16 +177,19 @@ def test_a_reader_that_was_ended_is_replaced(tmp_path: Path) -> None:
 def test_a_process_that_was_forked_has_a_reader_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
-    assert first_look.why_unreadable(*state_of(path)) is None
+    assert first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None
     parents, child = first_look._reader(os.getpid()), os.fork()
     if not child:
         first_look.why_unreadable.cache_clear()
-        right = first_look.why_unreadable(*state_of(path)) is None and first_look._reader(os.getpid()) is not parents
+        right = (
+            first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None
+            and first_look._reader(os.getpid()) is not parents
+        )
         os._exit(0 if right else 1)
     assert os.waitpid(child, 0)[1] == 0
     assert parents.poll() is None
     first_look.why_unreadable.cache_clear()
-    assert first_look.why_unreadable(*state_of(path)) is None, "the answers are not mixed up"
+    assert first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None, "the answers are not mixed up"
 
 
 def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
@@ -194,8 +198,9 @@ def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
     asks = """
         import os
         from pathlib import Path
-        from vegglue.storage import digest, first_look
-        first_look.why_unreadable(*digest.state_of(Path({path!r})))
+        from vegglue import first_look
+        from vegglue.storage import digest, hdf5_reading
+        first_look.why_unreadable(*digest.state_of(Path({path!r})), by=hdf5_reading.READ_HDF5)
         print(first_look._reader(os.getpid()).pid, flush=True)
         os.kill(os.getpid(), 9)
     """

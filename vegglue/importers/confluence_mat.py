@@ -13,9 +13,10 @@ from scipy.io import loadmat
 from vegglue.arrays import Array
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
+from vegglue.importers.library_files import read_by_library
+from vegglue.importers.matlab_loading import refuse_unreadable_matlab
 
-MAPS = "topo_water_level_maps.mat"
+MAPS, OF_THE_SET = "topo_water_level_maps.mat", "a file of the set"
 # Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
 DEEPEST = 2
 # Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
@@ -51,8 +52,8 @@ def tables_of_mat(source: Path, into: Path) -> Path:
 
 
 def _loaded(path: Path, *names: str) -> dict[str, Array]:
-    with read_by_library(path, "a file of the set"):
-        refuse_larger_matlab(path)
+    refuse_unreadable_matlab(path, OF_THE_SET)
+    with read_by_library(path, OF_THE_SET):
         found = loadmat(path, variable_names=names)
         return {name: np.asarray(found[name], dtype=np.float64) for name in names}
 

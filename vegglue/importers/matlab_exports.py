@@ -3,11 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from scipy.io import loadmat
-
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
+from vegglue.importers.matlab_loading import loaded_matlab
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.qrev_transects import QREV_VARIABLE, stations_of_qrev
 from vegglue.importers.riversurveyor_mat import RIVERSURVEYOR_VARIABLES, stations_of_riversurveyor
@@ -19,10 +17,8 @@ MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
 
 def read_matlab(path: Path, words: FileWords) -> Taken:
     """What a MATLAB file of an instrument holds. Errors: InputError naming the file."""
-    with read_by_library(path, "a MATLAB file of version 5"):
-        refuse_larger_matlab(path)
-        loaded: dict[str, Any] = loadmat(path, struct_as_record=False, squeeze_me=True)
-    parts = {name.strip("\0 "): part for name, part in loaded.items()}  # MIDAS fills up its names
+    # MIDAS fills its names up.
+    parts: dict[str, Any] = {name.strip("\0 "): part for name, part in loaded_matlab(path).items()}
     if QREV_VARIABLE in parts:
         return stations_of_qrev(path, parts, words)
     if set(PROFILER_VARIABLES) <= parts.keys():

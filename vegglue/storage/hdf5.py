@@ -14,10 +14,11 @@ import h5py
 import numpy as np
 
 from vegglue.errors import InputError, StorageError
+from vegglue.first_look import why_unreadable
 from vegglue.results.layout import Group
 from vegglue.storage.digest import is_unchanged, state_of, with_digest
-from vegglue.storage.first_look import why_unreadable
 from vegglue.storage.foreign_files import why_foreign
+from vegglue.storage.hdf5_reading import READ_HDF5
 from vegglue.whole_files import write_file
 
 # What reading a damaged file may raise, of Python or of the HDF5 library.
@@ -81,7 +82,7 @@ def _refuse_damaged(path: Path) -> None:
     if is_unchanged(*state) is False:
         refuse_in_use(path)
         raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
-    why = why_unreadable(*state)
+    why = why_unreadable(*state, by=READ_HDF5)
     if why is not None:
         refuse_in_use(path)
         raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")

@@ -1,0 +1,41 @@
+"""MATLAB files of version 5, loaded by the process of `first_look` before the command loads them itself."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+from scipy.io import loadmat
+
+from vegglue.errors import InputError, shown_path
+from vegglue.first_look import why_unreadable
+from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
+
+READ_MATLAB = f"{__name__}:read_all_variables"  # as `first_look` names it
+KIND = "a MATLAB file of version 5"
+
+
+def loaded_matlab(path: Path) -> dict[str, Any]:
+    """The variables of a file, structures as objects. Errors: those of refuse_unreadable_matlab."""
+    refuse_unreadable_matlab(path, KIND)
+    with read_by_library(path, KIND):
+        found: dict[str, Any] = loadmat(path, struct_as_record=False, squeeze_me=True)
+    return found
+
+
+def refuse_unreadable_matlab(path: Path, kind: str) -> None:
+    """Errors: InputError for a file that is too large, or that a process of its own does not read to its end; kind:
+    what it should be, in words. StorageError when no process can be begun.
+    """
+    with read_by_library(path, kind):
+        refuse_larger_matlab(path)
+        state = path.stat()
+    why = why_unreadable(path.absolute(), state.st_size, state.st_mtime_ns, by=READ_MATLAB)
+    if why is not None:
+        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {why}; save it anew.")
+
+
+def read_all_variables(path: str) -> None:
+    """Load a file and drop what comes; errors of the library."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        loadmat(path, struct_as_record=False, squeeze_me=True)
