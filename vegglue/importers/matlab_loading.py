@@ -35,7 +35,12 @@ def refuse_unreadable_matlab(path: Path, kind: str) -> None:
 
 
 def read_all_variables(path: str) -> None:
-    """Load a file and drop what comes; errors of the library."""
+    """Load a file and drop what comes. Its errors are left to whoever loads it next: they harm nobody."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        loadmat(path, struct_as_record=False, squeeze_me=True)
+        try:
+            loadmat(path, struct_as_record=False, squeeze_me=True)
+        except MemoryError:
+            raise
+        except Exception:  # on damaged files it raises anything
+            return
