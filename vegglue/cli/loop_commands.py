@@ -157,7 +157,7 @@ def overview_command(
     """Make one page of several runs: their answers, parameters side by side, and the way to each report."""
     cases = [vegglue.load_case(config, trust) for config in configs]
     with heard(quiet, as_object) as watch:
-        page = vegglue.overview(cases, runs=runs, watch=watch)
+        page = vegglue.overview(cases, runs=runs, trust=trust, watch=watch)
     tell(cases[0], runs, page, as_object)
 
 

@@ -13,10 +13,11 @@ from vegglue.workflow.report import results_of
 from vegglue.workflow.run_folder import as_solved, folder_of
 
 
-def overview(cases: Sequence[Case], *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
+def overview(cases: Sequence[Case], *, runs: Path | str = "runs", trust: bool = False, watch: Watch = silent) -> Path:
     """Write runs/overview.html about runs that have a posterior, in the order given; returns the page.
 
-    In place of a case that `run` took round the loop stands its last child, which has the posterior.
+    In place of a case that `run` took round the loop stands its last child, which has the posterior. trust: whether the
+    file of a law that the child names may be run.
 
     Errors: InputError where an ensemble or a posterior of a case is missing or out of date; StorageError when a file
     cannot be written.
@@ -24,16 +25,16 @@ def overview(cases: Sequence[Case], *, runs: Path | str = "runs", watch: Watch =
     known = []
     for case in cases:
         watch(Progress(f"reading {case.name}"))
-        shown = _with_posterior(case, runs)
+        shown = _with_posterior(case, runs, trust)
         known.append(results_of(as_solved(shown, folder_of(runs, shown)), shown, runs, above=""))
     watch(Progress("drawing the overview"))
     return write_overview(Path(runs) / "overview.html", known)
 
 
-def _with_posterior(case: Case, runs: Path | str) -> Case:
+def _with_posterior(case: Case, runs: Path | str, trust: bool) -> Case:
     """The case, or the last child of its ladder where only that has a posterior."""
     ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
     if ladder is None or (folder_of(runs, case) / "posterior.h5").exists():
         return case
     child = case.source.with_name(ladder.steps[-1].config)
-    return load_case(child, trust=case.effect_file is not None) if child.exists() else case
+    return load_case(child, trust) if child.exists() else case
