@@ -43,7 +43,7 @@ def case(monkeypatch: pytest.MonkeyPatch) -> Case:
     model = Model(case, build_site(case), station, NEWTON)
     STARTS.clear()
     monkeypatch.setattr("vegglue.workflow.run_folder.model_in", lambda case: model)
-    monkeypatch.setattr("vegglue.workflow.run_folder.linearise", two_wells)
+    monkeypatch.setattr("vegglue.workflow.run_folder.linearise_from", two_wells)
     monkeypatch.setattr("vegglue.calibration.fit.linearise", two_wells)
     return case
 

@@ -14,7 +14,7 @@ from vegglue.calibration.noise import (
     with_independent_grid_errors,
     with_model_error,
 )
-from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
@@ -81,7 +81,7 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         noise = with_model_error(noise, model_error_columns(coarse, near, coarse.case.model_error))
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
-    start = None if z is None else linearise(model, z, near) or linearise(model, z)
+    start = None if z is None else linearise_from(model, z, near)
     first = with_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
     base = with_error_of_grid(with_coarse_point(first))
     if near is not None and base.noise.model_error.any() and _is_near(base, near.z):
@@ -156,7 +156,7 @@ def _best_from_prior(model: Model, noise: Noise) -> Point:
 
 def _from_coarse(model: Model, noise: Noise, near: Point) -> MapEstimate:
     """The MAP estimate of a model, from a point of one on cells of twice the size."""
-    start = linearise(model, near.z, near) or linearise(model, near.z)
+    start = linearise_from(model, near.z, near)
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow on cells of half the size; refine `grid`.")
     return fit(model, noise, start)
@@ -176,15 +176,11 @@ def places_of_prior(parameters: int) -> Array:
     return np.asarray(0.7 * places)
 
 
-def _near_or_from_afar(model: Model, z: Array, near: Point | None) -> Point | None:
-    return linearise(model, z, near) or linearise(model, z)
-
-
 def _starts(model: Model, noise: Noise) -> list[Point]:
     """The FITTED_POINTS with the least objective, of the places of the prior."""
     middle, *others = places_of_prior(len(model.names))
     first = linearise(model, middle)
-    tried = [first, *in_threads(_near_or_from_afar, [(model, z, first) for z in others])]
+    tried = [first, *in_threads(linearise_from, [(model, z, first) for z in others])]
     found = [point for point in tried if point is not None]
     if not found:
         raise InputError(f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior.")

@@ -24,7 +24,7 @@ from vegglue.calibration.baseline import (
 from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_under
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Model, linearise
+from vegglue.engine.interface import Model, linearise, linearise_from
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import Suspect
@@ -86,7 +86,7 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
 
 def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
     model = _with(search.model, trial)
-    point = linearise(model, start, search.point) or linearise(model, start)
+    point = linearise_from(model, start, search.point)
     return None if point is None else fit(model, search.noise, point, REFIT_STEPS)
 
 
@@ -105,7 +105,7 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     model = _with(base.model, best)
     if base.coarse is None:
         return with_own_error(Baseline(model, base.noise, best.fitted, None, None))
-    start = linearise(model, place.z, place) or linearise(model, place.z)
+    start = linearise_from(model, place.z, place)
     if start is None:
         return None
     trial = Baseline(model, base.noise, fit(model, base.noise, start), _with(base.coarse, best), base.on_coarse)

@@ -104,6 +104,12 @@ def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None
     return model.engine.linearise(model, z, near)
 
 
+def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:
+    """`linearise` from a point nearby, and from afar where that leads nowhere or there is none."""
+    found = None if near is None else linearise(model, z, near)
+    return found or linearise(model, z)
+
+
 def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
     """Predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known already."""
     return model.engine.predict(model, points, z)

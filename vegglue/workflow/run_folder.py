@@ -21,7 +21,7 @@ from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.diagnosis.excluded_stations import excluding
-from vegglue.engine.interface import Model, linearise
+from vegglue.engine.interface import Model, linearise_from
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
@@ -131,7 +131,7 @@ def _leads_to(base: Baseline, known: Array) -> bool:
     """Whether a fit from another place ends where the base lies, or finds no flow."""
     if _same_place(base, known):
         return True
-    start = linearise(base.model, known, base.fitted.point) or linearise(base.model, known)
+    start = linearise_from(base.model, known, base.fitted.point)
     return start is None or _same_place(base, fit(base.model, base.noise, start).point.z)
 
 
