@@ -25,8 +25,8 @@ from vegglue.solver.wet_band import chord_in_band, rows_inside, widen
 
 # Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
 DIFFERENCE_STEP = 1e-3
-# Correction of a tangent, over its largest entry, after which it is exact enough [-]: the next one would be some thirty
-# times smaller. With 1e-5 a diagnosis of 9,600 cells takes a third longer and says the same to five digits.
+# Correction of a tangent, over its largest entry, after which it is exact enough [-]: a diagnosis says the same to five
+# digits as with 1e-5, with which the tangents of a baseline of 9,600 cells take 4.5 s of a core instead of 2.7.
 TANGENT_TOLERANCE = 1e-3
 # Chord steps with the factors of another flow before new ones are made [-]. Of 422 flows of a run 406 got there in ten,
 # most in three; factors cost as much as some ten steps.
