@@ -11,7 +11,7 @@ from posteriors import changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
-from vegglue.report_page.answer_words import headline, ladder_in_words, next_steps, why_not_to_rely
+from vegglue.report_page.answer_words import headline, ladder_in_words, next_steps, of_which_model, why_not_to_rely
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
 from vegglue.results.ladder import Ladder, LadderStep
@@ -51,6 +51,21 @@ def test_every_verdict_is_one_plain_sentence(toy: Run, found, said: str) -> None
     words = plain(headline(replace(toy, diagnosis=found)))
     assert said in words
     assert words.endswith(".")
+
+
+def test_the_page_of_a_child_tells_what_was_missing(toy: Run) -> None:
+    """`run` makes no page of the case itself: that of its last child has to tell the whole."""
+    first = a_diagnosis(verdict={"kind": "one-of"})
+    child = replace(toy, diagnosis=NOTHING, loop=LoopResults(behind=first, ladder=LADDER))
+    said = plain(headline(child))
+    assert f"was missing from {first.name}: most likely (70 %) störung" in said
+    assert said.endswith("Nothing is missing from this model that these data could show.")
+    assert of_which_model(child).startswith(f"This page is about the model made of {FIRST.name} by adding")
+    assert child.behind is first, "of which both models are drawn"
+    # What is missing still goes before what was missing.
+    more = replace(child, diagnosis=replace(first, name="child"))
+    assert "missing from this model" in plain(headline(more))
+    assert not of_which_model(more)
 
 
 def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy: Run) -> None:

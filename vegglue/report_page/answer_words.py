@@ -36,12 +36,19 @@ QUESTIONS_SHOWN = 3
 
 
 def headline(run: Run) -> str:
-    """The verdict in one sentence."""
-    found = run.behind
+    """The verdict in one sentence; of a model that was extended, what was missing before and what is now."""
+    found, own = run.behind, run.diagnosis
     if found is None:
         return verdict_of(run.case, run.posterior)
+    if found is own:
+        return _said(found, "this model", "is")
+    before = _said(found, html.escape(found.name), "was")
+    return before if own is None else f"{before} {_said(own, 'this model', 'is')}"
+
+
+def _said(found: Diagnosis, model: str, tense: str) -> str:
+    """The verdict on a model in one sentence; tense: is or was."""
     kind = found.verdict.kind
-    model, tense = ("this model", "is") if run.diagnosis else (html.escape(found.name), "was")
     if kind == "nothing-missing":
         return f"Nothing {tense} missing from {model} that these data could show."
     if kind == "instrument":
@@ -96,7 +103,7 @@ def _amplitude_in_words(amplitude: AmplitudeEstimate) -> str:
 def of_which_model(run: Run) -> str:
     """Which model the page is about, where it is not the one that was diagnosed; '' else."""
     ladder = run.loop.ladder
-    if run.diagnosis is not None or run.loop.behind is None or ladder is None:
+    if run.behind is run.diagnosis or ladder is None:
         return ""
     added = [name for step in ladder.steps for name in step.added if name in run.case.effects]
     return (
@@ -112,7 +119,7 @@ def _listed(words: list[str]) -> str:
 def why_not_to_rely(run: Run) -> str:
     """What forbids using the answer, in one sentence; '' where nothing does."""
     told = run.behind is None and not run.posterior.claimed  # by the headline
-    verdict = [*_of_verdict(run.behind)]
+    verdict = [*_of_verdict(run.diagnosis or run.behind)]
     parameters = [*([] if told else _of_posterior(run.posterior)), *_of_ensemble(run.ensemble)]
     if verdict and parameters:
         subject = "Neither the verdict nor the parameters below are"

@@ -62,8 +62,17 @@ class Run:
 
     @property
     def behind(self) -> Diagnosis | None:
-        """The diagnosis that says what is missing: of the case, else of the model it extends."""
-        return self.diagnosis or self.loop.behind
+        """The diagnosis that says what is missing: of the case; of the model it extends where it has none, or names
+        nothing more.
+        """
+        own, first = self.diagnosis, self.loop.behind
+        if own is None or first is None:
+            return own or first
+        return first if _names_something(first) and not _names_something(own) else own
+
+
+def _names_something(found: Diagnosis) -> bool:
+    return bool(found.steps or found.places or found.instruments or found.field or found.laws)
 
 
 def is_synthetic(case: Case) -> bool:
