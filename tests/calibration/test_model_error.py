@@ -12,10 +12,11 @@ from vegglue.calibration.baseline import with_own_error
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.model_error import bumps, field_columns, model_error_columns, responses_to_bumps
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
+from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case, ModelError
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point
-from vegglue.screening.candidates import effect_entry, place_candidate
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.screening.candidates import effect_entry, place_candidate, with_effect
 from vegglue.site.grid import Grid
 
 CASE_ALLOWS = ModelError(friction=0.05, bed=0.01)
@@ -131,6 +132,27 @@ def test_something_unlisted_in_the_model_may_differ_from_its_spot(flowing: tuple
     assert twice == pytest.approx(2.0 * own)
     assert not off.any()
     assert 1 < own.shape[1] < 60, "bumps around the place, not all over the channel"
+
+
+@pytest.mark.parametrize(("name", "amplitude"), [("unlisted_object", 0.2), ("unlisted_inflow", 0.05)])
+def test_an_error_of_shape_does_not_look_like_another_size(
+    flowing: tuple[Model, Point], name: str, amplitude: float
+) -> None:
+    """Else the size that was calibrated is lost in it: water that enters at a place was all error of shape."""
+    model, point = flowing
+    place = {"x": 15.0, "y": 0.2, "length": 0.6, "width": 0.5}
+    candidate = place_candidate(library()[name], place)
+    case = with_effect(model.case, candidate, place)
+    size = z_of(case.parameters[candidate.parameter], amplitude)
+    there = linearise(replace(model, case=case), np.append(point.z, size))
+    assert there is not None
+    columns = model_error_columns(replace(model, case=case), there, CASE_ALLOWS)
+    shape = columns[:, model_error_columns(model, point, CASE_ALLOWS).shape[1] :]
+    trace, weight = there.slope[:, -1], model.station["standard_error"].to_numpy(float) ** -2.0
+    together = (weight * trace) @ shape / (weight @ trace**2)
+    spread = float(np.sqrt(together @ together))
+    assert (shape**2).sum() > 0.0
+    assert spread < 0.1 * abs(size), "of the size"
 
 
 def linear(case: Case) -> tuple[Array, Array]:

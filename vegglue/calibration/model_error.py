@@ -5,7 +5,8 @@
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
 deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else
-in nature: its term may differ by SHAPE_ERROR of its size in every bump around it.
+in nature: its term may differ by SHAPE_ERROR of its size in every bump around it. What of that would look like another
+size of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
 Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
 checked against it); the fields of bumps are a definition of this project.
 """
@@ -125,16 +126,31 @@ def unlisted_in(case: Case) -> list[UnlistedObject]:
 
 
 def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one: UnlistedObject) -> Array:
-    """Bumps around a spot, each of SHAPE_ERROR of its size."""
-    place, half = one.place, FRICTION_RADIUS * half_width(model.site)
-    over = bumps(model.site.grid, half, half)
+    """Bumps around a spot, each of SHAPE_ERROR of its size, but for what looks like another size."""
+    place, half, grid = one.place, FRICTION_RADIUS * half_width(model.site), model.site.grid
+    over = bumps(grid, half, half)
     away = ((over.x[:, None] - place["x"]) / (place["length"] + over.length)) ** 2
     away = away + ((over.y[None] - place["y"]) / (place["width"] + over.width)) ** 2
     size = float(value_of(one.amplitude, theta_at(model.case, point.z[None]), 1)[0])
     if one.term == "inflow":
         size /= np.pi * place["length"] * place["width"]
     near = responses_to_bumps(responses, one.term, over)[:, away < AROUND**2]
-    return np.asarray(SHAPE_ERROR * size * near)
+    along = np.exp(-(((grid.x - place["x"]) / place["length"]) ** 2))
+    across = np.exp(-(((grid.y - place["y"]) / place["width"]) ** 2))
+    own = np.einsum("i,nij,j->n", along, responses.of[one.term], across)
+    return SHAPE_ERROR * size * _without(own, near, _weights_of(model))
+
+
+def _weights_of(model: Model) -> Array:
+    """1 / s^2 of each station [per its unit squared], 0 where no standard error s is told."""
+    return np.nan_to_num(model.station["standard_error"].to_numpy(float) ** -2.0)
+
+
+def _without(direction: Array, columns: Array, weight: Array) -> Array:
+    """Columns (station, k) less their part along a direction (station,), by weights (station,)."""
+    squared = float(weight @ direction**2)
+    share = (weight * direction) @ columns / squared if squared > 0.0 else np.zeros(columns.shape[1])
+    return np.asarray(columns - np.outer(direction, share))
 
 
 def _raster(centres: Array, spacing: float) -> Array:
