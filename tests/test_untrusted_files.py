@@ -24,6 +24,7 @@ def test_the_valid_file_is_read(reader: Reader, tmp_path: Path) -> None:
     assert outcome(reader, tmp_path, reader.valid) == ""
 
 
+@pytest.mark.slow
 @OF_READERS
 @SOME
 @given(edits=EDITS)
@@ -31,6 +32,7 @@ def test_an_edited_file_is_read_or_refused(reader: Reader, tmp_path: Path, edits
     assert len(outcome(reader, tmp_path, edited(reader.valid, edits)).splitlines()) <= 1
 
 
+@pytest.mark.slow
 @OF_READERS
 @SOME
 @given(content=st.binary(max_size=200) | st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")))

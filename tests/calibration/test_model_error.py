@@ -99,6 +99,7 @@ def test_what_one_experiment_sees_another_sees_too(flowing: tuple[Model, Point])
     assert np.median([unit[a] @ unit[b] for a, b in same]) > 0.5
 
 
+@pytest.mark.slow
 def test_responses_of_all_experiments_stand_in_the_rows_of_their_stations(flowing: tuple[Model, Point]) -> None:
     model, point = flowing
     found = cell_responses(model, point, ("friction",)).of["friction"]

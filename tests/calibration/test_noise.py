@@ -76,6 +76,7 @@ def test_the_error_of_the_grid_makes_errors_larger() -> None:
     assert covariance_of(after)[4, 4] == covariance_of(before)[4, 4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [0.0, 0.5])
 def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
     random, physics = np.random.default_rng(4), smooth()

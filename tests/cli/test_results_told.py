@@ -94,6 +94,7 @@ def test_a_mistake_leaves_standard_output_empty(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
 
 
+@pytest.mark.slow
 def test_no_colour_goes_into_a_pipe(tmp_path: Path) -> None:
     for arguments in (("--help",), ("diagnose", "--help"), ("effects",), ("effects", "wind")):
         assert "\x1b" not in vegglue(tmp_path, *arguments).stdout, arguments

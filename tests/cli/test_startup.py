@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from reach import ENVIRONMENT, ROOT, write_reach
 
+pytestmark = pytest.mark.slow
+
 HEAVY = {"dask", "distributed", "h5py", "jinja2", "joblib", "matplotlib", "numba", "numpy", "pandas", "scipy"}
 # Runs a command in a fresh interpreter, then tells which modules are there on the last line of standard error.
 TELLING = """

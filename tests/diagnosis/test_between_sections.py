@@ -13,6 +13,8 @@ from vegglue.calibration.noise import with_model_error
 from vegglue.diagnosis.between_sections import halfway, largest_error_between
 from vegglue.engine.interface import Model, Point
 
+pytestmark = pytest.mark.slow
+
 SECTIONS, POINTS, PARAMETERS, COLUMNS, ERROR = ("A",), 12, 3, 5, 0.01
 STATION = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
 

@@ -23,6 +23,8 @@ from vegglue.workflow import run_folder
 from vegglue.workflow.compare import left_out
 from vegglue.workflow.extend import write_child
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from coarse_twin import coarse_twin
 from diagnoses import a_suspect
 
@@ -10,6 +11,8 @@ from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
+
+pytestmark = pytest.mark.slow
 
 
 def a_step(*rivals: str) -> Step:

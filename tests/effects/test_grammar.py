@@ -19,6 +19,7 @@ from vegglue.screening.candidates import candidates_of
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_every_law_keeps_the_contract(effect: Effect) -> None:
     assert breaches(effect) == []

@@ -17,6 +17,8 @@ from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.equations import faces
 from vegglue.resistance import bed_laws
 
+pytestmark = pytest.mark.slow
+
 WIDTH, DEPTH, SLOPE = 6.0, 0.5, 0.001
 SMOOTH, ROUGH = 45.0, 25.0
 COLUMNS, SPACING = 60, 25.0

@@ -23,6 +23,8 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.solver.status import SOLVED_BY_NEWTON
 from vegglue.storage.result_files import read_ensemble
 
+pytestmark = pytest.mark.slow
+
 # So many that a run is still on its way when it is stopped, on a busy machine too: some second.
 CHUNKS = 16
 CHUNK = chunk_size(4096)
@@ -95,7 +97,6 @@ def stored(part: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(np.isfinite(seconds)), seconds
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemble, jobs: int) -> None:
     config = several_chunks(tmp_path)
@@ -118,7 +119,6 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemb
     np.testing.assert_array_equal(ensemble.seconds[there], seconds[there])  # of the wall clock: not solved again
 
 
-@pytest.mark.slow
 def test_the_numbers_do_not_depend_on_the_number_of_jobs(tmp_path: Path, uninterrupted: Ensemble) -> None:
     vegglue(tmp_path, "simulate", several_chunks(tmp_path).name, "--jobs", 2)
     ensemble = read_ensemble(tmp_path / ENSEMBLE)
@@ -135,7 +135,6 @@ def interruptible() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)
@@ -149,7 +148,6 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     assert stored(tmp_path / PART)[0].size >= CHUNK
 
 
-@pytest.mark.slow
 def test_a_second_run_of_one_name_is_refused(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)
     with running(tmp_path, "simulate", config.name, "--jobs", 1) as process:
@@ -222,7 +220,6 @@ def room_for(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.slow
 def test_a_disk_without_room_is_one_sentence_and_keeps_what_was_there(tmp_path: Path, say: Say) -> None:
     simulated(tmp_path)
     assert say("infer") == (0, "")

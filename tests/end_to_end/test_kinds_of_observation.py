@@ -38,6 +38,8 @@ from vegglue.site.gridded_site import build_site
 from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
 from vegglue.twins.twin_files import write_twin
 
+pytestmark = pytest.mark.slow
+
 TRUTH = {"n_b": 0.05, "q": 2.13, "phi": 8.0}
 # A discharge that only those know who measured it.
 CHANGES = (
@@ -163,7 +165,6 @@ def test_models_are_compared_and_measurements_planned(line: Line) -> None:
     save_fingerprint_figure(trace, base.model.station, "m/s", line.folder / "wind.png")
 
 
-@pytest.mark.slow
 def _as_run(line: Line, flow: dict[str, FlowFields]) -> Run:
     site = build_site(line.case)
     return Run(
@@ -207,7 +208,6 @@ def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
     save_diagnosis_figure(other.diagnosis, other.case, other.folder / "diagnosis.png")
 
 
-@pytest.mark.slow
 def test_their_page_is_written(other: Line) -> None:
     flow = solve_flow(other.case, other.posterior.marginals.median)
     page = write_report(_as_run(other, flow))

@@ -46,6 +46,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
         yield Pair(inside, command, runs, (ensembles[0], ensembles[1]))
 
 
+@pytest.mark.slow
 def test_the_ensemble_is_the_same(pair: Pair) -> None:
     inside, command = pair.ensembles
     np.testing.assert_array_equal(command.parameters["n_b"], inside.parameters["n_b"])

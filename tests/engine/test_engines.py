@@ -26,6 +26,8 @@ from vegglue.flow.local_changes import TERMS, Term
 from vegglue.screening.candidates import candidates_of, cause_of, with_effect
 from vegglue.site.gridded_site import build_site
 
+pytestmark = pytest.mark.slow
+
 CASE = Case.model_validate(
     {
         "source": Path("engines"),
@@ -143,7 +145,6 @@ def test_calibration_ends_at_the_same_place(models: tuple[Model, Model], points:
     assert np.abs(ends[1].point.z - ends[0].point.z).max() < 0.05 * spread.min()
 
 
-@pytest.mark.slow
 def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     """Streamlining is hidden; scores of all effects, the verdict and the amplitude come out alike."""
     hidden = next(one for one in candidates_of(CASE, models[0].station) if one.name == "streamlining")

@@ -15,6 +15,8 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.engine.newton import predict_near
 from vegglue.measurements.observations import read_observations
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

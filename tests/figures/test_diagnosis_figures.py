@@ -27,6 +27,8 @@ from vegglue.report_page.diagnosis_words import diagnosis_section, ranked_suspec
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
 from vegglue.site.polygons import corners_of
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 SUSPECTS = pd.DataFrame({
     "name": list("abcde"), "status": list(MARKS), "first": [40.0, -30.0, 9.0, 1.0, 0.5],

@@ -70,6 +70,7 @@ def test_land_raises_no_viscosity() -> None:
     assert found[True] < 0.02
 
 
+@pytest.mark.slow
 def test_tangent_equals_difference_of_solved_states() -> None:
     """Of the discharge, with a mixing length, relative to the largest answer in the water."""
 

@@ -19,6 +19,8 @@ from vegglue.importers.matlab_exports import read_matlab
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.terrain_files import read_geotiff
 
+pytestmark = pytest.mark.slow
+
 VALID = {name: content for name, content, _ in IMPORTS}
 SHEET = "xl/worksheets/sheet1.xml"
 MOST = 400_000_000  # bytes, a few times the largest file of data

@@ -111,6 +111,7 @@ def test_a_workbook_is_read_like_a_table(tmp_path: Path) -> None:
         read_loosely(tmp_path / "none.xlsx")
 
 
+@pytest.mark.slow
 def test_what_is_wrong_in_a_file_is_named_by_check(tmp_path: Path) -> None:
     """A wrong unit, a station outside the grid, and a stream that is reversed."""
     rows = "".join(f"8,{y},{40 + y}\n20,{y},{42 + y}\n" for y in (-1, 0, 1))

@@ -69,6 +69,7 @@ def test_whatever_stands_in_it_is_read_or_refused(tmp_path: Path, place: tuple[A
         assert len(said) < 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "place", [one for one in places(BENT) if one[:1] in (("grid",), ("frame",), ("walls",))], ids=str
 )

@@ -11,6 +11,8 @@ from vegglue.inference.importance_sampling import Sample, sample
 from vegglue.inference.student_mixture import Mixture, draw, log_density, mixture_at_modes, pooled_weights, tempered
 from vegglue.inference.weighted_statistics import effective_size, pareto_shape
 
+pytestmark = pytest.mark.slow
+
 SEEDS = range(4)
 
 
@@ -99,7 +101,6 @@ def test_same_seed_same_draws_and_all_count() -> None:
     assert not np.array_equal(first.z, sample(bent, squares, start(2), 300, seed=5).z)
 
 
-@pytest.mark.slow
 def test_too_few_rounds_are_no_error() -> None:
     def needle(z: np.ndarray, values: np.ndarray) -> np.ndarray:
         return -0.5 * np.sum((z - 5) ** 2 / 1e-8, axis=1)

@@ -61,6 +61,7 @@ def noise(reach: tuple[Case, Observations, Ensemble]) -> Noise:
     return modes_and_errors(model_of(case, observations), ensemble, "known").noise
 
 
+@pytest.mark.slow
 def test_a_thousand_effective_draws_around_the_truth(refined: Posterior) -> None:
     assert refined.settings.method == "refine"
     assert refined.weighting.effective_size >= 1000
@@ -97,6 +98,7 @@ def test_the_log_density_is_that_of_errors_and_prior(
     assert found - found[0] == pytest.approx(expected - expected[0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_numbers_do_not_depend_on_the_jobs(reach: tuple[Case, Observations, Ensemble], refined: Posterior) -> None:
     case, observations, ensemble = reach
     with at_most(2):
@@ -140,6 +142,7 @@ def test_what_is_said(refined: Posterior) -> None:
     assert "no posterior is claimed" not in said
 
 
+@pytest.mark.slow
 def test_errors_taken_from_the_residual_are_said_to_be(tmp_path: Path) -> None:
     case, observations, ensemble = made(tmp_path, (KNOWN[0], "simulate: {members: 64, seed: 7}"))
     posterior = refine(ensemble, case, observations)
@@ -159,6 +162,7 @@ def test_an_informal_likelihood_is_not_refined(reach: tuple[Case, Observations, 
     assert refinable(case)
 
 
+@pytest.mark.slow
 def test_the_method_can_be_chosen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,6 +89,7 @@ def drawn(seed: int, missing: float = 0.0) -> tuple[list[HypothesisKind], Array]
     return kinds_of(values), random.standard_normal((DRAWS, ROWS))
 
 
+@pytest.mark.slow
 def test_alarms_are_as_rare_as_said() -> None:
     chances = np.array([alarm_p(*drawn(seed), seed) for seed in range(NULLS)])
     assert scipy.stats.kstest(chances, "uniform").pvalue > 1e-3

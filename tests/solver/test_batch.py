@@ -134,6 +134,7 @@ def test_a_member_solved_from_far_away_is_the_same(tmp_path: Path) -> None:
     assert np.abs(both[0] - both[1]).max() > 0.1
 
 
+@pytest.mark.slow
 def test_a_member_without_steady_state_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
     case, site, observations = reach_at(tmp_path, *OUTLET)
     column = list(case.parameters).index("outlet")
@@ -164,6 +165,7 @@ def test_a_case_says_how_long_to_march(tmp_path: Path) -> None:
     assert rows["reason"][0].endswith(("after 0.08 s", "of marching"))
 
 
+@pytest.mark.slow
 def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path) -> None:
     shallower = ("low: -3, high: 1", "low: -0.7, high: 1")
     case, _, observations = reach_at(tmp_path, *OUTLET, shallower, ("members: 1024", "members: 8"))

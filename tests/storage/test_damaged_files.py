@@ -16,6 +16,8 @@ from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import EnsembleWriter, ensemble_writer, part_file, remove_left_over_fields
 from vegglue.twins.sealed_answer import opened_answer
 
+pytestmark = pytest.mark.slow
+
 # Damaged one by one: each is looked at by a process of its own, which takes a third of a second.
 PLACES = 20
 CHUNKS_OF_MEMBERS = [np.sort(members_of(chunk)) for chunk in sorted(ALL)]

@@ -32,6 +32,7 @@ def test_ensemble_comes_back_as_it_went(path: Path) -> None:
     assert stored_hash(path) == HASH
 
 
+@pytest.mark.slow
 def test_missing_other_and_broken_ensembles_are_told(path: Path) -> None:
     with pytest.raises(InputError, match=r"ensemble\.h5: .*found no file; run `vegglue simulate CONFIG`"):
         read_ensemble(path)

@@ -31,6 +31,8 @@ from vegglue.storage.hdf5_reading import READ_HDF5
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import ensemble_writer, part_file
 
+pytestmark = pytest.mark.slow
+
 Valid = Callable[[str], bytes]
 OF_RESULTS = pytest.mark.parametrize("kept", RESULTS, ids=lambda kept: kept.name)
 ANY_EXAMPLES, CHILDREN = 60, 8  # a damaged file costs its reader, and another takes a third of a second to begin
@@ -76,7 +78,6 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> Valid:
     return content_of
 
 
-@pytest.mark.slow
 @OF_RESULTS
 @settings(max_examples=ANY_EXAMPLES, **SHARED)
 @given(change=CHANGE)
@@ -119,7 +120,6 @@ def test_damage_of_a_file_with_a_digest_is_noticed(
         assert "has changed since it was written" in sentence_of(kept, path) or kept.name == "flow.h5"
 
 
-@pytest.mark.slow
 @OF_RESULTS
 @settings(max_examples=CHILDREN, **SHARED)
 @given(edits=DAMAGE)

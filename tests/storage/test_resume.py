@@ -28,6 +28,8 @@ from vegglue.results.ensemble import Header
 from vegglue.storage.result_files import read_ensemble
 from vegglue.storage.resume import ensemble_writer
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:

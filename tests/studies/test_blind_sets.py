@@ -13,6 +13,8 @@ from site_reach import Truth, bed_level, reach_of
 
 from vegglue.screening.candidates import candidates_of
 
+pytestmark = pytest.mark.slow
+
 THETA = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7, "eddy_viscosity": 0.008}
 
 
@@ -104,7 +106,6 @@ def test_a_seed_is_the_same_on_every_machine():
     assert hash_of("second/twin/listed6/0") != hash_of("second/twin/listed6/1")
 
 
-@pytest.mark.slow
 def test_the_record_of_a_data_set_holds_what_the_page_asks_for(tmp_path):
     record = study(trial("listed6", hide=("discharge_error[high]",)))
     path = tmp_path / "records.jsonl"

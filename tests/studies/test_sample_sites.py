@@ -6,6 +6,7 @@ import pytest
 from sample_sites import BEND, FLUME, WRITERS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", [BEND, FLUME], ids=lambda folder: folder.name)
 def test_a_sample_is_what_its_script_makes(tmp_path: Path, folder: Path) -> None:
     """Word for word but for numbers, whose last digits another machine may have otherwise."""

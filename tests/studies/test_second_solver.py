@@ -13,6 +13,8 @@ from second_laws import Ground, closure_of
 from second_solver import Ends, Flow, Reach, march, rates, steady
 from site_reach import Truth, at, centres, reach_of, steady_flow
 
+pytestmark = pytest.mark.slow
+
 BAR = {"scour": [47.0, -0.5, -0.22, 1.6, 0.5]}
 LARGE = (1.0, 0.375)
 SITE = Truth(nb=0.04, ks=0.6, phi=3.0, hd=0.8, settings={})
@@ -86,7 +88,6 @@ def test_every_section_passes_the_discharge():
     np.testing.assert_allclose(through, 2.66, rtol=0.01)
 
 
-@pytest.mark.slow
 def test_the_fourth_flow_of_open_a_is_met():
     """0.0008 m/s root mean square with dx 0.5 m, 0.0012 with 0.25 m; kappa and the depth that shears are from it."""
     truth = json.loads((OPEN_CASES / "open-a" / "answer.json").read_text(encoding="utf-8"))["truth"]

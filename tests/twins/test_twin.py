@@ -26,6 +26,8 @@ from vegglue.twins.twin import errors_named, measured_twin, true_place, twin_bas
 from vegglue.twins.twin_files import config_in, write_twin
 from vegglue.workflow.run_folder import model_in
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 
@@ -124,7 +126,6 @@ def test_something_unlisted_at_a_named_place_stands_there(ground: TwinBase) -> N
     assert hidden.signal == pytest.approx(6.0, rel=0.1)
 
 
-@pytest.mark.slow
 def test_the_seed_decides_everything(ground: TwinBase) -> None:
     first, again = (measured_twin(ground, ["?"], 6.0, "white", 5) for _ in range(2))
     assert first[0]["value"].tolist() == again[0]["value"].tolist()
@@ -132,7 +133,6 @@ def test_the_seed_decides_everything(ground: TwinBase) -> None:
     assert len({measured_twin(ground, ["?"], 6.0, "white", seed)[1].hidden[0].name for seed in range(4)}) > 1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pier", "jet", "sink", "fallen_tree", "scour_hole"])
 def test_what_is_in_no_list_can_be_hidden(ground: TwinBase, name: str) -> None:
     _, answer = measured_twin(ground, [f"unlisted:{name}"], 6.0, "white", 2)
@@ -230,7 +230,6 @@ def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:
         config_in(tmp_path)
 
 
-@pytest.mark.slow
 def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     assert said_to(monkeypatch, capsys, "twin", CONFIG, "--hide", "gauge_datum=0.1", "--seed", 2, "--to", "play") == (

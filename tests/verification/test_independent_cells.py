@@ -13,11 +13,14 @@ import json
 
 import numpy as np
 import pandas as pd
+import pytest
 from channels import GRAVITY, centres
 from open_cases import OPEN_CASES
 from scipy.linalg import solve_banded
 
 from vegglue.arrays import Array
+
+pytestmark = pytest.mark.slow
 
 FOLDER = OPEN_CASES / "open-e"
 # Width of the data's cells, step along x, half the width that holds all water, least depth of their wet cells, depth

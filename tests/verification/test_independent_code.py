@@ -21,6 +21,8 @@ from vegglue.flow.sensor import read_sensors
 from vegglue.resistance import bed_laws
 from vegglue.site.grid import Grid
 
+pytestmark = pytest.mark.slow
+
 DELFT3D = Path(__file__).parents[3] / "shared" / "cases" / "delft3d"
 CELL = (0.5, 0.375)
 

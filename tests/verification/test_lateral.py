@@ -74,6 +74,7 @@ def integrated(viscosity: float):
     return halves(lambda s: found.sol(s)[0], lambda s: found.sol(s)[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [pytest.param("shiono-knight", marks=pytest.mark.slow), "constant"])
 def test_velocity_across_two_roughnesses(kind):
     """Far speeds 1.01 and 0.56 m/s. With 0.125 m cells within 0.34 mm/s, order 1.93 (closed form), 1.95 (constant)."""

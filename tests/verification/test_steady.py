@@ -22,6 +22,8 @@ from vegglue.solver.jacobian import factors, jacobian
 from vegglue.solver.march import USUAL_FALL_BACK, march, march_to_rest
 from vegglue.solver.status import SOLVED_BY_NEWTON
 
+pytestmark = pytest.mark.slow
+
 CHANCE = np.random.default_rng(3)
 
 

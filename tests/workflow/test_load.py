@@ -12,6 +12,8 @@ import vegglue
 from vegglue.storage import labelled_arrays
 from vegglue.storage.result_files import write_diagnosis, write_posterior
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:

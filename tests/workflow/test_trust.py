@@ -65,6 +65,7 @@ def test_the_folder_of_a_run_lies_in_runs(tmp_path: Path, monkeypatch: pytest.Mo
         load_case(write_reach(tmp_path, ("name: brook", f"name: {name!r}")))
 
 
+@pytest.mark.slow
 def test_nothing_that_is_read_can_hold_code() -> None:
     """No pickle, eval or shell anywhere but in what speaks to workers of a cluster, which the user names. Two files
     begin a process: a Python of its own words, which reads a result file before the command does, and the command of
