@@ -8,7 +8,10 @@ MINUTES ?= 60
 KILLS ?= 208
 VENV := .venv
 BIN := $(VENV)/bin
+# What runs the product, and with it what the tests need. Bytecode is made where a module is first imported: most never are.
 READY := $(VENV)/.ready
+TESTABLE := $(VENV)/.testable
+INSTALL := PYTHONWARNINGS=ignore PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet --no-compile --editable
 VEGGLUE := $(BIN)/vegglue
 # One process a core, but no more than four: each takes some 1.2 GB. The tests of a file share what they set up.
 PYTEST := $(BIN)/pytest tests -n auto --maxprocesses 4 --dist loadfile
@@ -23,11 +26,13 @@ export OMP_NUM_THREADS := 1
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
 
-setup: $(READY)  # the environment, in .venv
+setup: $(TESTABLE)  # the environment, in .venv
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(INSTALL) .
+	touch $@
+$(TESTABLE): $(READY)
+	$(INSTALL) '.[test]'
 	touch $@
 
 demo: $(READY)  # the loop on a site with a hidden effect, then the paper's D3a, to finished reports
@@ -58,33 +63,33 @@ runs/%/posterior.h5: runs/%/ensemble.h5
 runs/%/report.html: runs/%/posterior.h5
 	$(VEGGLUE) report configs/$*.yaml
 
-test: $(READY)  # everything that must pass
+test: $(TESTABLE)  # everything that must pass
 	$(BIN)/ruff check vegglue tests
 	$(BIN)/mypy
 	$(PYTEST)
 
-check: $(READY)  # the fast part
+check: $(TESTABLE)  # the fast part
 	$(BIN)/ruff check vegglue tests
 	$(BIN)/mypy
 	$(PYTEST) -m 'not slow'
 
-bench: $(READY)  # measured speed: members/s, cell-steps/s, share of the kernel
+bench: $(TESTABLE)  # measured speed: members/s, cell-steps/s, share of the kernel
 	$(BIN)/python tests/studies/bench.py
 
-blind: $(READY)  # the study of docs/blind.md: hours; goes on where it was stopped
+blind: $(TESTABLE)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)
 
-laws: $(READY)  # the study of docs/discover_study.md: hours; goes on where it was stopped
+laws: $(TESTABLE)  # the study of docs/discover_study.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/laws.py
 
-faults: $(READY)  # every command killed at random moments, counted in docs/faults.md: half an hour
+faults: $(TESTABLE)  # every command killed at random moments, counted in docs/faults.md: half an hour
 	$(BIN)/python tests/kills.py $(KILLS)
 	$(BIN)/python tests/fault_table.py
 
-confluence: $(READY)  # the numbers of docs/confluence.md, from the published set in the folder DATA
+confluence: $(TESTABLE)  # the numbers of docs/confluence.md, from the published set in the folder DATA
 	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)
 
-fuzz: $(READY)  # files from strangers, bred towards lines not yet reached, for MINUTES
+fuzz: $(TESTABLE)  # files from strangers, bred towards lines not yet reached, for MINUTES
 	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES)
 	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES) --results
 
