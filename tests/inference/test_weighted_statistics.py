@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from vegglue.inference.weighted_statistics import (
     correlation,
@@ -49,6 +50,15 @@ def test_mixture_of_normal_members_adds_the_variances() -> None:
     centres = np.random.default_rng(2).normal(3, 0.4, (20000, 1))
     got = mixture_quantile(centres, np.ones(20000), np.array([0.3]), [0.025, 0.975])
     assert got[:, 0] == pytest.approx([3 - 1.96 * 0.5, 3 + 1.96 * 0.5], abs=0.02)
+
+
+def test_a_mixture_in_two_heaps_has_its_share_below_each_quantile() -> None:
+    random = np.random.default_rng(4)
+    centres = random.normal(size=(300, 6)) + 8.0 * (random.random((300, 6)) < 0.4)
+    weights, levels = random.random(300) ** 2, [0.025, 0.25, 0.5, 0.75, 0.975]
+    got = mixture_quantile(centres, weights, np.full(6, 0.5), levels)
+    below = [weights @ scipy.stats.norm.cdf((row - centres) / 0.5) / weights.sum() for row in got]
+    assert np.array(below) == pytest.approx(np.tile(np.reshape(levels, (-1, 1)), 6), abs=1e-12)
 
 
 def test_covariance_of_weights_is_that_of_repeated_members() -> None:

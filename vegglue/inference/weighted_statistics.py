@@ -2,12 +2,14 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from vegglue.arrays import Array
 
-# Halvings of the bracket of a mixture quantile: 2^-50 of its width is below rounding.
-BISECTIONS = 50
+# Steps of a mixture quantile at most: were all halvings of its bracket, 2^-50 of its width would be below rounding.
+QUANTILE_STEPS = 50
+# Step of a mixture quantile [standard errors] after which it is exact: Newton's next one would be its square, 1e-18.
+QUANTILE_STEP = 1e-9
 # k-hat above which a mean over weighted members is not to be trusted: no practical number of members makes its error
 # small (Vehtari et al. 2024, https://jmlr.org/papers/v25/19-556.html).
 TRUSTED_K_HAT = 0.7
@@ -41,17 +43,28 @@ def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLik
     """
     kept = weights > 1e-12 * weights.max()  # the others together weigh less than rounding
     centres, share = centres[kept], weights[kept] / weights[kept].sum()
-    low = np.tile(centres.min(axis=0) - 10 * sd, (np.size(levels), 1))
-    high = np.tile(centres.max(axis=0) + 10 * sd, (np.size(levels), 1))
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = _mixture_distribution(middle, centres, share, sd) < np.reshape(levels, (-1, 1))
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return 0.5 * (low + high)
+    wanted = np.reshape(levels, (-1, 1)).astype(float)
+    low, high = centres.min(axis=0) - 10 * sd, centres.max(axis=0) + 10 * sd
+    spread = np.sqrt(share @ (centres - share @ centres) ** 2 + sd**2)
+    at = np.clip(share @ centres + spread * ndtri(np.clip(wanted, 1e-9, 1 - 1e-9)), low, high)
+    for _ in range(QUANTILE_STEPS):
+        above, density = _mixture_above(at, wanted, centres, share, sd)
+        low, high = np.where(above < 0, at, low), np.where(above < 0, high, at)
+        newton = at - above / np.maximum(density, 1e-300)
+        following = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+        still = np.abs(following - at) > QUANTILE_STEP * sd
+        at = following
+        if not still.any():
+            break
+    return at
 
 
-def _mixture_distribution(at: Array, centres: Array, share: Array, sd: Array) -> Array:
-    return np.array([share @ ndtr((row - centres) / sd) for row in at])
+def _mixture_above(at: Array, wanted: Array, centres: Array, share: Array, sd: Array) -> tuple[Array, Array]:
+    """sum_k w_k Phi((q - c_k) / s) - p at q (level, station), and its derivative by q."""
+    away = [(row - centres) / sd for row in at]
+    distribution = np.array([share @ ndtr(one) for one in away])
+    density = np.array([share @ np.exp(-0.5 * one**2) for one in away]) / (np.sqrt(2 * np.pi) * sd)
+    return distribution - wanted, density
 
 
 def weighted_covariance(values: Array, weights: Array) -> Array:
