@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from vegglue.inference.emulator import fit_emulator
+from vegglue.inference.emulator import emulator_of_density, fit_emulator
 from vegglue.inference.importance_sampling import Sample, sample
 from vegglue.inference.student_mixture import Mixture, draw, log_density, mixture_at_modes, pooled_weights, tempered
 from vegglue.inference.weighted_statistics import effective_size, pareto_shape
@@ -155,3 +155,28 @@ def test_an_emulator_passes_over_places_that_failed() -> None:
     logs = np.where(np.arange(40) < 5, -np.inf, 0.0)
     values = np.where(np.arange(40)[:, None] < 5, np.nan, z)
     assert fit_emulator(z, values, logs, np.zeros(2), np.eye(2)).predict(z) == pytest.approx(z, abs=1e-3)
+
+
+def test_the_degree_is_the_one_that_predicts_runs_held_out() -> None:
+    """A model that wriggles leaves nothing to a high degree but its wriggles."""
+    z = np.random.default_rng(11).normal(size=(192, 4))
+
+    def highest(values: np.ndarray) -> int:
+        return max(sum(powers) for powers in emulator_of_density(z, values, squares, np.zeros(4), np.eye(4)).powers)
+
+    smooth = 2.0 * z + 0.5 * z[:, [1, 2, 3, 0]] ** 2
+    assert highest(smooth + 0.02 * z[:, [1, 2, 3, 0]] ** 4) == 4
+    assert highest(smooth + np.sin(40 * z)) == 2
+
+
+def test_a_model_that_wriggles_is_drawn_from_in_about_as_many_runs() -> None:
+    def wriggling(z: np.ndarray) -> np.ndarray:
+        return z + 0.3 * z[:, [1, 2, 3, 0]] ** 2 + 0.3 * np.sin(25 * z)
+
+    def smooth(z: np.ndarray) -> np.ndarray:
+        return z + 0.3 * z[:, [1, 2, 3, 0]] ** 2
+
+    most = [
+        max(sample(model, squares, start(4), 1000, seed).drawn[-1] for seed in SEEDS) for model in (smooth, wriggling)
+    ]
+    assert most[1] < 1.4 * most[0]
