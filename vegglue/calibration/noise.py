@@ -192,11 +192,20 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
 def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:
     """-2 ln likelihood (rho, s, ln t) up to a constant."""
     gram = systematic @ systematic.T
+    known = covariance_of(replace(noise, scale=0.0))
+    variance = np.outer(noise.error, noise.error)
+    # Few pairs of stations share a section: a power of all distances took more time than the factors.
+    pairs = np.nonzero(np.isfinite(noise.separation) & ~np.eye(residual.size, dtype=bool))
+    apart, shared = noise.separation[pairs], variance[pairs]
 
     def deviance(rho: float, scale: float, log_t: float) -> float:
-        covariance = covariance_of(replace(noise, correlation=rho, scale=scale)) + np.exp(2.0 * log_t) * gram
-        factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
-        return float(2.0 * np.log(np.diag(factor)).sum() + residual @ scipy.linalg.cho_solve((factor, lower), residual))
+        covariance = known + np.exp(2.0 * log_t) * gram
+        np.einsum("ii->i", covariance)[:] += scale**2 * np.diag(variance)
+        if rho > 0.0:
+            covariance[pairs] += scale**2 * shared * np.exp(apart * np.log(rho))
+        factor, lower = scipy.linalg.cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
+        solved = scipy.linalg.cho_solve((factor, lower), residual, check_finite=False)
+        return float(2.0 * np.log(np.diag(factor)).sum() + residual @ solved)
 
     return deviance
 

@@ -23,7 +23,7 @@ from vegglue.inference.likelihood import fit_members
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
-from vegglue.screening.residual_screening import screen
+from vegglue.screening.residual_screening import noise_given_all
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
 # prior]. Chosen, not measured: more starts find more modes and each costs a fit.
@@ -168,7 +168,7 @@ def modes_and_errors(model: Model, ensemble: Ensemble, rule: str, watch: Watch =
     for _ in range(SIZE_ESTIMATES if rule != "known" else 0):
         noise = _with_estimated_sizes(noise, fits[0], model.station)
         fits = _refitted(model, noise, fits)
-    estimated = screen(Baseline(model, noise, fits[0], coarse, on_coarse)).base.noise
+    estimated = noise_given_all(Baseline(model, noise, fits[0], coarse, on_coarse))
     noise = estimated if rule == "known" else replace(estimated, scale=1.0)
     fits = _refitted(model, noise, fits)
     standardised = standardised_residual(noise, fits[0].point)

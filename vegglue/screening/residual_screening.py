@@ -122,6 +122,16 @@ def screen(
     )
 
 
+def noise_given_all(base: Baseline) -> Noise:
+    """The noise that `screen` estimates, where nothing else of a screening is asked for."""
+    search = search_model(base)
+    fingerprints = fingerprints_of(search, half_width(base.model.site))
+    instruments = instruments_of(base.model.station.iloc[base.noise.rows])
+    used = base.noise.used(search.point.slope), _plausible(base.noise, fingerprints, instruments)
+    point = base.fitted.point
+    return _estimated_noise(base.noise, used, base.noise.residual(point.prediction), point.z)
+
+
 def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
     """Listed effects: as likely before, and so are the settings of one."""
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
