@@ -20,7 +20,7 @@ from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.newton import CLOSE
 from vegglue.solver.prolongation import on_grid
 from vegglue.solver.reference_member import settled
-from vegglue.solver.tangent import tangents
+from vegglue.solver.tangent import CAUSE_LANES, tangents
 from vegglue.solver.wet_band import chord_in_band, rows_inside, widen
 
 # Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
@@ -86,36 +86,37 @@ def _few_near(model: Model, point: Point, z: Array) -> Array:
 
 
 def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    """See `Engine.responses`; one tangent for each cause, experiments side by side."""
+    """See `Engine.responses`; one tangent for each cause, those that are solved together side by side with others."""
     found = np.zeros((len(model.station), len(causes)))
-    tasks = [(model, point, experiment, causes) for experiment in point.flows]
-    for experiment, part in zip(point.flows, in_threads(_responses_in, tasks), strict=True):
-        found[model.rows[experiment]] = part
+    tasks = []
+    for experiment in point.flows:
+        here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
+        tasks += [(experiment, here[first : first + CAUSE_LANES]) for first in range(0, len(here), CAUSE_LANES)]
+    work = partial(_responses_in, model, point)
+    parts = in_threads(work, [(experiment, [causes[j] for j in some]) for experiment, some in tasks])
+    for (experiment, some), part in zip(tasks, parts, strict=True):
+        found[np.ix_(model.rows[experiment], np.array(some))] = part
     return found
 
 
 def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
-    """Responses in one experiment, (stations of it, causes); zero for what does not act in it."""
+    """Responses in one experiment, (stations of it, causes), to causes that act in it."""
     flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
     found = np.zeros((rows.size, len(causes)))
-    here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
-    if not here:
-        return found
     base = crop(problem_at(model, experiment, point.z), *flow.band)
     without_cause = residual(base, flow.state)
-    built, changes = [], np.empty((*flow.state.shape[:3], len(here)))
-    for lane, j in enumerate(here):
-        amplitude = causes[j].amplitude
+    built, changes = [], np.empty((*flow.state.shape[:3], len(causes)))
+    for lane, cause in enumerate(causes):
+        amplitude = cause.amplitude
         gain, value = amplitude.small**amplitude.power, np.array([amplitude.off + amplitude.small])
-        problem = build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: value})
+        problem = build_problem(cause.case, model.site, experiment, theta | {cause.parameter: value})
         changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
         built.append((problem, gain))
     moved = tangents(base, flow.state, flow.factors, changes, TANGENT_TOLERANCE)
-    for lane, j in enumerate(here):
-        problem, gain = built[lane]
+    for lane, (problem, gain) in enumerate(built):
         state = flow.state + gain * moved[..., lane : lane + 1]
         now = _read(model, experiment, problem, state, flow.band)[0]
-        found[:, j] = (now - point.prediction[rows]) / gain
+        found[:, lane] = (now - point.prediction[rows]) / gain
     return found
 
 
