@@ -22,7 +22,7 @@ from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.inference.homogeneity import equal_values_test, one_experiment, transfer, without_prior
 from vegglue.inference.map_and_errors import distinct_modes, modes_and_errors, standardised_residual, starting_points
-from vegglue.inference.refine import log_posterior, refinable, refine
+from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
@@ -84,6 +84,21 @@ def test_draws_are_runs_of_the_model(reach: tuple[Case, Observations, Ensemble],
         alone = linearise(model, row)
         assert alone is not None
         assert refined.sample.prediction[member] == pytest.approx(alone.prediction, abs=1e-5)
+
+
+def test_draws_are_as_exact_as_measurements_can_tell(
+    reach: tuple[Case, Observations, Ensemble], refined: Posterior, noise: Noise
+) -> None:
+    model = model_of(*reach[:2])
+    heavy = np.argsort(-refined.sample.weights)[:32]
+    z = z_at(reach[0], {name: values[heavy] for name, values in refined.sample.theta.items()})
+    middle = linearise(model, z[0])
+    assert middle is not None
+    drawn = solved_for(model, noise)
+    assert drawn.case.numerics.tolerance == pytest.approx(0.02 * 0.01)
+    exact, found = (predict(one, [middle], z) for one in (model, drawn))
+    assert found == pytest.approx(exact, abs=0.01 * 0.01)
+    assert log_posterior(noise, z, found) == pytest.approx(log_posterior(noise, z, exact), abs=0.02)
 
 
 def test_the_log_density_is_that_of_errors_and_prior(

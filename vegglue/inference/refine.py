@@ -15,7 +15,7 @@ from vegglue.calibration.fit import MapEstimate
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Engine, predict
+from vegglue.engine.interface import Engine, Model, predict
 from vegglue.engine.model import model_of
 from vegglue.engine.newton import NEWTON
 from vegglue.inference.glue import check_stations
@@ -35,6 +35,10 @@ from vegglue.version import VERSION
 
 # Effective draws that are asked for: an end of the 95 % range then rests on 25 of them.
 EFFECTIVE_DRAWS = 1000
+# Largest correction that a draw may still ask for, over the smallest error of a measurement [-]; it is then made, and
+# what is left is far smaller. Chosen: on open-b, with and without its effect, predictions moved by at most 2e-4 of
+# their errors and ln p by 1e-3, for a sixth less work than with the tolerance of the case. With 0.05 it was 5e-3.
+DRAWN_WITHIN = 0.02
 
 
 def refine(
@@ -47,7 +51,7 @@ def refine(
     """
     check_stations(ensemble, observations.table)
     base = modes_and_errors(model_of(case, observations, engine), ensemble, case.infer.sigma, watch)
-    run = partial(predict, base.model, [one.point for one in base.fits])
+    run = partial(predict, solved_for(base.model, base.noise), [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
     finished = counted(watch, f"drawing around {len(base.fits)} mode(s)", EFFECTIVE_DRAWS, "effective draws")
     drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
@@ -57,6 +61,15 @@ def refine(
         posterior,
         refinement=refinement_of(base, drawn, posterior.sample.best),
         transfer=transfer(base.model, base.noise, base.fits[0].point, case.infer.sigma == "known"),
+    )
+
+
+def solved_for(model: Model, noise: Noise) -> Model:
+    """The model with its flows solved as exactly as measurements can tell, see DRAWN_WITHIN, or as the case asks."""
+    own = model.case.numerics
+    tolerance = max(own.tolerance, DRAWN_WITHIN * float(noise.data_error.min()))
+    return replace(
+        model, case=model.case.model_copy(update={"numerics": own.model_copy(update={"tolerance": tolerance})})
     )
 
 
