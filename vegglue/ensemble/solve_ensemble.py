@@ -23,7 +23,7 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
-from vegglue.parallel import as_finished
+from vegglue.parallel import as_finished, in_threads
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ensemble import Header
 from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
@@ -250,14 +250,15 @@ def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
     """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
     site = build_site(case)
     sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
-    fields = {}
-    for experiment in case.experiments:
+    coarse = ever_coarser(case, site)[:-1]
+
+    def fields_of(experiment: str) -> dict[str, FlowFields]:
         problem = build_problem(case, site, experiment, sample.theta)
-        build = partial(_problem_at, case, site, experiment)
-        solved = solve_members(problem, sample.points, build, case.numerics.tolerance, how=_fall_back(case))
-        if solved.status[0] != FAILED:
-            fields[experiment] = flow_fields(problem, solved.state, site.grid)
-    return fields
+        solved = _solved_in(case, site, experiment, sample, problem, None, coarse)
+        return {} if solved.status[0] == FAILED else {experiment: flow_fields(problem, solved.state, site.grid)}
+
+    found = in_threads(fields_of, [(experiment,) for experiment in case.experiments])
+    return {experiment: fields for one in found for experiment, fields in one.items()}
 
 
 def _fall_back(case: Case) -> FallBack:

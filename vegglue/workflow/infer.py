@@ -60,7 +60,8 @@ def infer(
             engine = with_command(model_of(case, observations), folder, watch).engine
             posterior = refine(ensemble, case, observations, watch, engine)
     write_posterior(folder / "posterior.h5", posterior, resolved_yaml(case), wanted)
-    median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
+    with at_most(jobs):
+        median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior
 
 
