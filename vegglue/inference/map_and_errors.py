@@ -16,7 +16,7 @@ from vegglue.calibration.baseline import Baseline, grid_difference, with_own_err
 from vegglue.calibration.fit import MapEstimate, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error
 from vegglue.case.parameter_space import z_at
-from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
@@ -37,10 +37,19 @@ NEGLIGIBLE_MODE = 30.0
 
 @dataclass(frozen=True)
 class FoundModes:
-    """MAP estimates on the case's own grid, the best first; starts: number of members that the search started from."""
+    """MAP estimates on the case's own grid, the best first; starts: number of members that the search started from;
+    on_coarse: those on cells of twice the size that led there, none where there are no such cells.
+    """
 
     fits: tuple[MapEstimate, ...]
     starts: int
+    on_coarse: tuple[MapEstimate, ...]
+
+    def coarse_point(self, coarse: Model) -> Point | None:
+        """The best mode's place on cells of twice the size, from the nearest that is known there."""
+        z = self.fits[0].point.z
+        near = min((one.point for one in self.on_coarse), key=lambda point: float(np.linalg.norm(point.z - z)))
+        return linearise_from(coarse, z, near)
 
 
 def find_modes(model: Model, noise: Noise, ensemble: Ensemble, watch: Watch = silent) -> FoundModes:
@@ -51,12 +60,13 @@ def find_modes(model: Model, noise: Noise, ensemble: Ensemble, watch: Watch = si
     starts = starting_points(noise, z_at(model.case, ensemble.parameters), ensemble.prediction)
     places = ever_coarser(model.case, model.site)[-MOST_GRIDS:]
     grids = [replace(model, case=case, site=site) for case, site in places]
+    before: list[MapEstimate] = []
     ends = _apart(_fit_all(grids[0], noise, starts, watch))
     for coarse, finer in pairwise(grids):
-        ends = distinct_modes(_refine_all(finer, coarse, noise, ends, watch))
+        before, ends = ends, distinct_modes(_refine_all(finer, coarse, noise, ends, watch))
     if not ends:
         raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
-    return FoundModes(tuple(ends), len(starts))
+    return FoundModes(tuple(ends), len(starts), tuple(before))
 
 
 def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
@@ -161,7 +171,7 @@ def modes_and_errors(model: Model, ensemble: Ensemble, rule: str, watch: Watch =
     modes = find_modes(model, noise, ensemble, watch)
     watch(Progress("estimating the errors"))
     fits, coarse = list(modes.fits), coarser(model)
-    on_coarse = None if coarse is None else linearise(coarse, fits[0].point.z)
+    on_coarse = None if coarse is None else modes.coarse_point(coarse)
     if rule == "known":
         noise = with_grid_error(noise, grid_difference(fits[0].point, on_coarse))
         noise = with_own_error(Baseline(model, noise, fits[0], coarse, on_coarse)).noise
