@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from blind import records_in
+from law_angles import ANGLES
 from law_page import write_law_page
 from law_sets import LawDataSet, LawTrial, knowing_hidden, law_data_set, law_trials
 
@@ -127,9 +128,8 @@ def main() -> None:
     path = given.runs / "records.jsonl"
     if not given.page:
         _make(path, given.most)
-    write_law_page(
-        list({record["key"]: record for record in (*records_in(KEPT), *records_in(path))}.values()), ROOT / "docs"
-    )
+    found = {record["key"]: record for record in (*records_in(KEPT), *records_in(path))}
+    write_law_page(list(found.values()), list(records_in(ANGLES)), ROOT / "docs")
 
 
 def _make(path: Path, most: int | None) -> None:

@@ -4,15 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from law_page import (
-    has_quantity,
-    is_silent,
-    law_says_term,
-    near_truth,
-    quantity_alone,
-    says_term,
-    write_law_page,
-)
+from law_answers import has_quantity, is_silent, law_says_term, near_truth, quantity_alone, says_term
+from law_limits import WAYS, likeliest_quantity
+from law_page import write_law_page
 
 SPEED = {"term": "floor", "quantity": "speed", "form": "step", "chance": 0.6, "same_as": ""}
 DEPTH = SPEED | {"quantity": "depth", "chance": 0.2}
@@ -46,6 +40,13 @@ def test_a_listed_effect_that_says_the_same_is_right_and_no_law() -> None:
     assert says_term(record(others={"patch_density[p1]": 0.9}, hide="hidden_plants_speed_threshold"))
 
 
+def test_chances_are_judged_by_quantity() -> None:
+    two_forms = record(SPEED, SPEED | {"form": "ramp", "chance": 0.1}, DEPTH, others={"position": 0.1})
+    assert likeliest_quantity(two_forms) == (pytest.approx(0.7), True)
+    assert likeliest_quantity(record()) is None
+    assert likeliest_quantity(record(SPEED | {"term": "bank"})) == (pytest.approx(1.0), False)
+
+
 def test_a_combination_is_right_with_either_quantity() -> None:
     assert has_quantity(record(SPEED | {"quantity": "along"}, hide="hidden_floor_offset_square_along"))
 
@@ -64,12 +65,18 @@ def test_the_page_tells_shares_with_their_intervals(tmp_path: Path) -> None:
     )  # fmt: skip
     nothing = record(group="nothing", hide="", hidden=None, key="nothing/0")
     left_out = {"key": "law/1", "group": "law", "hide": "x", "left_out": "never as visible as asked"}
-    write_law_page([record(SPEED), listed, nothing, left_out], tmp_path)
+    shares = {"in set": 1.0, "alone": 0.5}
+    angle = {"hide": "hidden_floor_speed_threshold", "nearest": 0.93, "says": ["floor", "froude"]}
+    angles = [angle | dict.fromkeys(WAYS, shares)]
+    write_law_page([record(SPEED), listed, nothing, left_out], angles, tmp_path)
     text = (tmp_path / "discover_study.md").read_text(encoding="utf-8")
     assert "3 sets: 1 with a law hidden, 1 with nothing and 1 with a listed effect, of" in text
     assert "Left out were 1 since at no plausible size" in " ".join(text.split())
     assert "| the likeliest cause changes the right term | at least 80 % | 1 | 100 % | 2 to 100 % |" in text
     assert "| floor | speed | threshold | 1 | 1 | 1 | 1 |" in text
+    assert "| floor | speed | threshold | floor: froude | 0.93 | 50 % | 50 % | 50 % |" in text
+    assert "| 95 to 100 % | 1 | 100 % | 100 % |" in text
+    assert f"| {WAYS['as it is']} | 100 % | 50 % |" in text
     assert "| `bank_trend` | 8 | 80 % | floor: speed, step (60 %) | 0.0200 | 0.0120 | 0.0100 |" in text
 
 

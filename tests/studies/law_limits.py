@@ -1,0 +1,76 @@
+"""What the page of the study of laws says of its own limits: how alike traces are, and how good chances are."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from hidden_laws import BY_NAME
+from law_answers import Record, Said, causes, is_true
+
+# Ways to weigh in records of `law_angles`, and in words.
+WAYS = {
+    "as it is": "to first order, in a model that is right but for the law: as `discover` weighs",
+    "whole evidence": "the same, fingerprints taken for nature's: no evidence taken back",
+    "true law tried": "the same, and the hidden law itself among those that are tried",
+}
+# Ends of the bins of the chance of the likeliest quantity [-].
+BINS = (0.0, 0.6, 0.8, 0.95, 1.0)
+
+
+def angle_lines(angles: Sequence[Mapping[str, Any]]) -> str:
+    """Law by law: the cosine of its trace with the nearest that says anything else, and shares alone, all places."""
+    rows = []
+    for law in BY_NAME.values():
+        of_law = [one for one in angles if one["hide"] == law.name]
+        if not of_law:
+            continue
+        cosine = float(np.median([one["nearest"] for one in of_law]))
+        (term, quantity), _ = Counter(tuple(one["says"]) for one in of_law).most_common(1)[0]
+        nearest = f"{term}: {quantity}" if quantity else term or "a place, an instrument, or another effect"
+        shares = " | ".join(f"{100 * _mean(of_law, way, 'alone'):.0f} %" for way in WAYS)
+        rows.append(f"| {law.term} | {law.quantity} | {law.form} | {nearest} | {cosine:.2f} | {shares} |")
+    return "\n".join(rows)
+
+
+def told_at_most(made: Sequence[Record], angles: Sequence[Mapping[str, Any]]) -> str:
+    """Shares in the set and alone for each way to weigh, of the laws that were hidden, each as often as it was."""
+    hidden = [record["hide"] for record in made if record["group"] == "law"]
+    rows = []
+    for way, words in WAYS.items():
+        found = [[one for one in angles if one["hide"] == name] for name in hidden]
+        shares = [np.mean([_mean(some, way, what) for some in found if some]) for what in ("in set", "alone")]
+        rows.append(f"| {words} | {' | '.join(f'{100 * share:.0f} %' for share in shares)} |")
+    return "\n".join(rows)
+
+
+def chance_lines(made: Sequence[Record]) -> str:
+    """The chance of the likeliest quantity of a term, all its laws together, and how often it was right, by bins."""
+    pairs = [pair for record in made if record["group"] == "law" and (pair := likeliest_quantity(record)) is not None]
+    rows = []
+    for low, high in pairwise(BINS):
+        of_bin = [(chance, right) for chance, right in pairs if low < chance <= high]
+        if of_bin:
+            chance, right = np.mean(of_bin, axis=0)
+            bounds = f"{100 * low:.0f} to {100 * high:.0f} %"
+            rows.append(f"| {bounds} | {len(of_bin)} | {100 * chance:.0f} % | {100 * right:.0f} % |")
+    if pairs:
+        chance, right = np.mean(pairs, axis=0)
+        rows.append(f"| all | {len(pairs)} | {100 * chance:.0f} % | {100 * right:.0f} % |")
+    return "\n".join(rows)
+
+
+def likeliest_quantity(record: Record) -> tuple[float, bool] | None:
+    """Its chance in the set, and whether it is the right one; None where the set is empty."""
+    together: dict[Said, float] = {}
+    for said, chance, _ in causes(record):
+        together[said] = together.get(said, 0.0) + chance
+    if not together:
+        return None
+    best = max(together, key=lambda said: together[said])
+    return together[best] / sum(together.values()), is_true(BY_NAME[record["hide"]], best)
+
+
+def _mean(angles: Sequence[Mapping[str, Any]], way: str, what: str) -> float:
+    return float(np.mean([one[way][what] for one in angles]))
