@@ -1,11 +1,14 @@
 """Chances of what competes: as often true as told, tempered by what fingerprints may be wrong, and told anew."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import tempered_chances
+from vegglue.diagnosis.competition import contenders_of, tempered_chances
 from vegglue.diagnosis.rivals import followed_further, with_chances
+from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
 from vegglue.screening import score_test
 
@@ -58,3 +61,34 @@ def test_what_was_accepted_on_trial_stands_in_its_set() -> None:
     """Else there would be no words for it."""
     told = with_chances(STEP, "c", {"a": 0.6, "b": 0.37, "c": 0.03})
     assert (told.accepted, told.rivals, told.groups) == ("c", ("a", "b", "c"), (("a", "b"), ("c",)))
+
+
+@pytest.mark.parametrize(("kept", "refitted"), [(None, "ab"), (2.0, "ab"), (18.0, "a")])
+def test_what_promised_most_and_keeps_less_leaves_room_for_others(
+    monkeypatch: pytest.MonkeyPatch, kept: float | None, refitted: str
+) -> None:
+    """To first order a promises 20, b 3 and c -30; c is out of reach of what is left. kept: by a once it is refitted,
+    or no flow.
+    """
+    promise, tried = np.array([20.0, 3.0, -30.0]), []
+
+    def refits(_search: object, trials: list[str], _watch: object) -> list[SimpleNamespace | None]:
+        tried.extend(trials)
+        ends = {"a": kept, "b": 3.0, "c": -30.0}
+        return [
+            None
+            if (end := ends[name]) is None
+            else SimpleNamespace(log_factor=end, candidate=SimpleNamespace(name=name))
+            for name in trials
+        ]
+
+    monkeypatch.setattr(competition, "refits_of", refits)
+    monkeypatch.setattr(competition, "second_look", lambda _: None)
+    monkeypatch.setattr(competition, "_effect_trial", lambda _screening, j, *_: "abc"[j])
+    kind = SimpleNamespace(name="effect", total=20.0, log_evidence=promise, log_prior=np.zeros(3))
+    columns, candidates = [np.array([j]) for j in range(3)], [SimpleNamespace(name=name) for name in "abc"]
+    fingerprints = SimpleNamespace(candidates=candidates, columns=columns, places=())
+    screening = SimpleNamespace(kinds=(kind,), fingerprints=fingerprints, instruments={}, search=None)
+    found = contenders_of(screening, silent)
+    assert "".join(tried) == refitted
+    assert {one.name for one in found} == set(refitted) - ({"a"} if kept is None else set())

@@ -55,30 +55,79 @@ class Contender:
 
 
 def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Contender]:
-    """Everything that was tried, most evidence first; elsewhere: ln evidence of what competes besides."""
-    by_name, second = {kind.name: kind for kind in screening.kinds}, second_look(screening)
-    linear = _linear_evidence(by_name["effect"], second)
+    """Everything that was tried, most evidence first; elsewhere: ln evidence of what competes besides.
+
+    To first order an effect may promise more than it keeps, or have no flow at all. Then what is within reach of the
+    rest is refitted, too, until nothing is.
+    """
+    kind, second = screening.kinds[0], second_look(screening)
+    linear = _linear_evidence(kind, second)
     best = max(*(kind.total for kind in screening.kinds), float(linear.max()), elsewhere)
-    effects = _worth_refitting(screening, linear, best)
-    places = [one for one in screening.fingerprints.places if _within_reach(by_name[one.term].total, best)]
-    spots = [(one, spot) for one in places for spot in _promising_spots(one, by_name[one.term], best)]
-    candidates = screening.fingerprints.candidates
-    names = [candidates[j].name for j in effects] + [f"{one.term} at a place" for one in places]
-    watch(Progress(f"comparing {', '.join(names)}"))
-    trials = [_effect_trial(screening, j, linear, second) for j in effects]
+    found, tried = _instrument_contenders(screening), set[str]()
+    while True:
+        of_round = _round(screening, linear, best, tried)
+        if not of_round.effects and not of_round.places:
+            return sorted(found, key=lambda one: -one.log_evidence)
+        watch(Progress(f"comparing {', '.join(of_round.names(screening))}"))
+        found += _refitted(screening, of_round, (linear, second), watch)
+        tried |= set(of_round.names(screening))
+        kept = [one.log_evidence for one in found]
+        best = max(elsewhere, *kept, *_promises(screening, linear, tried))
+
+
+@dataclass(frozen=True)
+class _Round:
+    """What is refitted together: effects by their indices, and terms at places with the spots to start from."""
+
+    effects: list[int]
+    places: list[tuple[Places, list[int]]]
+
+    def names(self, screening: Screening) -> list[str]:
+        candidates = screening.fingerprints.candidates
+        return [candidates[j].name for j in self.effects] + [f"{one.term} at a place" for one, _ in self.places]
+
+
+def _round(screening: Screening, linear: Array, best: float, tried: set[str]) -> _Round:
+    """What is within reach of the best and was not tried."""
+    kinds, candidates = {kind.name: kind for kind in screening.kinds}, screening.fingerprints.candidates
+    effects = [j for j in _worth_refitting(screening, linear, best) if candidates[j].name not in tried]
+    places = [
+        (one, _promising_spots(one, kinds[one.term], best))
+        for one in screening.fingerprints.places
+        if f"{one.term} at a place" not in tried and _within_reach(kinds[one.term].total, best)
+    ]
+    return _Round(effects, places)
+
+
+def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[float]:
+    """ln evidence to first order of what may be refitted and was not tried."""
+    kinds, candidates = {kind.name: kind for kind in screening.kinds}, screening.fingerprints.candidates
+    of_each = _of_each(screening, linear)
+    effects = [float(of_each[j]) for j in _most_promising(of_each) if candidates[j].name not in tried]
+    terms = [one.term for one in screening.fingerprints.places if f"{one.term} at a place" not in tried]
+    return effects + [kinds[term].total for term in terms]
+
+
+def _refitted(
+    screening: Screening, of_round: _Round, promised: tuple[Array, SecondLook | None], watch: Watch
+) -> list[Contender]:
+    """Contenders of one round, those that found a flow; promised: evidence to first order, and the second look."""
+    linear, kinds = promised[0], {kind.name: kind for kind in screening.kinds}
+    effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
+    trials = [_effect_trial(screening, j, *promised) for j in effects]
     trials += [_place_trial(screening, one, spot) for one, spot in spots]
     refits = refits_of(screening.search, trials, watch)
-    found = _instrument_contenders(screening)
+    found = []
     for j, refit in zip(effects, refits, strict=False):
         if refit is not None:
             column = _column_of(screening, j, linear)
-            evidence = refit.log_factor + _settings_charge(screening, by_name["effect"], j, column)
+            evidence = refit.log_factor + _settings_charge(screening, kinds["effect"], j, column)
             found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
-    for one in places:
+    for one, _ in of_round.places:
         of_term = zip(spots, refits[len(effects) :], strict=True)
         ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
-        found += _place_contender(by_name[one.term], ended)
-    return sorted(found, key=lambda one: -one.log_evidence)
+        found += _place_contender(kinds[one.term], ended)
+    return found
 
 
 def _place_contender(kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]) -> list[Contender]:
@@ -120,9 +169,18 @@ def _linear_evidence(kind: HypothesisKind, second: SecondLook | None) -> Array:
 
 def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[int]:
     """Listed effects whose evidence is not far behind the best, the best first, one of them at least."""
-    of_each = np.array([linear[columns].max() for columns in screening.fingerprints.columns])
-    ranked = [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
+    of_each = _of_each(screening, linear)
+    ranked = _most_promising(of_each)
     return [j for j in ranked if _within_reach(float(of_each[j]), best)] or ranked[:1]
+
+
+def _of_each(screening: Screening, linear: Array) -> Array:
+    """E of the best column of each listed effect (candidate,)."""
+    return np.array([linear[columns].max() for columns in screening.fingerprints.columns])
+
+
+def _most_promising(of_each: Array) -> list[int]:
+    return [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
 
 
 def _promising_spots(places: Places, kind: HypothesisKind, best: float) -> list[int]:

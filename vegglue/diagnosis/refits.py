@@ -32,6 +32,9 @@ from vegglue.screening.candidates import Candidate, candidate_in_case, start_amp
 
 # Steps that a refit may take. Chosen, not measured: most need four.
 REFIT_STEPS = 10
+# Shares of the way to a start at which a flow is looked for, the next where the one before has none. Chosen, not
+# measured: with a tenth of a size nearly every flow is found that is found without.
+SHARES_OF_START = (1.0, 0.3, 0.1)
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,19 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
 
 def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
     model = _with(search.model, trial)
-    point = linearise_from(model, start, search.point)
-    return None if point is None else fit(model, search.noise, point, REFIT_STEPS)
+    for share in SHARES_OF_START:
+        point = linearise_from(model, _nearer(model, trial, search.point.z, start, share), search.point)
+        if point is not None:
+            return fit(model, search.noise, point, REFIT_STEPS)
+    return None
+
+
+def _nearer(model: Model, trial: RefitTrial, z: Array, start: Array, share: float) -> Array:
+    """A share of the way from z (p,) with the amplitude off to the start (p + 1,)."""
+    candidate = trial.candidate
+    off = z_of(model.case.parameters[candidate.parameter], start_amplitude(candidate.amplitude, 0.0))
+    here = np.append(z, off)
+    return np.asarray(here + share * (start - here))
 
 
 def _refit(search: SearchModel, trial: RefitTrial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:

@@ -3,10 +3,11 @@
 The model is calibrated and screened as for a diagnosis. While errors alone leave as much for laws, nothing is said.
 Else the most promising laws are calibrated with the model and ranked by their evidence beside listed effects, places
 and instruments, which are as likely before as in a diagnosis; all laws together are a tenth as likely as all listed
-effects (`law_screening`).
+effects (`law_screening`), and so is something at a place, which is as vague.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent
-from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.score_test import ALIKE
 
 # Laws that are calibrated at most; as many as listed effects in a diagnosis. Chosen, not measured: each costs a fit.
@@ -46,16 +47,24 @@ def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = sile
     screening = screen_laws(base, traces)
     if screening.p > FALSE_ALARMS:
         return Discovery(screening.p, len(screening.laws), (), {})
-    ranked = [*contenders_of(screening.listed, watch, screening.kind.total), *_laws(screening, watch)]
-    return _discovery(screening, sorted(ranked, key=lambda one: -one.log_evidence))
+    known = _as_vague(screening, contenders_of(screening.listed, watch, screening.kind.total))
+    laws = _laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
+    return _discovery(screening, sorted([*known, *laws], key=lambda one: -one.log_evidence))
 
 
-def _laws(screening: LawScreening, watch: Watch) -> list[Contender]:
-    """The most promising laws, calibrated, with their evidence."""
+def _as_vague(screening: LawScreening, found: Sequence[Contender]) -> list[Contender]:
+    """What is at a place, of no kind that others have seen in nature, as likely before as laws; all else as it is."""
+    places = {one.term for one in screening.listed.fingerprints.places}
+    less = np.log(LISTED_ODDS)
+    return [replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one for one in found]
+
+
+def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Contender]:
+    """The most promising laws, calibrated, with their evidence; known: that of the best of all else."""
     evidence = screening.kind.log_evidence
     best = np.array([screening.best_column(j) for j in range(len(screening.laws))])
     order = np.argsort(-evidence[best])[:MOST_LAWS_REFITTED]
-    top = max(float(evidence[best].max()), *(kind.total for kind in screening.listed.kinds))
+    top = max(float(evidence[best].max()), known)
     reach = [int(j) for j in order if (top - evidence[best[j]]) / tempering(np.array(top)) < REACH]
     trials = [_trial(screening, j, int(best[j])) for j in reach]
     refits = refits_of(screening.listed.search, trials, watch)
