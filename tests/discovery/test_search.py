@@ -54,6 +54,11 @@ def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
     return discover_laws(replace(model, station=station))
 
 
+@pytest.mark.parametrize(("p", "words"), [(0.4, "errors alone leave as much in 40 % of cases"), (0.001, "is missing")])
+def test_silence_says_whether_something_is_missing(p: float, words: str) -> None:
+    assert words in Discovery(p, 65, (), {}).sentence
+
+
 @pytest.mark.slow
 def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
     """Three seeds; each names one by chance in at most 5 %."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.effects.grammar import Law
 from vegglue.in_short import in_short
 
@@ -111,6 +112,8 @@ class Discovery:
         if self.others:
             name, chance = max(self.others.items(), key=lambda pair: pair[1])
             return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
+        if self.p <= FALSE_ALARMS:
+            return "No law is found: something is missing, but no law or known effect explains enough of it."
         return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
 
     def __repr__(self) -> str:
