@@ -36,8 +36,8 @@ CELLS_OF_TRUTH, STEADY_ENOUGH = (0.5, 0.1875), 2e-5
 # Between the discharges that are measured: what a law says there is no guess. Level as h ~ Q^0.6.
 HELD_OUT, LIKE = "held out", "mid"
 HELD_OUT_SETTING = Experiment(discharge={"upstream": 2.6}, level=1.0)
-# How often each hidden law is drawn anew, and data sets with nothing hidden. With 3 in the place of 4 there were 108 sets
-# once those were left out in which the law cannot be seen; 120 are wanted.
+# How often each hidden law is drawn anew, and data sets with nothing hidden. With 3 in the place of 4, 108 sets were
+# left without those in which the law cannot be seen; 120 are wanted.
 TIMES, NOTHING = 4, 25
 # Listed effects that change a term of the grammar: hidden, and left out in turn.
 LISTED = (
