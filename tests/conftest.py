@@ -1,5 +1,6 @@
 """What all tests share, and the order in which their files are begun."""
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,3 +42,11 @@ def _one_thread_of_linear_algebra() -> Iterator[None]:
     """Blocks are small: threads of linear algebra would only wait for each other, here as in `simulate`."""
     with threadpool_limits(1):
         yield
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What is started heeds Ctrl-C even where a shell in the background has the tests ignore it, and all they start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

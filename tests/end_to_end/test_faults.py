@@ -127,14 +127,6 @@ def test_the_numbers_do_not_depend_on_the_number_of_jobs(tmp_path: Path, uninter
     assert len(np.unique(ensemble.prediction[:, 0])) == CHUNKS * CHUNK
 
 
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """What is started heeds Ctrl-C even where a shell in the background has the tests ignore it, and all they start."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     config = several_chunks(tmp_path)

@@ -108,6 +108,7 @@ def test_a_killed_run_goes_on_and_repeats_no_member(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_what_is_under_way(tmp_path: Path) -> None:
     marks = slow_brook(tmp_path, 60.0)
     process = begin(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2)
