@@ -20,6 +20,8 @@ SOURCES := $(wildcard vegglue/*.py vegglue/*/*.py vegglue/*/*.j2 vegglue/*/*.css
 SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# Where Python may keep no bytecode, every process compiles all libraries anew: 8 s of a core for each of the tests' own.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo paper test check bench blind laws faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5

@@ -7,6 +7,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from statistics import median
 
@@ -26,6 +27,7 @@ class Folder:
     first: tuple[str, ...]
 
 
+@cache
 def folders() -> dict[str, Folder]:
     """All folders of the package, lower ones before those that import them."""
     found = {path.parent.name: _folder(path) for path in PACKAGE.glob("*/__init__.py")}
@@ -39,7 +41,7 @@ def folders() -> dict[str, Folder]:
 
 
 def _folder(path: Path) -> Folder:
-    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    text = ast.get_docstring(tree_of(path)) or ""
     said = DOCSTRING.match(text)
     assert said, f"{path}: expected a purpose, `May import: ....` and `Open first: ....`"
     may = () if said["may"].startswith("no ") else tuple(said["may"].replace("\n", " ").split(", "))
@@ -47,37 +49,47 @@ def _folder(path: Path) -> Folder:
     return Folder(path.parent.name, purpose, may, tuple(said["first"].split(", ")))
 
 
+@cache
 def module_of(path: Path) -> str:
     """vegglue.flow.kernels, of the path of its file."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imported(path: Path) -> set[str]:
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """A file of the package as Python reads it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imported(path: Path) -> frozenset[str]:
     """Modules and names a file imports anywhere in it, in full."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
+    return frozenset(names)
 
 
-def imported_files(path: Path) -> set[str]:
+@cache
+def imported_files(path: Path) -> frozenset[str]:
     """Modules of the package that a file imports."""
     return (imported(path) & {module_of(other) for other in FILES}) - {"vegglue"}
 
 
-def imports_of(folder: str) -> set[str]:
+@cache
+def imports_of(folder: str) -> frozenset[str]:
     """Other folders that the files of a folder import."""
     names = {name.split(".")[1] for path in (PACKAGE / folder).rglob("*.py") for name in imported_files(path)}
-    return {name for name in names if (PACKAGE / name).is_dir()} - {folder}
+    return frozenset(name for name in names if (PACKAGE / name).is_dir()) - {folder}
 
 
 def functions(path: Path) -> Iterator[tuple[str, int]]:
     """Name and length in lines of every function of a file."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.FunctionDef):
             assert node.end_lineno is not None
             yield node.name, node.end_lineno - node.lineno + 1
@@ -86,7 +98,7 @@ def functions(path: Path) -> Iterator[tuple[str, int]]:
 def public_names(path: Path) -> set[str]:
     """Public functions, classes and constants that a file defines."""
     found: set[str] = set()
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for node in tree_of(path).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
