@@ -116,6 +116,7 @@ def test_members_far_away_are_those_newton_finds(model: Model) -> None:
         assert prediction == pytest.approx(alone.prediction, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_both_engines_know_walls(model: Model) -> None:
     exact, marched = linearise(model, Z), linearise(replace(model, engine=marching()), Z)
     assert exact is not None

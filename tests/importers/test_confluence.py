@@ -105,6 +105,7 @@ def test_a_velocity_across_that_is_no_number_is_a_sentence(tmp_path: Path) -> No
         case_from_confluence(folder, tmp_path / "made.yaml")
 
 
+@pytest.mark.slow
 def test_the_side_walls_have_friction_of_their_own(imported: Path) -> None:
     case = load_case(imported)
     assert case.friction.walls is not None

@@ -106,6 +106,7 @@ def test_bands_hold_their_share() -> None:
     assert share_inside(below, 0.95) == pytest.approx(0.95, abs=0.002)
 
 
+@pytest.mark.slow  # arviz takes a second to import
 def test_smoothed_weights_are_those_of_arviz() -> None:
     arviz = pytest.importorskip("arviz")
     log_weights = 1.5 * np.random.default_rng(2).normal(size=4000)

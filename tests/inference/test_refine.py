@@ -133,6 +133,7 @@ def test_everything_comes_back_from_the_file(refined: Posterior, tmp_path: Path)
 
 
 # Weighted draws are resampled for ArviZ. Some come twice, which its shape of a tail takes for heavy: 0.702, ours 0.11.
+@pytest.mark.slow  # arviz takes a second to import
 @pytest.mark.filterwarnings("ignore:Estimated shape parameter of Pareto:UserWarning")
 def test_arviz_reads_draws_likelihood_and_prior(refined: Posterior, tmp_path: Path) -> None:
     arviz = pytest.importorskip("arviz")

@@ -96,6 +96,7 @@ def test_tail_shape_is_that_of_a_pareto_distribution() -> None:
     assert math.isnan(pareto_shape(np.ones(100)))
 
 
+@pytest.mark.slow  # arviz takes a second to import
 def test_tail_shape_is_that_of_arviz() -> None:
     arviz = pytest.importorskip("arviz")
     log_weights = 2 * np.random.default_rng(6).normal(size=5000)

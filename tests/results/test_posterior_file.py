@@ -95,6 +95,7 @@ def test_xarray_opens_every_group_of_a_posterior(tmp_path: Path) -> None:
             assert not any(variable.startswith("phony") for variable in data.sizes)
 
 
+@pytest.mark.slow  # arviz takes a second to import
 def test_arviz_summarises_and_plots_a_posterior(tmp_path: Path) -> None:
     arviz, matplotlib = pytest.importorskip("arviz"), pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
