@@ -12,7 +12,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.fit import MOST_STEPS, NEGLIGIBLE_DECREASE, fit, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import FURTHEST
-from vegglue.engine.interface import Point
+from vegglue.engine.interface import Point, Wanted, always
 
 MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
                          "value": [1.1, 1.05, 0.3], "standard_error": 0.005, "used": True})  # fmt: skip
@@ -31,7 +31,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Array]:
     """The points z that a search computed."""
     points: list[Array] = []
 
-    def linearise(model: Any, z: Array, near: Point) -> Point:
+    def linearise(model: Any, z: Array, near: Point, wanted: Wanted) -> Point:
         points.append(z)
         return at(z)
 
@@ -52,7 +52,7 @@ def test_a_search_ends_at_the_end_of_all_places(monkeypatch: pytest.MonkeyPatch)
 
     steps: list[Array] = []
 
-    def endless(model: Any, z: Array, near: Point | None) -> Point:
+    def endless(model: Any, z: Array, near: Point | None, wanted: Wanted = always) -> Point:
         slope = np.array([[1.0 if np.abs(z[0]) < FURTHEST else 0.5, 0.0]] * 2 + [[0.0, 0.5]])  # by central differences
         steps.append(z)
         return Point(z, np.array([*np.clip(z[[0, 0]], -FURTHEST, FURTHEST), 0.5 * z[1]]), slope, {})
@@ -64,7 +64,7 @@ def test_a_search_ends_at_the_end_of_all_places(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_place_without_flow_is_stepped_back_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vegglue.calibration.fit.linearise", lambda model, z, near: at(z) if z[0] < 2.0 else None)
+    monkeypatch.setattr("vegglue.calibration.fit.linearise", lambda model, z, *_: at(z) if z[0] < 2.0 else None)
     found = fit(None, NOISE, at(np.array([1.5, 0.0])))  # type: ignore[arg-type]
     assert 1.9 < found.point.z[0] < 2.0
     assert found.point.z[1] == pytest.approx(0.6, abs=0.02)

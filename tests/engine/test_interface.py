@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vegglue.arrays import Array
-from vegglue.engine.interface import Point, linearise_from
+from vegglue.engine.interface import Point, Wanted, linearise_from
 
 NEAR = Point(np.zeros(1), np.zeros(1), np.zeros((1, 1)), {})
 FOUND = Point(np.ones(1), np.zeros(1), np.zeros((1, 1)), {})
@@ -23,7 +23,7 @@ def test_a_point_is_searched_from_afar_once_and_only_where_it_has_to_be(
 ) -> None:
     starts: list[str] = []
 
-    def searched(model: Any, z: Array, start: Point | None) -> Point | None:
+    def searched(model: Any, z: Array, start: Point | None, wanted: Wanted) -> Point | None:
         starts.append("afar" if start is None else "near")
         return FOUND if starts[-1] in leads else None
 

@@ -17,7 +17,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.engine.interface import Model, Point
+from vegglue.engine.interface import Model, Point, Wanted, always
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.site.gridded_site import build_site
@@ -27,7 +27,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 STARTS: list[Array | None] = []
 
 
-def two_wells(model: Model, z: Array, near: Point | None = None) -> Point:
+def two_wells(model: Model, z: Array, near: Point | None = None, wanted: Wanted = always) -> Point:
     """Misfits (z^2 - 1) / 5 and (z - 1) / 40 of the first z, in m/s: wells at -1 and, lower, at 1."""
     first = z[0]
     prediction, slope = np.zeros(len(model.station)), np.zeros((len(model.station), z.size))

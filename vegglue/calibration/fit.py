@@ -7,6 +7,7 @@ which their prior is standard normal.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -49,8 +50,10 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> Ma
         step, predicted = _step(noise, point, longest)
         if predicted < NEGLIGIBLE_DECREASE:
             break
-        moved = linearise(model, point.z + step, point)
-        decrease = -np.inf if moved is None else objective(noise, point) - objective(noise, moved)
+        there, before = point.z + step, objective(noise, point)
+        # The slopes of a step that is taken back are never asked for: they are half of its work.
+        moved = linearise(model, there, point, partial(_is_below, before, noise, there))
+        decrease = -np.inf if moved is None else before - objective(noise, moved)
         length = float(np.abs(step).max())
         longest = length / 4.0 if decrease < predicted / 4.0 else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
         if moved is not None and decrease > 0.0:
@@ -65,12 +68,21 @@ def at_point(noise: Noise, point: Point) -> MapEstimate:
 
 def chi2(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 over the used stations [-]."""
-    return float(np.sum(noise.whiten(noise.residual(point.prediction)) ** 2))
+    return _misfit(noise, point.prediction)
 
 
 def objective(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 + |z|^2 [-]."""
     return chi2(noise, point) + float(point.z @ point.z)
+
+
+def _misfit(noise: Noise, prediction: Array) -> float:
+    return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
+
+
+def _is_below(limit: float, noise: Noise, z: Array, prediction: Array) -> bool:
+    """Whether the objective of predictions (n,) at z is below a limit."""
+    return _misfit(noise, prediction) + float(z @ z) < limit
 
 
 def covariance(noise: Noise, point: Point) -> Array:

@@ -20,7 +20,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import FURTHEST, theta_at
 from vegglue.engine.command_runs import CommandRuns, command_predictions, own_parameters
-from vegglue.engine.interface import Cause, Engine, Model, Point
+from vegglue.engine.interface import Cause, Engine, Model, Point, Wanted, linearise
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.progress import Watch, silent
@@ -74,7 +74,7 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch = sile
     found, reasons = command_predictions(
         runs, bare.case, model.station, _thetas(bare, points), watch, f"running the command of {model.case.name}"
     )
-    own = NEWTON.linearise(bare, here, None)
+    own = linearise(bare, here)
     if own is None:
         raise InputError(
             f"{model.case.name}: the built-in engine finds no flow where the command is calibrated; widen the priors, "
@@ -151,11 +151,11 @@ def _correction_in(correction: Correction, model: Model, z: Array) -> tuple[Arra
     return value + of_stations @ (z[columns] - correction.z), slope
 
 
-def _linearised(correction: Correction, model: Model, z: Array, near: Point | None) -> Point | None:
-    point = NEWTON.linearise(model, z, near)
+def _linearised(correction: Correction, model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+    value, slope = _correction_in(correction, model, z)
+    point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
     if point is None:
         return None
-    value, slope = _correction_in(correction, model, z)
     return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
 
 
@@ -168,7 +168,7 @@ def _predicted(runs: CommandRuns, watch: Watch, model: Model, points: Sequence[P
     )
     if not model.case.effects:
         return found
-    near = [NEWTON.linearise(bare, _own(model, point.z[None], bare.names)[0], None) for point in points]
+    near = [linearise(bare, _own(model, point.z[None], bare.names)[0]) for point in points]
     known = [point for point in near if point is not None]
     if not known:
         return np.full_like(found, np.nan)

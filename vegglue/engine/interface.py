@@ -54,12 +54,21 @@ class CentreFlow:
     v: Array
 
 
+# Told predictions (n,), whether their slopes are worth their time. Where they are not no point is given, either.
+Wanted = Callable[[Array], bool]
+
+
+def always(prediction: Array) -> bool:
+    """Slopes are wanted whatever the predictions are."""
+    return True
+
+
 @dataclass(frozen=True)
 class Engine:
     """How a flow is computed. A new engine is one value of this kind, see `newton` and `marching`.
 
-    linearise(model, z, near): the model and its slopes at z (p,), or None where no steady flow is found; near: a point
-        to start from, of this model or of one on cells of twice the size.
+    linearise(model, z, near, wanted): the model and its slopes at z (p,), or None where no steady flow is found;
+        near: a point to start from, of this model or of one on cells of twice the size; wanted: see `Wanted`.
     predict(model, points, z): predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
     responses(model, point, causes): d prediction / d (amplitude - off)^power at off, (n, causes).
     responses_to_cells(model, point, experiment, terms): d prediction / d term of the stations of an experiment, for a
@@ -68,7 +77,7 @@ class Engine:
     """
 
     name: str
-    linearise: Callable[["Model", Array, Point | None], Point | None]
+    linearise: Callable[["Model", Array, Point | None, Wanted], Point | None]
     predict: Callable[["Model", Sequence[Point], Array], Array]
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Array]]
@@ -94,14 +103,20 @@ class Model:
         names = self.station["experiment"].to_numpy()
         return {experiment: np.flatnonzero(names == experiment) for experiment in self.case.experiments}
 
+    @cached_property
+    def _stations(self) -> dict[str, pd.DataFrame]:
+        return {experiment: self.station.iloc[rows] for experiment, rows in self.rows.items()}
+
     def station_of(self, experiment: str) -> pd.DataFrame:
         """The stations of one experiment."""
-        return self.station.iloc[self.rows[experiment]]
+        return self._stations[experiment]
 
 
-def linearise(model: Model, z: Array, near: Point | None = None) -> Point | None:
-    """Predictions and slopes at z (p,); None when a flow finds no rest. near: a point to start from."""
-    return model.engine.linearise(model, z, near)
+def linearise(model: Model, z: Array, near: Point | None = None, wanted: Wanted = always) -> Point | None:
+    """Predictions and slopes at z (p,); None when a flow finds no rest, or slopes are not `wanted`. near: a point to
+    start from.
+    """
+    return model.engine.linearise(model, z, near, wanted)
 
 
 def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point
+from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
 from vegglue.flow.local_changes import Term, with_changed_term
@@ -42,7 +42,9 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
     )
 
 
-def _linearised(model: Model, z: Array, near: Point | None, time_step: float, longest: float) -> Point | None:
+def _linearised(
+    model: Model, z: Array, near: Point | None, wanted: Wanted, time_step: float, longest: float
+) -> Point | None:
     """All members of the central differences are marched side by side, the first of them at z itself."""
     steps = MARCHED_DIFFERENCE_STEP * np.eye(z.size)
     members = np.vstack([z[None], z + steps, z - steps])
@@ -53,7 +55,7 @@ def _linearised(model: Model, z: Array, near: Point | None, time_step: float, lo
         state = _rested(problem, _start(problem, near, experiment), time_step, longest)
         prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
         flows[experiment] = state[..., :1]
-    if not np.isfinite(prediction).all():
+    if not np.isfinite(prediction).all() or not wanted(prediction[0]):
         return None
     ahead, behind = prediction[1 : 1 + z.size], prediction[1 + z.size :]
     return Point(z, prediction[0], (ahead - behind).T / (2.0 * MARCHED_DIFFERENCE_STEP), flows)
