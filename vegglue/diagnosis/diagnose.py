@@ -16,6 +16,7 @@ from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_offset
+from vegglue.diagnosis.centred_place import centred
 from vegglue.diagnosis.competition import (
     LEAST_ODDS,
     Contender,
@@ -183,15 +184,17 @@ def _with_accepted(
     one = contenders[j]
     if one.log_evidence < 0.0:
         return None
-    watch(Progress(f"calibrating with {one.name}"))
+    charge = one.log_evidence - refit.log_factor
+    refit = refit if one.kind == "effect" else centred(screening, one.kind, refit)
+    watch(Progress(f"calibrating with {refit.candidate.name}"))
     further = calibrated_with(screening.base, refit)
-    if further is None:
+    if further is None or not is_worth_it(one.kind, log_evidence(further) - log_evidence(screening.base) + charge):
         return None
     before = chi2(screening.base.noise, screening.base.fitted.point)
     found = replace(
         found,
         explained=found.explained + before - further.fitted.chi2,
-        log_prior=found.log_prior + one.log_evidence - refit.log_factor,
+        log_prior=found.log_prior + charge,
     )
     if one.kind != "effect":
         return Following(
@@ -203,6 +206,11 @@ def _with_accepted(
     further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
     return Following(replace(found, steps=(*kept, step)), further)
+
+
+def is_worth_it(kind: str, log_evidence: float) -> bool:
+    """Whether a contender beats nothing on the case's own grid: an effect at all, a place by LEAST_ODDS."""
+    return log_evidence > (0.0 if kind == "effect" else np.log(LEAST_ODDS))
 
 
 def _kept(suspects: Mapping[str, Suspect], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
