@@ -39,7 +39,8 @@ def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
         low, high = one.seen
         assert low < high
         for settings in one.candidate.settings():
-            assert low <= settings.get("reference", low) * (1 + 1e-9) or one.law.quantity.name == "along"
+            rounded = 1.05  # a reference has two digits
+            assert low <= settings.get("reference", low) * rounded or one.law.quantity.name == "along"
     low, high = laws["law_floor_depth_ramp"].seen
     assert 0.5 < low < high < 1.3
     assert high - low > LEAST_SPREAD

@@ -25,13 +25,14 @@ from law_sets import RATIOS, STUDY, knowing_hidden
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.diagnosis.competition import tempered_chances
-from vegglue.discovery.search import HELD, MOST_LAWS_REFITTED
+from vegglue.discovery.search import HELD, MOST_QUANTITIES
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 from vegglue.screening import score_test
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.screening.evidence import log_factors
-from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
+from vegglue.screening.residual_screening import GROUPS
 
 ANGLES = Path(__file__).parents[2] / "data" / "blind" / "law_angles.jsonl"
 # A hidden law is left out where the plausible strength leaves less than this [standard errors]: the study of laws
@@ -42,7 +43,7 @@ LEAST_SEEN = RATIOS["law"][0] / 4.0
 @dataclass(frozen=True)
 class Rival:
     """Something that competes: what it says, and of each of its columns the unit trace u (rows, c), the size a (c,) and
-    ln prior (c,); law: whether it is one of the grammar.
+    ln prior (c,); law: whether it is of the grammar.
     """
 
     said: Said
@@ -60,7 +61,7 @@ class Rival:
 
 
 def rivals_of(screening: LawScreening) -> list[Rival]:
-    """Listed effects, laws, and places and instruments by kind."""
+    """Listed effects, quantities of terms with all their laws, and places and instruments by kind."""
 
     def rival(kind: Any, said: Said, columns: Any, law: bool = False) -> Rival:
         parts = (kind.projected.units[:, columns], kind.size[columns], kind.log_prior[columns])
@@ -71,13 +72,14 @@ def rivals_of(screening: LawScreening) -> list[Rival]:
     pairs = list(zip(traces.candidates, traces.columns, strict=True))
     found = [rival(listed, LISTED_SAYS.get(one.effect.name, ("", "")), columns) for one, columns in pairs]
     found += [rival(kind, ("", ""), slice(None)) for kind in others]
-    for one, columns in zip(screening.laws, screening.columns, strict=True):
-        found.append(rival(screening.kind, (one.law.term.name, one.law.quantity.name), columns, law=True))
+    for said, laws in screening.subjects.items():
+        columns = np.concatenate([screening.columns[law] for law in laws])
+        found.append(rival(screening.kind, said, columns, law=True))
     return found
 
 
 def true_rival(base: Baseline, screening: LawScreening, law: HiddenLaw) -> Rival:
-    """The hidden law itself at its middle reference, as likely before as a law of the grammar."""
+    """The hidden law itself at its middle reference, as likely before as a quantity of a term."""
     listed = screening.listed
     model = replace(listed.search.model, case=knowing_hidden(listed.search.model.case))
     effect = next(one for one in EFFECTS if one.name == law.name)
@@ -86,7 +88,7 @@ def true_rival(base: Baseline, screening: LawScreening, law: HiddenLaw) -> Rival
     residual = np.zeros(noise.rows.size)
     trace = noise.whiten(noise.used(values))
     seen = score_test.project(listed.whitened_slopes, residual, base.fitted.point.z, trace)
-    prior = np.full(1, float(screening.kind.log_prior[screening.columns[0]].max()))
+    prior = np.full(1, -np.log(GROUPS * LISTED_ODDS * len(screening.subjects)))
     return Rival(
         (law.term, law.quantity), seen.units, effect.amplitude.scale * seen.length, prior, np.zeros(1, bool), True
     )
@@ -99,7 +101,7 @@ def chances_told(rivals: Sequence[Rival], residual: Array, whole: bool) -> list[
     evidence = np.array([one.log_evidence(residual) for one in rivals])
     laws = np.flatnonzero([one.law for one in rivals])
     kept = np.ones(evidence.size, bool)
-    kept[laws[np.argsort(-evidence[laws])[MOST_LAWS_REFITTED:]]] = False
+    kept[laws[np.argsort(-evidence[laws])[MOST_QUANTITIES:]]] = False
     evidence = np.where(kept, evidence, -np.inf)
     weight = np.exp(evidence - evidence.max())
     chance = weight / weight.sum() if whole else tempered_chances(evidence)

@@ -1,12 +1,14 @@
 """Data sets of the study of laws: what is hidden in each, at which size, and the measurements that come of it.
 
 The truth is the second solver's, on a site with small imperfections drawn anew for each set, as in the blind study. One
-experiment more is held out.
+experiment more is held out. Truths are kept, for they do not change with the search.
 """
 
+import json
+import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from vegglue.calibration.noise import noise_of, with_grid_error, with_model_erro
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model
+from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.screening.candidates import Candidate
 from vegglue.twins.hidden_effect import TwinBase, VisibilityError, chosen_effect
@@ -94,18 +97,61 @@ def knowing_hidden(case: Case) -> Case:
     return case.model_copy(update={"effect_file": Path(hidden_laws.__file__)})
 
 
-def law_data_set(trial: LawTrial) -> LawDataSet:
-    """The data set of a trial. Errors: VisibilityError where it cannot be made visible, RuntimeError where the second
-    solver finds no steady flow.
+@dataclass(frozen=True)
+class LawTruth:
+    """What instruments show at the stations (station,) and, without errors, what is true at those held out (k,); hidden
+    and also_true as in `LawDataSet`; left_out: why there is none, or empty.
     """
-    base, columns = place_of(STUDY, (7 * trial.number + len(trial.group)) % PLACES)
+
+    hidden: dict[str, Any] | None
+    value: list[float]
+    held_out: list[float]
+    also_true: dict[str, float]
+    seconds: float
+    left_out: str = ""
+
+
+def law_truth(trial: LawTrial, folder: Path) -> LawTruth:
+    """The truth of a trial, from the folder where it is kept there, else made and put there."""
+    path = folder / f"{trial.key.replace('/', '_')}.json"
+    if path.exists():
+        return LawTruth(**json.loads(path.read_text(encoding="utf-8")))
+    folder.mkdir(parents=True, exist_ok=True)
+    began = time.process_time()
+    try:
+        made = replace(_made(trial), seconds=time.process_time() - began)
+    except (VisibilityError, InputError, RuntimeError) as error:
+        made = LawTruth(None, [], [], {}, time.process_time() - began, str(error))
+    path.write_text(json.dumps(asdict(made)), encoding="utf-8")
+    return made
+
+
+def law_data_set(trial: LawTrial, truth: LawTruth) -> LawDataSet:
+    """The data set of a trial with its truth, which was not left out."""
+    base, _ = place_of(STUDY, _place(trial))
+    model = replace(base.model, station=base.model.station.assign(value=np.array(truth.value)))
+    held_out = held_out_stations(base.model).assign(value=np.array(truth.held_out))
+    return LawDataSet(model, truth.hidden, held_out, _with_held_out(base.model.case), truth.also_true)
+
+
+def _place(trial: LawTrial) -> int:
+    return (7 * trial.number + len(trial.group)) % PLACES
+
+
+def _with_held_out(case: Case) -> Case:
+    return case.model_copy(update={"experiments": {**case.experiments, HELD_OUT: HELD_OUT_SETTING}})
+
+
+def _made(trial: LawTrial) -> LawTruth:
+    """Errors: VisibilityError where it cannot be made visible, RuntimeError where the second solver finds no steady
+    flow.
+    """
+    base, columns = place_of(STUDY, _place(trial))
     seed = hash_of(f"laws: {trial.key}")
     random = np.random.default_rng((seed, 2))
     errors = noise_of(base.model.station)
     hidden = _hidden_in(base, columns, trial, random) if trial.hide else None
-    station, held_out = base.model.station, held_out_stations(base.model)
-    experiments = {**base.model.case.experiments, HELD_OUT: HELD_OUT_SETTING}
-    case = base.model.case.model_copy(update={"experiments": experiments})
+    station, held_out, case = base.model.station, held_out_stations(base.model), _with_held_out(base.model.case)
     theta = {name: float(values[0]) for name, values in theta_at(case, base.here.z).items()}
     of_kind = SAME_KIND.get(hidden_laws.BY_NAME[trial.hide].term, ()) if trial.group == "law" else (trial.hide,)
     site = site_of_nature(perfect_site(case, STUDY, theta, len(station)), case, seed % 2**31, of_kind)
@@ -114,8 +160,7 @@ def law_data_set(trial: LawTrial) -> LawDataSet:
     truly = true_values(site, case, STUDY, everywhere, numbers, CELLS_OF_TRUTH, STEADY_ENOUGH)
     value = truly[: len(station)].copy()
     value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
-    model = replace(base.model, station=station.assign(value=value))
-    return LawDataSet(model, hidden, held_out.assign(value=truly[len(station) :]), case, site.also_true)
+    return LawTruth(hidden, value.tolist(), truly[len(station) :].tolist(), dict(site.also_true), 0.0)
 
 
 def held_out_stations(model: Model) -> pd.DataFrame:

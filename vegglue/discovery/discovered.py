@@ -1,12 +1,15 @@
 """What a search for laws has found, and how it is told."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
+from vegglue.diagnosis.refits import Refit
 from vegglue.effects.grammar import Law
 from vegglue.in_short import in_short
+from vegglue.screening.laws_in_case import VALUES_SEEN
 
 MOST_ALIKE = 4  # told by name
 
@@ -23,7 +26,9 @@ def signed(reference: float) -> str:
 
 @dataclass(frozen=True)
 class LawFound:
-    """A law with its reference r, its strength a and the 95 % interval of it [-], and its chance to be what is missing.
+    """A law with its reference r, its strength a and the 95 % interval of it [-].
+
+    chance: that its term changes with its quantity, in whatever form; the law is the form that explains most.
 
     scale: a plausible strength; same_as: the listed effect that it restates, or empty; seen: from where to where the
     data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations.
@@ -57,9 +62,9 @@ class LawFound:
 
     @property
     def factor(self) -> float:
-        """By what the term is larger at the upper end of what was seen than at the lower [-]."""
-        low, high = (float(self.law.form.of(np.array(q), self.reference or 1.0)) for q in self.seen)
-        return float(np.exp(self.strength * (high - low)))
+        """By what the term is larger where it differs most, over what was seen, than at the lower end of that [-]."""
+        g = self.law.form.of(np.linspace(*self.seen, VALUES_SEEN), 1.0 if self.reference is None else self.reference)
+        return float(np.exp(self.strength * (g - g[0])[np.abs(g - g[0]).argmax()]))
 
     @property
     def range_seen(self) -> str:
@@ -86,13 +91,16 @@ class Discovery:
     """p: chance that errors alone make laws stand out as much; tried: the number of laws that had something to act on.
 
     laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together; none
-    where nothing is found.
+    where nothing is found. compared: ln evidence of all that was calibrated, by name [-];
+    likeliest: the likeliest of these, where it is in the model and not in the data.
     """
 
     p: float
     tried: int
     laws: tuple[LawFound, ...]
     others: dict[str, float]
+    compared: Mapping[str, float] = field(default_factory=dict)
+    likeliest: Refit | None = None
 
     @property
     def best(self) -> LawFound | None:

@@ -6,25 +6,29 @@ and instruments, which are as likely before as in a diagnosis; all laws together
 effects (`law_screening`), and so is something at a place, which is as vague.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempered_chances, tempering
+from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempering
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.discovery.discovered import Discovery, LawFound
-from vegglue.effects.grammar import SAME_AS
+from vegglue.effects.grammar import SAME_AS, Law
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent
 from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.score_test import ALIKE
 
-# Laws that are calibrated at most; as many as listed effects in a diagnosis. Chosen, not measured: each costs a fit.
-MOST_LAWS_REFITTED = 8
+# Quantities of terms of which a law is calibrated at most; as many as listed effects in a diagnosis. Of the first two,
+# which decide what is told, two forms are. Chosen, not measured: each costs a fit.
+MOST_QUANTITIES, SEVERAL_FORMS, FORMS_REFITTED = 8, 2, 2
+# Relative error of a trace [-], half that of a diagnosis: of what cells and laws of nature do to a trace, most is
+# common to quantities of one term, which are what is to be told apart. Chosen after 15 sets of the study of laws.
+TRACE_ERROR = 0.07
 # Chance that the set of laws and other causes holds together [-].
 HELD = 0.95
 
@@ -60,40 +64,62 @@ def _as_vague(screening: LawScreening, found: Sequence[Contender]) -> list[Conte
 
 
 def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Contender]:
-    """The most promising laws, calibrated, with their evidence; known: that of the best of all else."""
+    """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
+    laws; known: ln evidence of the best of all else.
+    """
     evidence = screening.kind.log_evidence
-    best = np.array([screening.best_column(j) for j in range(len(screening.laws))])
-    order = np.argsort(-evidence[best])[:MOST_LAWS_REFITTED]
-    top = max(float(evidence[best].max()), known)
-    reach = [int(j) for j in order if (top - evidence[best[j]]) / tempering(np.array(top)) < REACH]
-    trials = [_trial(screening, j, int(best[j])) for j in reach]
-    refits = refits_of(screening.listed.search, trials, watch)
-    return [
-        Contender("law", refit.candidate.name, refit.log_factor + _charge(screening, j), int(best[j]), refit)
-        for j, refit in zip(reach, refits, strict=True)
-        if refit is not None
-    ]
+    columns = {said: _columns(screening, laws) for said, laws in screening.subjects.items()}
+    promised = {said: float(np.logaddexp.reduce(evidence[some])) for said, some in columns.items()}
+    ranked = sorted(promised, key=lambda said: -promised[said])[:MOST_QUANTITIES]
+    top = max(promised[ranked[0]], known)
+    ranked = [said for said in ranked if (top - promised[said]) / tempering(np.array(top)) < REACH]
+    tried = [(said, law) for rank, said in enumerate(ranked) for law in _forms(screening, said, rank)]
+    refits = refits_of(screening.listed.search, [_trial(screening, law) for _, law in tried], watch)
+    found = []
+    for said in ranked:
+        kept = {law: refit for (of, law), refit in zip(tried, refits, strict=True) if of == said and refit is not None}
+        if kept:
+            found.append(_contender(screening, columns[said], kept))
+    return found
 
 
-def _trial(screening: LawScreening, law: int, column: int) -> RefitTrial:
+def _columns(screening: LawScreening, laws: Sequence[int]) -> np.ndarray:
+    return np.concatenate([screening.columns[law] for law in laws])
+
+
+def _forms(screening: LawScreening, said: tuple[str, str], rank: int) -> list[int]:
+    """The laws of a quantity that are calibrated, the most promising first: more than one of the first quantities."""
+    evidence, laws = screening.kind.log_evidence, screening.subjects[said]
+    ranked = sorted(laws, key=lambda law: -evidence[screening.best_column(law)])
+    return ranked[: FORMS_REFITTED if rank < SEVERAL_FORMS else 1]
+
+
+def _trial(screening: LawScreening, law: int) -> RefitTrial:
     """A law at its best reference, from the best place and the size of its score."""
-    search, one, shapes = screening.listed.search, screening.laws[law].candidate, screening.settings[column]
+    search, one, shapes = screening.listed.search, screening.laws[law].candidate, screening.settings_of(law)
     start = start_with(search.model.case, one, shapes, search.point.z, screening.gain(law))
     return RefitTrial(one, shapes, (start,))
 
 
-def _charge(screening: LawScreening, law: int) -> float:
-    """ln prior of a law at its best reference, and what its other references add to first order."""
-    columns, evidence = screening.columns[law], screening.kind.log_evidence
-    others = float(np.logaddexp.reduce(evidence[columns]) - evidence[columns].max())
-    return float(screening.kind.log_prior[columns[0]]) + others
+def _contender(screening: LawScreening, columns: np.ndarray, kept: Mapping[int, Refit]) -> Contender:
+    """The best of the calibrated laws of a quantity, with the evidence of all its columns: as kept where calibrated,
+    elsewhere to first order, corrected as that of the best one.
+    """
+    first, prior = screening.kind.log_evidence, screening.kind.log_prior
+    ends = {screening.best_column(law): refit for law, refit in kept.items()}
+    best = max(ends, key=lambda column: ends[column].log_factor + prior[column])
+    evidence = first + (ends[best].log_factor + prior[best] - first[best])
+    for column, refit in ends.items():
+        evidence[column] = refit.log_factor + prior[column]
+    return Contender("law", ends[best].candidate.name, float(np.logaddexp.reduce(evidence[columns])), best, ends[best])
 
 
 def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discovery:
-    """The causes that hold HELD of the chance together; none where even the best says too little."""
-    if not ranked or ranked[0].log_evidence < 0.0:
+    """The causes that hold HELD of the chance together; none where all of them together say too little."""
+    evidence = np.array([one.log_evidence for one in ranked])
+    if np.logaddexp.reduce(evidence) < 0.0:
         return Discovery(screening.p, len(screening.laws), (), {})
-    chances = tempered_chances(np.array([one.log_evidence for one in ranked]))
+    chances = _chances(evidence)
     count = int(np.searchsorted(np.cumsum(chances), HELD)) + 1
     pairs = list(zip(ranked, chances, strict=True))[:count]
     laws = tuple(_law_found(screening, one, float(p)) for one, p in pairs if one.kind == "law")
@@ -102,7 +128,16 @@ def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discover
         tried=len(screening.laws),
         laws=laws,
         others={one.name: float(p) for one, p in pairs if one.kind != "law"},
+        compared={one.name: one.log_evidence for one in ranked},
+        likeliest=ranked[0].what if isinstance(ranked[0].what, Refit) else None,
     )
+
+
+def _chances(evidence: Array) -> Array:
+    """As in `competition`, with TRACE_ERROR."""
+    tempered = 1.0 + TRACE_ERROR**2 * 2.0 * np.maximum(evidence, 0.0)
+    weight = np.exp((evidence - evidence.max()) / tempered)
+    return np.asarray(weight / weight.sum())
 
 
 def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFound:
@@ -119,15 +154,20 @@ def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFou
         chance=chance,
         log_evidence=one.log_evidence,
         seen=of_law.seen,
-        alike=_alike(screening, one),
+        alike=_alike(screening, one, of_law.law),
     )
 
 
-def _alike(screening: LawScreening, one: Contender) -> tuple[str, ...]:
-    """Names of listed effects and laws whose trace at the stations is that of this law, the most alike first."""
+def _alike(screening: LawScreening, one: Contender, own: Law) -> tuple[str, ...]:
+    """Names of listed effects, and of the nearest law of any other quantity, that leave the same trace as this law, the
+    most alike first.
+    """
     row = np.abs(screening.cosine[screening.of_listed + one.column])
     listed = screening.listed.fingerprints
-    names = [candidate.name for candidate in listed.candidates] + [law.candidate.name for law in screening.laws]
-    columns = [*listed.columns, *(screening.of_listed + numbers for numbers in screening.columns)]
-    nearest: Array = np.array([row[numbers].max() for numbers in columns])
-    return tuple(names[j] for j in np.argsort(-nearest) if nearest[j] > ALIKE and names[j] != one.name)
+    near = {of.name: float(row[some].max()) for of, some in zip(listed.candidates, listed.columns, strict=True)}
+    for said, laws in screening.subjects.items():
+        if said != own.subject:
+            cosine = {law: float(row[screening.of_listed + screening.columns[law]].max()) for law in laws}
+            nearest = max(laws, key=lambda law: cosine[law])
+            near[screening.laws[nearest].candidate.name] = cosine[nearest]
+    return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > ALIKE)

@@ -81,6 +81,11 @@ class Law:
         return f"law_{self.term.name}_{self.quantity.name}_{self.form.name}"
 
     @property
+    def subject(self) -> tuple[str, str]:
+        """Names of its term and of its quantity: what a law says, whatever its form."""
+        return self.term.name, self.quantity.name
+
+    @property
     def title(self) -> str:
         words = self.form.words.format(q=self.quantity.words)
         return f"{self.term.words[0].upper()}{self.term.words[1:]} {words}"
@@ -170,6 +175,8 @@ _EDGE = LawQuantity(
     "np.abs(cells.geometry.edge)", 0.5,
 )  # fmt: skip
 
+# Quantiles of what was seen at which references are tried: so many that a reference between two of them changes little.
+_EVERYWHERE = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 # g of -2.3 to 2.3, -1 to 2, -1/2 to 1/2 and 0 to 1: held where q is ten or three times r, since no data reach there.
 _POWER = LawForm(
     "power", "changes as a power of {q}", lambda q, r: np.log(np.clip(q / r, 0.1, 10.0)),
@@ -181,7 +188,11 @@ _RAMP = LawForm(
 )  # fmt: skip
 _STEP = LawForm(
     "step", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(5.0 * (np.minimum(q / r, 3.0) - 1.0)),
-    "0.5 * np.tanh(5 * (np.minimum({q} / {r}, 3) - 1))", "tanh(5 ({q}/{r} - 1)) / 2", (0.3, 0.5, 0.7),
+    "0.5 * np.tanh(5 * (np.minimum({q} / {r}, 3) - 1))", "tanh(5 ({q}/{r} - 1)) / 2", _EVERYWHERE,
+)  # fmt: skip
+_HUMP = LawForm(
+    "hump", "differs around one value of {q}", lambda q, r: np.exp(-(((np.minimum(q / r, 3.0) - 1.0) / 0.4) ** 2)),
+    "np.exp(-(((np.minimum({q} / {r}, 3) - 1) / 0.4) ** 2))", "exp(-(({q}/{r} - 1)/0.4)^2)", _EVERYWHERE,
 )  # fmt: skip
 # The data may lie in a tenth of the channel: then a is large, although the term changes little there.
 _TREND = LawForm(
@@ -189,18 +200,22 @@ _TREND = LawForm(
 )
 _PART = LawForm(
     "part", "changes at one value of {q}", lambda q, r: 0.5 * np.tanh(20.0 * (q - r)),
-    "0.5 * np.tanh(20 * ({q} - {r}))", "tanh(20 ({q} - {r})) / 2", (0.3, 0.5, 0.7),
+    "0.5 * np.tanh(20 * ({q} - {r}))", "tanh(20 ({q} - {r})) / 2", _EVERYWHERE,
+)  # fmt: skip
+_STRETCH = LawForm(
+    "stretch", "differs in one stretch of the channel", lambda q, r: np.exp(-(((q - r) / 0.2) ** 2)),
+    "np.exp(-((({q} - {r}) / 0.2) ** 2))", "exp(-(({q} - {r})/0.2)^2)", _EVERYWHERE,
 )  # fmt: skip
 _FADING = LawForm(
-    "fading", "fades out with {q}", lambda q, r: np.exp(-q / r), "np.exp(-({q}) / {r})", "exp(-{q}/{r})", (0.3, 0.7)
+    "fading", "fades out with {q}", lambda q, r: np.exp(-q / r), "np.exp(-({q}) / {r})", "exp(-{q}/{r})", _EVERYWHERE
 )
 
 _EVERY_TERM = (_FLOOR, _BANK, _PLANTS, _VISCOSITY)
 # Which quantities are to be seen in which terms, and the forms that make sense of them.
 _SENTENCES: tuple[tuple[tuple[LawTerm, ...], tuple[LawQuantity, ...], tuple[LawForm, ...]], ...] = (
-    (_EVERY_TERM, (_DEPTH, _SPEED, _FROUDE, _SHEAR), (_POWER, _RAMP, _STEP)),
-    (_EVERY_TERM, (_ALONG_CHANNEL,), (_TREND, _PART)),
-    (_EVERY_TERM, (_OFFSET,), (_RAMP, _STEP)),
+    (_EVERY_TERM, (_DEPTH, _SPEED, _FROUDE, _SHEAR), (_POWER, _RAMP, _STEP, _HUMP)),
+    (_EVERY_TERM, (_ALONG_CHANNEL,), (_TREND, _PART, _STRETCH)),
+    (_EVERY_TERM, (_OFFSET,), (_RAMP, _STEP, _HUMP)),
     ((_PLANTS, _VISCOSITY), (_FRONT,), (_FADING,)),
     ((_FLOOR, _PLANTS, _VISCOSITY), (_EDGE,), (_FADING,)),
 )

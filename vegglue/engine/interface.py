@@ -74,6 +74,8 @@ class Engine:
     responses_to_cells(model, point, experiment, terms): d prediction / d term of the stations of an experiment, for a
         change in each cell of one of the TERMS of `flow/local_changes`, (n, nx, ny) by term.
     flow_at_centres(model, point, experiment): depth and velocities of a point.
+    by_itself(model, point): the point with nothing borrowed from a flow nearby, where `responses_to_cells` is to be
+        exact to a per cent.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Engine:
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Array]]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
+    by_itself: Callable[["Model", Point], Point]
 
 
 @dataclass(frozen=True)
@@ -138,6 +141,11 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
 def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:
     """d prediction / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
     return model.engine.responses_to_cells(model, point, experiment, terms)
+
+
+def by_itself(model: Model, point: Point) -> Point:
+    """The point with nothing borrowed from a flow nearby: its responses to cells are then exact to a per cent."""
+    return model.engine.by_itself(model, point)
 
 
 def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:

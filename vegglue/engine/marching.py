@@ -27,7 +27,9 @@ REST_RATE, STEPS_BETWEEN_CHECKS = 1e-9, 100
 # Step of central differences in z [standard deviations of the prior].
 MARCHED_DIFFERENCE_STEP = 0.02
 # Small changes of a term in one cell, in its unit: large against what is left of the march when it ends.
-MARCHED_CHANGE: dict[Term, float] = {"friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-4, "viscosity": 1e-3}
+MARCHED_CHANGE: dict[Term, float] = {
+    "friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-4, "viscosity": 1e-3, "mixing": 0.05,
+}  # fmt: skip
 
 
 def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
@@ -39,6 +41,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
         responses=partial(_responses, time_step=time_step, longest=longest),
         responses_to_cells=partial(_responses_to_cells, time_step=time_step, longest=longest),
         flow_at_centres=_flow_at_centres,
+        by_itself=lambda model, point: point,
     )
 
 

@@ -124,6 +124,18 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     return found
 
 
+def with_own_factors(model: Model, point: Point) -> Point:
+    """See `Engine.by_itself`: with factors of a flow nearby answers to cells are off by some 5 %, with its own by
+    0.5 %.
+    """
+    flows = dict(point.flows)
+    for experiment, flow in point.flows.items():
+        if flow.moved > 0.0:
+            problem = crop(problem_at(model, experiment, point.z), *flow.band)
+            flows[experiment] = replace(flow, factors=factors(problem, flow.state), moved=0.0)
+    return replace(point, flows=flows)
+
+
 def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
     """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
     flow = point.flows[experiment]
@@ -209,4 +221,5 @@ NEWTON = Engine(
     responses=responses_by_tangents,
     responses_to_cells=responses_by_adjoints,
     flow_at_centres=centre_flow,
+    by_itself=with_own_factors,
 )

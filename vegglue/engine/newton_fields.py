@@ -29,7 +29,9 @@ from vegglue.solver.wet_band import widen
 # Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
 CELL_STRIDE = 5
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
-SMALL_CHANGE: dict[Term, float] = {"friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4}
+SMALL_CHANGE: dict[Term, float] = {
+    "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
+}  # fmt: skip
 
 
 def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:

@@ -16,9 +16,9 @@ from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.flow.problem import Problem, take
 
 # friction: k -> k (1 + a) [-]; drag: k -> k + a [1/m]; bed: z_b -> z_b + a [m]; inflow: a enters [m/s]; viscosity:
-# nu -> nu + a [m2/s].
-Term = Literal["friction", "drag", "bed", "inflow", "viscosity"]
-TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity")
+# nu -> nu + a [m2/s]; mixing: nu -> nu (1 + a) [-].
+Term = Literal["friction", "drag", "bed", "inflow", "viscosity", "mixing"]
+TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity", "mixing")
 
 
 def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, change: Array) -> Problem:
@@ -55,12 +55,15 @@ def _field_effect(term: Term, whole: ChannelGeometry, change: Array) -> Effect:
     def viscosity(cells: Cells, on: Array) -> Mapping[str, Array]:
         return {"viscosity": on * here(cells)}
 
+    def mixing(cells: Cells, on: Array) -> Mapping[str, Array]:
+        return {"viscosity": on * here(cells) * cells.viscosity}
+
     return Effect(
         name=f"field_of_{term}",
-        stage="exchange" if term == "viscosity" else "resistance",
+        stage="exchange" if term in ("viscosity", "mixing") else "resistance",
         title=f"A field of {term}",
         equation="term + field",
-        act={"friction": friction, "drag": drag, "viscosity": viscosity}[term],
+        act={"friction": friction, "drag": drag, "viscosity": viscosity, "mixing": mixing}[term],
         amplitude=Amplitude("on", "-", "0 or 1", 1.0, 0.0, 1.0),
         source="definition",
         checked=True,

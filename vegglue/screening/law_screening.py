@@ -4,18 +4,19 @@ The errors' correlation is estimated with laws among what could be missing, else
 correlated errors. Listed effects, places and instruments keep their kinds and chances.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
-from vegglue.engine.interface import responses
 from vegglue.screening import score_test
 from vegglue.screening.candidates import cause_of
 from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses, prior_shrinkage
 from vegglue.screening.family_wise_p import family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
+from vegglue.screening.law_traces import law_traces
 from vegglue.screening.laws_in_case import LawInCase, laws_in_case
 from vegglue.screening.residual_screening import GROUPS, Screening, kind_of_listed, screen
 from vegglue.site.channel_geometry import half_width
@@ -49,10 +50,22 @@ class LawScreening:
         evidence = self.kind.log_evidence
         return np.array([np.logaddexp.reduce(evidence[columns]) for columns in self.columns])
 
+    @property
+    def subjects(self) -> dict[tuple[str, str], list[int]]:
+        """The laws of each quantity of each term, by their numbers."""
+        found: dict[tuple[str, str], list[int]] = {}
+        for j, one in enumerate(self.laws):
+            found.setdefault(one.law.subject, []).append(j)
+        return found
+
     def best_column(self, law: int) -> int:
         """Of the fingerprint of a law with the most evidence, in `kind`."""
         columns = self.columns[law]
         return int(columns[np.argmax(self.kind.log_evidence[columns])])
+
+    def settings_of(self, law: int) -> dict[str, float]:
+        """Of that fingerprint."""
+        return self.settings[self.best_column(law)]
 
     def gain(self, law: int) -> float:
         """Its strength to first order, not beyond LARGEST_GAIN plausible ones [-]."""
@@ -92,7 +105,7 @@ def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...]
     full = screen(base, flagged, every, LAW_SEED)
     count = len(listed.settings)
     columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
-    kind = _kind_of_laws(full, columns, count)
+    kind = _kind_of_laws(full, laws, columns, count)
     return LawScreening(
         listed=_of_listed(full, listed),
         laws=laws,
@@ -131,7 +144,8 @@ def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel)
         amplitudes += [one.candidate.amplitude] * len(tried)
         causes += [cause_of(search.model.case, one.candidate, shapes) for shapes in tried]
         first += len(tried)
-    values = responses(search.model, search.point, causes)
+    traces = law_traces(search.model, search.point)
+    values = np.hstack([traces.of(one.law, one.candidate.settings()) for one in laws])
     return replace(
         listed,
         candidates=[*listed.candidates, *(one.candidate for one in laws)],
@@ -152,12 +166,12 @@ def _part(projected: score_test.Projected, columns: slice) -> score_test.Project
     )
 
 
-def _kind_of_laws(full: Screening, columns: list[np.ndarray], first: int) -> HypothesisKind:
-    """All laws are as likely before, and so are the references of one."""
+def _kind_of_laws(full: Screening, laws: list[LawInCase], columns: list[np.ndarray], first: int) -> HypothesisKind:
+    """All quantities of all terms are as likely before, all forms of one, and all references of a form."""
     plausible = np.array([one.plausible_gain for one in full.fingerprints.amplitudes[first:]])
-    prior = np.empty(plausible.size)
-    for of_law in columns:
-        prior[of_law] = 1.0 / (GROUPS * LISTED_ODDS * len(columns) * of_law.size)
+    prior, forms = np.empty(plausible.size), Counter(one.law.subject for one in laws)
+    for one, of_law in zip(laws, columns, strict=True):
+        prior[of_law] = 1.0 / (GROUPS * LISTED_ODDS * len(forms) * forms[one.law.subject] * of_law.size)
     return kind_of_hypotheses("law", _part(full.projected, slice(first, None)), plausible, prior)
 
 

@@ -25,6 +25,8 @@ SEEN, FEWEST_SEEN = (0.05, 0.95), 10
 # Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it can be told
 # from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.
 LEAST_SPREAD = 0.1
+# Values of a quantity over what was seen, enough to meet the top of a hump to a few per cent.
+VALUES_SEEN = 41
 # Significant digits of a reference: a person reads it.
 DIGITS = 2
 
@@ -62,13 +64,13 @@ def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawI
 
 
 def _plausible(effect: Effect, law: Law, low: float, high: float) -> float:
-    """A plausible strength a: from one end of what was seen to the other, exp(a g) changes by PLAUSIBLE_STRENGTH in ln.
+    """A plausible strength a: over what was seen exp(a g) changes by PLAUSIBLE_STRENGTH in ln.
 
     So all laws are as free to change what the data see, however g is counted; at most half way to the support's end.
     """
     reference = effect.shapes[0].default if effect.shapes else 1.0
-    first, last = (float(law.form.of(np.array(q), reference)) for q in (low, high))
-    return min(PLAUSIBLE_STRENGTH / max(abs(last - first), 1e-9), 0.5 * effect.amplitude.high)
+    change = float(np.ptp(law.form.of(np.linspace(low, high, VALUES_SEEN), reference)))
+    return min(PLAUSIBLE_STRENGTH / max(change, 1e-9), 0.5 * effect.amplitude.high)
 
 
 def _with_references(law: Law, values: Array) -> Effect:
@@ -97,6 +99,7 @@ def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
     """The flow at cell centres of one experiment, with friction and viscosity of 1."""
     flow = flow_at_centres(model, point, experiment)
     geometry = channel_geometry(model.case, model.site, experiment)
+    of_smallest = model.case.numerics.shear_depth == "smallest"
     depth, of_one = flow.depth[..., None], np.ones_like(flow.depth)[..., None]
     return Cells(
         geometry=geometry,
@@ -107,7 +110,7 @@ def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
         rate=of_one,
         bed_rate=of_one,
         viscosity=of_one,
-        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9,
+        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9 if of_smallest else np.zeros((0, 0, 0)),
     )
 
 

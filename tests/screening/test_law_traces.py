@@ -1,0 +1,54 @@
+"""Fingerprints of laws from answers to cells: those of the effects, also at a point with borrowed factors."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.effects.grammar import LAWS
+from vegglue.engine.interface import Model, Point, by_itself, linearise, responses
+from vegglue.engine.model import coarser
+from vegglue.screening.candidates import Candidate, cause_of
+from vegglue.screening.law_traces import law_traces
+from vegglue.workflow.run_folder import model_in
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+NAMES = (
+    "law_floor_speed_power", "law_bank_shear_step", "law_bank_depth_hump", "law_plants_along_stretch",
+    "law_viscosity_offset_ramp", "law_viscosity_front_fading",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    coarse = coarser(model_in(load_case(CONFIG)))
+    assert coarse is not None
+    return coarse
+
+
+@pytest.fixture(scope="module")
+def borrowed(model: Model) -> Point:
+    """A point that leans on the factors of one nearby."""
+    near = linearise(model, np.zeros(len(model.names)))
+    assert near is not None
+    point = linearise(model, np.full(len(model.names), 0.02), near)
+    assert point is not None
+    assert any(flow.moved > 0.0 for flow in point.flows.values())
+    return point
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_trace_is_the_response_to_the_effect(model: Model, borrowed: Point, name: str) -> None:
+    law = LAWS[name]
+    settings = {shape.name: shape.default for shape in law.effect.shapes}
+    exact = responses(model, borrowed, [cause_of(model.case, Candidate(law.effect), settings)])
+    trace = law_traces(model, borrowed).of(law, [settings])
+    assert trace == pytest.approx(exact, abs=0.02 * np.abs(exact).max())
+
+
+def test_a_point_by_itself_borrows_nothing(model: Model, borrowed: Point) -> None:
+    alone = by_itself(model, borrowed)
+    assert all(flow.moved == 0.0 for flow in alone.flows.values())
+    assert by_itself(model, alone).flows["mid"].factors is alone.flows["mid"].factors
+    assert np.array_equal(alone.prediction, borrowed.prediction)
