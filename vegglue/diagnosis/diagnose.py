@@ -188,7 +188,7 @@ def _with_accepted(
     refit = refit if one.kind == "effect" else centred(screening, one.kind, refit)
     watch(Progress(f"calibrating with {refit.candidate.name}"))
     further = calibrated_with(screening.base, refit)
-    if further is None or not is_worth_it(one.kind, log_evidence(further) - log_evidence(screening.base) + charge):
+    if further is None:
         return None
     before = chi2(screening.base.noise, screening.base.fitted.point)
     found = replace(
@@ -206,11 +206,6 @@ def _with_accepted(
     further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
     return Following(replace(found, steps=(*kept, step)), further)
-
-
-def is_worth_it(kind: str, log_evidence: float) -> bool:
-    """Whether a contender beats nothing on the case's own grid: an effect at all, a place by LEAST_ODDS."""
-    return log_evidence > (0.0 if kind == "effect" else np.log(LEAST_ODDS))
 
 
 def _kept(suspects: Mapping[str, Suspect], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
