@@ -19,6 +19,7 @@ import scipy.special
 from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of
+from vegglue.parallel import in_threads
 
 # Error of the grid over the difference of predictions to a grid of twice the cell size [-]: 1/(2^p - 1) for an order p
 # between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to open-f are the same and
@@ -183,7 +184,7 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
         )
         return float(end.fun), *unfold(end.x)
 
-    fixed, free = best(False), best(True)
+    fixed, free = in_threads(best, [(False,), (True,)])
     _, rho, scale, log_t = free if fixed[0] - free[0] > SCALE_EVIDENCE and free[2] > 1.0 else fixed
     found = with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
     return replace(found, correlation_chances=_correlation_chances(lambda level: deviance(level, scale, log_t)))

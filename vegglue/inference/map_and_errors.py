@@ -20,7 +20,7 @@ from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
-from vegglue.parallel import side_by_side
+from vegglue.parallel import in_threads, side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.screening.residual_screening import noise_given_all
@@ -217,4 +217,4 @@ def _with_estimated_sizes(noise: Noise, fitted: MapEstimate, station: pd.DataFra
 
 def _refitted(model: Model, noise: Noise, fits: list[MapEstimate]) -> list[MapEstimate]:
     """The modes under other errors, from where they were."""
-    return distinct_modes([fit(model, noise, one.point) for one in fits])
+    return distinct_modes(in_threads(fit, [(model, noise, one.point) for one in fits]))

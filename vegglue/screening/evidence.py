@@ -84,21 +84,48 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
     rows = kinds[0].projected.residual.size
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     drawn = np.hstack([errors, of_prior]).astype(np.float32)
-    parts = [(kinds, drawn[k : k + NULL_DRAWS_TOGETHER]) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
+    terms = [_drawn_terms(kind) for kind in kinds]
+    parts = [(terms, drawn[k : k + NULL_DRAWS_TOGETHER]) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
     count = sum(int(np.sum(sums >= found)) for sums in in_threads(_sums_of_draws, parts))
     return (1 + count) / (1 + len(errors))
 
 
-def _sums_of_draws(kinds: Sequence[HypothesisKind], drawn: Single) -> Array:
+@dataclass(frozen=True)
+class _DrawnTerms:
+    """ln (B prior) = constant + factor T^2 of each column of a kind (c,), T = draw . unit; units (rows, c)."""
+
+    units: Single
+    one_sided: np.ndarray
+    constant: Array
+    factor: Array
+
+
+def _drawn_terms(kind: HypothesisKind) -> _DrawnTerms:
+    constant = log_factors(np.zeros(kind.size.size), kind.size) + kind.log_prior
+    return _DrawnTerms(
+        kind.projected.units.astype(np.float32), kind.one_sided, constant, 0.5 * prior_shrinkage(kind.size)
+    )
+
+
+def _sums_of_draws(terms: Sequence[_DrawnTerms], drawn: Single) -> Array:
     """ln of the sum over all kinds of each draw (draws, n) of errors alone, (draws,)."""
-    sums = [logsumexp(_of_scores(kind, _drawn_scores(kind, drawn)), axis=1) for kind in kinds]
-    return np.asarray(logsumexp(sums, axis=0))
+    return np.asarray(logsumexp([_sums_of_kind(one, drawn) for one in terms], axis=0))
+
+
+def _sums_of_kind(one: _DrawnTerms, drawn: Single) -> Array:
+    """The same of one kind; in place, which takes a third of the time."""
+    if not one.constant.size:
+        return np.full(len(drawn), -np.inf)
+    values = (drawn @ one.units).astype(np.float64)
+    values[:, one.one_sided] = np.maximum(values[:, one.one_sided], 0.0)
+    np.square(values, out=values)
+    values *= one.factor
+    values += one.constant
+    most = values.max(axis=1)
+    values -= most[:, None]
+    np.exp(values, out=values)
+    return np.asarray(most + np.log(values.sum(axis=1)))
 
 
 def _of_scores(kind: HypothesisKind, scores: Array) -> Array:
     return log_factors(scores, kind.size) + kind.log_prior
-
-
-def _drawn_scores(kind: HypothesisKind, drawn: Single) -> Array:
-    scores = drawn @ kind.projected.units.astype(np.float32)
-    return np.where(kind.one_sided & (scores < 0), 0.0, scores)
