@@ -77,6 +77,16 @@ def test_one_that_strayed_is_not_taken_up_again():
     assert kept is None
 
 
+def test_who_ends_a_step_early_is_as_near_as_asked_for():
+    """Some end with a correction above the tolerance, and are within it after the step all the same."""
+    batch, centre, shared = neighbours(13, 16)
+    exact = chord(batch, np.repeat(centre, 16, axis=3), shared, 1e-11)
+    early = chord(batch, np.repeat(centre, 16, axis=3), shared, 1e-5)
+    assert early.converged.all()
+    assert (early.correction > 1e-5).any()
+    assert np.abs(early.state - exact.state)[:-1].max() < 1e-5
+
+
 def test_one_lane_serves_all():
     batch, centre, shared = neighbours(11, 3)
     ends: list[int] = []
