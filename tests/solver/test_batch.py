@@ -18,12 +18,13 @@ from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.site.gridded_site import Site, build_site
-from vegglue.solver.batch import CLUSTER_SIZE, blend, solve_members
+from vegglue.solver.batch import CLUSTER_SIZE, blend, put_rows, solve_members
 from vegglue.solver.block_elimination import minimise
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.jacobian import eliminate
 from vegglue.solver.parameter_metric import clusters, principal_axes
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
+from vegglue.solver.wet_band import widen
 from vegglue.storage.result_files import read_ensemble
 
 CHUNK = LARGEST_CHUNK
@@ -213,6 +214,14 @@ def test_starts_are_weighted_sums_of_solved_states_in_the_rows_of_a_band() -> No
     some = np.array([7, 0, 3])
     expected = np.einsum("bn,nxej->xejb", weights, states[some][..., 2:6])
     assert blend(states, some, weights, 2, 6) == pytest.approx(expected, rel=1e-12)
+
+
+def test_states_found_in_a_band_are_put_into_all_rows_of_those_that_are_good() -> None:
+    states, found = np.full((6, 5, 3, 9), 7.0), np.random.default_rng(8).random((5, 3, 4, 3))
+    put_rows(states, np.array([4, 0, 5]), np.array([True, False, True]), found, 2, 6)
+    wide = widen(found, 9, (2, 6))
+    np.testing.assert_array_equal(states[[4, 5]], np.moveaxis(wide, -1, 0)[[0, 2]])
+    assert (states[:4] == 7.0).all()
 
 
 def test_a_singular_jacobian_fails_its_own_member_only(tmp_path: Path) -> None:

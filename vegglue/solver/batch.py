@@ -30,7 +30,7 @@ from vegglue.solver.reference_member import (
     solve_reference,
 )
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
-from vegglue.solver.wet_band import overflows, rows_inside, walled, widen
+from vegglue.solver.wet_band import overflows, rows_inside, walled
 
 # Members that one factorisation serves at most: chosen, not measured; in a sketch of the solver one served 16 in 3 to 8
 # steps each. Fewer cost more factorisations, more take more steps.
@@ -186,7 +186,7 @@ def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, s
         solved.iterations[members] += ended.iterations
         good = ended.converged & ~overflows(part, ended.state, band, ny)
         solved.status[members[good]] = SOLVED_BY_NEWTON
-        solved.state[..., members[good]] = widen(ended.state[..., good], ny, band)
+        put_rows(np.moveaxis(solved.state, -1, 0), members, good, ended.state, *band)
 
     def starts_of(members: np.ndarray) -> Array:
         return _starts(batch.metric, reference, solved, members)
@@ -282,3 +282,26 @@ def blend(states: Array, some: NDArray[np.int64], weights: Array, south: int, no
                 for b in range(members):
                     blended[i, e, j, b] = column[b, e, j]
     return blended
+
+
+@compiled
+def put_rows(
+    states: Array, some: NDArray[np.int64], good: NDArray[np.bool_], found: Array, south: int, north: int
+) -> None:
+    """States found in the rows south..north-1 (nx, 3, rows, b), those that are good, put into those of all members (m,
+    nx, 3, ny) at some[b] as `widen` does, but member by member in memory that lies together.
+    """
+    nx, ny, rows = states.shape[1], states.shape[3], north - south
+    for i in range(nx):
+        for b in range(some.size):
+            if not good[b]:
+                continue
+            for e in range(3):
+                target = states[some[b], i, e]
+                for j in range(rows):
+                    target[south + j] = found[i, e, j, b]
+                first, last = (target[south], target[north - 1]) if e == 0 else (0.0, 0.0)
+                for j in range(south):
+                    target[j] = first
+                for j in range(north, ny):
+                    target[j] = last
