@@ -159,7 +159,7 @@ def test_models_are_compared_and_measurements_planned(line: Line) -> None:
     assert np.isfinite([held_out_rmse(found), *found.in_sample.rmse.values()]).all()
     save_ladder_figure([found], line.folder / "ladder.png")
     wind, *_ = [one for one in candidates_of(line.case, line.observations.table) if one.name == "wind"]
-    plans = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [[(wind, {}, 1.0)]])[0]
+    plans = worth_of_measurements(base.model, base.noise, base.fitted.point, [[(wind, {}, 1.0)]])[0]
     assert all(np.isfinite([plan.now, plan.then]).all() for plan in plans)
     trace = responses(base.model, base.fitted.point, [cause_of(line.case, wind, {})])[:, 0]
     save_fingerprint_figure(trace, base.model.station, "m/s", line.folder / "wind.png")

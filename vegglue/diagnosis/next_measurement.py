@@ -20,7 +20,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
-from vegglue.engine.interface import Model, linearise, responses
+from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
@@ -71,14 +71,14 @@ Rival = tuple[Candidate, dict[str, float], float]
 
 
 def worth_of_measurements(
-    model: Model, noise: Noise, z: Array, questions: Sequence[Sequence[Rival]]
+    model: Model, noise: Noise, here: Point, questions: Sequence[Sequence[Rival]]
 ) -> list[list[MeasurementWorth]]:
     """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
-    be told from calibration: (effect, shapes, gain (amplitude - off)^power).
+    be told from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
     """
     for case in (_with_other_discharges(model.case, LOWER), _with_other_discharges(model.case, ()), model.case):
         wide, plans = planned(model, case)
-        point = linearise(wide, z)
+        point = linearise_from(wide, here.z, here)
         if point is not None:
             break
     else:

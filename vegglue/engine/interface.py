@@ -68,7 +68,8 @@ class Engine:
     """How a flow is computed. A new engine is one value of this kind, see `newton` and `marching`.
 
     linearise(model, z, near, wanted): the model and its slopes at z (p,), or None where no steady flow is found;
-        near: a point to start from, of this model or of one on cells of twice the size; wanted: see `Wanted`.
+        near: a point to start from, of this model or of one on cells of twice the size, whose experiments may be
+        fewer; wanted: see `Wanted`.
     predict(model, points, z): predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
     responses(model, point, causes): d prediction / d (amplitude - off)^power at off, (n, causes).
     responses_to_cells(model, point, experiment, terms): d prediction / d term of the stations of an experiment, for a

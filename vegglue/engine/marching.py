@@ -122,7 +122,7 @@ def _problem(model: Model, experiment: str, z: Array) -> Problem:
 
 def _start(problem: Problem, near: Point | None, experiment: str) -> Array:
     """From a point of the same grid, else from a backwater curve; (nx, 3, ny, m)."""
-    if near is None or near.flows[experiment].shape[::2] != problem.shape:
+    if near is None or experiment not in near.flows or near.flows[experiment].shape[::2] != problem.shape:
         return backwater(problem)
     return np.repeat(near.flows[experiment], problem.members, axis=3)
 

@@ -176,8 +176,8 @@ def _state_and_factors(
 ) -> SteadyFlow | None:
     """The flow without its slopes: with the factors of a point nearby, else with its own."""
     tolerance, warm = model.case.numerics.tolerance, None
-    if near is not None:
-        before = near.flows[experiment]
+    before = None if near is None else near.flows.get(experiment)
+    if near is not None and before is not None:
         warm = _warm(near, before, z, problem.shape)
         borrowed = _borrowed(problem, before, warm, tolerance)
         if borrowed is not None:

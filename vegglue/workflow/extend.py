@@ -21,7 +21,7 @@ from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
-from vegglue.parallel import at_most, one_thread
+from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
@@ -131,10 +131,9 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
         remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base), case_hash(cases[-1]))
         bases.append(base)
     # Only now are the measurements for validation looked at.
-    ladder = [
-        rung(replace(base, model=replace(base.model, case=one)), validation_of(one, folder_of(runs, one), watch))
-        for one, base in zip(cases, bases, strict=True)
-    ]
+    bases = [replace(base, model=replace(base.model, case=one)) for one, base in zip(cases, bases, strict=True)]
+    unseen = [validation_of(one, folder_of(runs, one), watch) for one in cases]
+    ladder = in_threads(rung, list(zip(bases, unseen, strict=True)))
     return StepwiseExtension(
         tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, in_words(found, choice)
     )

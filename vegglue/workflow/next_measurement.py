@@ -88,7 +88,7 @@ def next_measurement(
             watch(Progress(f"calibrating {case.name}"))
             base = calibrated(case, folder_of(runs, case), excluded_by(found), watch)
             watch(Progress("weighing what could be measured"))
-            worths = worth_of_measurements(base.model, base.noise, base.fitted.point.z, [one for _, one in asked])
+            worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
     if not between:
         write_questions(folder_of(runs, case), [open_question(one) for one in questions], wanted)
