@@ -20,6 +20,7 @@ from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.model_error import Bumps, bumps, field_columns
 from vegglue.calibration.noise import covariance_of
 from vegglue.flow.local_changes import Term
+from vegglue.parallel import in_threads
 from vegglue.screening.residual_screening import GROUPS
 
 # Half lengths and half widths of bumps over the half width of the floor [-], from those of the model's own error to a
@@ -60,16 +61,19 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
     responses = cell_responses(search.model, search.point, tuple(FIELD_SIZES))
     whole, residual = free_of_prior(search)
     nothing = log_density_of_residual(whole, residual)
-    found = []
-    for term, sizes in FIELD_SIZES.items():
-        for length, width in FIELD_SHAPES:
-            over = bumps(responses.grid, length * half_width, width * half_width)
-            columns = search.noise.used(field_columns(responses, term, over))
-            gram = columns @ columns.T
-            for size in sizes:
-                gained = log_density_of_residual(whole + size**2 * gram, residual) - nothing
-                found.append(FieldHypothesis(term, over, size, gained))
-    return sorted(found, key=lambda one: -one.log_factor), responses
+
+    def fields_of(term: Term, length: float, width: float) -> list[FieldHypothesis]:
+        over = bumps(responses.grid, length * half_width, width * half_width)
+        columns = search.noise.used(field_columns(responses, term, over))
+        gram = columns @ columns.T
+        gained = [log_density_of_residual(whole + size**2 * gram, residual) for size in FIELD_SIZES[term]]
+        return [
+            FieldHypothesis(term, over, size, one - nothing)
+            for size, one in zip(FIELD_SIZES[term], gained, strict=True)
+        ]
+
+    found = in_threads(fields_of, [(term, *shape) for term in FIELD_SIZES for shape in FIELD_SHAPES])
+    return sorted((one for some in found for one in some), key=lambda one: -one.log_factor), responses
 
 
 def best_field(search: SearchModel, half_width: float) -> tuple[FieldHypothesis, CellResponses]:

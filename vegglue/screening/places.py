@@ -19,6 +19,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.flow.local_changes import Term
 from vegglue.flow.problem_setup import share_under_water
+from vegglue.parallel import in_threads
 from vegglue.site.grid import cell_stretch
 from vegglue.site.gridded_site import in_experiment
 
@@ -72,7 +73,8 @@ def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ..
     wet = np.stack([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
     # Water that enters does so where there is water at all times.
     seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in EFFECT_AT_PLACE}
-    return tuple(_places_of_term(model, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE)
+    tasks = [(model, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE]
+    return tuple(in_threads(_places_of_term, tasks))
 
 
 def plausible_size(case: Case, term: Term) -> float:
