@@ -53,7 +53,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     laws = laws_suspected(first, last, found)
     if found.places and not (found.steps or found.instruments) and clearly_a_law(laws):
-        last, found = first, replace(found, places=(), explained=0.0, log_prior=0.0)
+        last, found = first, replace(found, places=(), explained=0.0, log_prior=0.0, of_shape=0.0)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit = _misfit(first, last, found)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
@@ -159,7 +159,7 @@ def _field(
         return None, None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
-    gained = log_evidence(last.base) - log_evidence(first.base) + found.log_prior if found.accepted else 0.0
+    gained = found.gained(log_evidence(first.base), log_evidence(last.base)) if found.accepted else 0.0
     told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
     if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
         return None, None

@@ -16,7 +16,6 @@ from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_offset
-from vegglue.diagnosis.centred_place import centred
 from vegglue.diagnosis.competition import (
     LEAST_ODDS,
     Contender,
@@ -184,9 +183,7 @@ def _with_accepted(
     one = contenders[j]
     if one.log_evidence < 0.0:
         return None
-    charge = one.log_evidence - refit.log_factor
-    refit = refit if one.kind == "effect" else centred(screening, one.kind, refit)
-    watch(Progress(f"calibrating with {refit.candidate.name}"))
+    watch(Progress(f"calibrating with {one.name}"))
     further = calibrated_with(screening.base, refit)
     if further is None:
         return None
@@ -194,12 +191,12 @@ def _with_accepted(
     found = replace(
         found,
         explained=found.explained + before - further.fitted.chi2,
-        log_prior=found.log_prior + charge,
+        log_prior=found.log_prior + one.log_evidence - refit.log_factor,
     )
     if one.kind != "effect":
-        return Following(
-            replace(found, places=(*found.places, location_found(screening, contenders, j, refit))), further
-        )
+        lost = refit.log_factor - (log_evidence(further) - log_evidence(screening.base))
+        places = (*found.places, location_found(screening, contenders, j, refit))
+        return Following(replace(found, places=places, of_shape=found.of_shape + lost), further)
     step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None

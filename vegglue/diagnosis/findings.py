@@ -9,9 +9,10 @@ from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 @dataclass(frozen=True)
 class Findings:
     """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places;
-    log_prior: ln of the chance of all of them before the data. p: of the last alarm, and the rate below which it is
-    sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of the
-    case can have, in sentences.
+    log_prior: ln of the chance of all of them before the data. of_shape: ln evidence of places as they competed, less
+    that in the model, whose covariance holds the error of their shape. p: of the last alarm, and the rate below which
+    it is sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of
+    the case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
@@ -20,6 +21,7 @@ class Findings:
     flagged: tuple[int, ...] = ()
     explained: float = 0.0
     log_prior: float = 0.0
+    of_shape: float = 0.0
     p: float = 1.0
     rate: float = 0.0
     undecided: tuple[Contender, ...] = ()
@@ -28,6 +30,10 @@ class Findings:
     @property
     def alarmed(self) -> bool:
         return self.p < self.rate
+
+    def gained(self, before: float, after: float) -> float:
+        """ln evidence of all that was found together, as it competed, from those of the first and the last model."""
+        return after - before + self.log_prior + self.of_shape
 
     @property
     def accepted(self) -> int:

@@ -8,7 +8,6 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2
-from vegglue.diagnosis.centred_place import mean_place, places_and_kind
 from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.refits import Refit
 from vegglue.measurements.kinds import kind_of
@@ -81,8 +80,8 @@ def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
 def location_found(screening: Screening, contenders: Sequence[Contender], accepted: int, refit: Refit) -> Location:
     """One contender, something at a place, as a location."""
     best = contenders[accepted]
-    places, kind = places_and_kind(screening, best.kind)
-    *_, x_error, y_error = mean_place(places, kind.log_evidence, refit.shapes["length"])
+    places = next(one for one in screening.fingerprints.places if one.term == best.kind)
+    kind = next(one for one in screening.kinds if one.name == best.kind)
     noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]
     white = noise.whiten(noise.used(column))[:, 0] ** 2
     names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
@@ -92,9 +91,9 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
     evidence |= {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
     ahead = {name: best.log_evidence - other for name, other in evidence.items() if name != best.kind}
     return Location(
-        **refit.shapes,
-        x_error=x_error,
-        y_error=y_error,
+        **places.shapes(best.column),
+        x_error=_spread(places.x, kind.log_evidence),
+        y_error=_spread(places.y, kind.log_evidence),
         term=best.kind,
         effect=refit.candidate.effect.name,
         amplitude=refit.amplitude,
@@ -104,6 +103,13 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
         experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
         odds={name: float(np.exp(min(gained, LARGEST_LOG_ODDS))) for name, gained in ahead.items()},
     )
+
+
+def _spread(where: Array, log_evidence: Array) -> float:
+    """Standard deviation of a coordinate (spot,) [m] over all spots, each as likely as its evidence says."""
+    chance = np.exp(log_evidence - log_evidence.max())
+    chance = chance / chance.sum()
+    return float(np.sqrt(max(float(chance @ where**2 - (chance @ where) ** 2), 0.0)))
 
 
 def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:

@@ -62,7 +62,7 @@ def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
     tested.
     """
     if found.accepted:
-        return [log_evidence(last.base) - log_evidence(first.base) + found.log_prior]
+        return [found.gained(log_evidence(first.base), log_evidence(last.base))]
     if found.undecided:
         return [one.log_evidence for one in found.undecided]
     return [kind.total for kind in last.kinds]
