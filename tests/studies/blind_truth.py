@@ -108,29 +108,37 @@ def _moved(
 
 def true_values(
     site: Site, case: Case, study: str, station: pd.DataFrame, hidden: Mapping[str, Numbers],
-    cells: tuple[float, float] | None = None, settled: float = SETTLED,
+    cells: tuple[float, float] | None = None, settled: float = SETTLED, starts: Mapping[str, Flow] | None = None,
 ) -> Field:  # fmt: skip
     """What error-free instruments would show (station,), with numbers of each hidden effect by its name; cells [m] and
-    change at which a flow is steady [m/s2], where not those of the study.
+    change at which a flow is steady [m/s2], where not those of the study; starts: flows of a like site by experiment.
     """
     cells = cells or CELLS[study]
     value = np.full(len(station), np.nan)
-    for name, setting in case.experiments.items():
+    for name in case.experiments:
         here = (station["experiment"] == name).to_numpy()
-        discharge = float(next(iter(setting.discharge.values()))) * site.discharges[name]
-        truth, discharge, level = _hiding(site.truth, name, discharge, float(setting.level), hidden)
-        flow = steady_flow(truth, discharge, level, cells, settled)
+        truth, discharge, level = _hiding(site, case, name, hidden)
+        start = {"start": starts[name]} if starts else {}
+        flow = steady_flow(truth, discharge, level, cells, settled, **start)
         shifts = np.zeros(len(station))
         shifts[: site.shifts.size] = site.shifts
         value[here] = _readings(truth, flow, level, cells, station[here], shifts[here], hidden)
     return value
 
 
+def flows_of(site: Site, case: Case, study: str) -> dict[str, Flow]:
+    """The steady flow of each experiment where nothing is hidden."""
+    told = {name: _hiding(site, case, name, {}) for name in case.experiments}
+    return {name: steady_flow(*each, CELLS[study], SETTLED) for name, each in told.items()}
+
+
 def _hiding(
-    truth: Truth, experiment: str, discharge: float, level: float, hidden: Mapping[str, Numbers]
+    site: Site, case: Case, experiment: str, hidden: Mapping[str, Numbers]
 ) -> tuple[Truth, float, float]:
     """Truth, discharge and level at the outlet of an experiment with what is hidden."""
-    spread: dict[str, float] = {}
+    truth, setting = site.truth, case.experiments[experiment]
+    discharge = float(next(iter(setting.discharge.values()))) * site.discharges[experiment]
+    level, spread = float(setting.level), dict[str, float]()
     settings, acting = dict(truth.settings), dict(truth.effects)
     for label, numbers in hidden.items():
         name, where = label.partition("[")[0], label.partition("[")[2].rstrip("]")

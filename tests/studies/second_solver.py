@@ -19,9 +19,6 @@ Field = np.ndarray
 COURANT = 0.8
 # Steps between two evaluations of the closures: some 0.1 s, under the time of friction among plants.
 LAWS_EVERY = 5
-# Steady: velocities change by less [m/s2]. What is left fades by e in some 40 s, so that it is 2e-4 m/s.
-STEADY, LONGEST = 4e-6, 2000.0
-LOOK_EVERY = 200
 
 
 @dataclass(frozen=True)
@@ -110,18 +107,3 @@ def march(reach: Reach, ends: Ends, flow: Flow, steps: int) -> tuple[Flow, float
         kernels.mean(flow.h, flow.u, flow.v, latest.h, latest.u, latest.v)
         passed += dt
     return flow, passed
-
-
-def steady(reach: Reach, ends: Ends, start: Flow, change: float = STEADY) -> Flow:
-    """The steady flow; RuntimeError if it is not reached, or if water stands at a wall of the grid."""
-    flow, passed = start, 0.0
-    while passed < LONGEST:
-        after, seconds = march(reach, ends, flow, LOOK_EVERY)
-        passed += seconds
-        moved = max(float(np.abs(after.u - flow.u).max()), float(np.abs(after.h - flow.h).max())) / seconds
-        flow = after
-        if not np.isfinite(moved):
-            break
-        if moved < change:
-            return flow
-    raise RuntimeError(f"no steady flow after {passed:.0f} s, it changed by {moved:.1e} m/s2")

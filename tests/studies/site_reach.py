@@ -14,7 +14,8 @@ from second_channel import PAPER, Channel, Range, lie_of
 from second_effects import BED, changes
 from second_kernels import DRY
 from second_laws import USUAL, Formulation, Ground, closure_of
-from second_solver import STEADY, Ends, Field, Flow, Reach, steady
+from second_solver import Ends, Field, Flow, Reach
+from second_steady import STEADY, steady
 
 FINE = (0.25, 0.1875)
 # Water may rise so much over the level at the outlet [m] before it meets the wall of the grid.
@@ -162,21 +163,32 @@ def _source(x: Field, y: Field, cells: tuple[float, float], truth: Truth) -> Fie
 
 
 def steady_flow(
-    truth: Truth, discharge: float, level: float, cells: tuple[float, float] = FINE, change: float = STEADY
-) -> Flow:
-    """The steady flow on cells of this size, by way of cells that are larger in x and y, and in x."""
-    dx, dy = cells
-    sizes, channel = ((2 * dx, 2 * dy), (2 * dx, dy), cells), truth.channel
-    reach, ends = _problem(truth, discharge, level, sizes[0])
-    surface = level + channel.slope * (channel.length - centres(sizes[0], level, channel)[0])
-    flow = _first_guess(reach, discharge, surface)
-    for size in sizes:
-        before, (reach, ends) = reach, _problem(truth, discharge, level, size)
-        # the flows on larger cells are only starts
-        flow = steady(reach, ends, _on_cells_of(reach, before, flow), change if size == cells else 10 * change)
+    truth: Truth, discharge: float, level: float, cells: tuple[float, float] = FINE, change: float = STEADY,
+    start: Flow | None = None,
+) -> Flow:  # fmt: skip
+    """The steady flow on cells of this size, from a flow of a like site on the same cells, else by way of cells that
+    are twice as long and wide.
+    """
+    reach, ends = _problem(truth, discharge, level, cells)
+    if start is not None and start.h.shape == reach.z.shape:
+        level_bed = bed_level(*centres(cells, level, truth.channel), replace(truth, bed_seed=None, effects={}))
+        near = _on_cells_of(reach, replace(reach, z=level_bed), start)
+    else:
+        near = _from_afar(truth, discharge, level, cells, reach, 10 * change)
+    flow = steady(reach, ends, near, change)
     if flow.h[:, [0, -1]].max() > DRY:
         raise RuntimeError("the water stands at the wall of the grid: a larger MARGIN is needed")
     return flow
+
+
+def _from_afar(
+    truth: Truth, discharge: float, level: float, cells: tuple[float, float], reach: Reach, change: float
+) -> Flow:
+    """The flow on larger cells, which is only a start, on these."""
+    large, channel = (2 * cells[0], 2 * cells[1]), truth.channel
+    coarse, ends = _problem(truth, discharge, level, large)
+    surface = level + channel.slope * (channel.length - centres(large, level, channel)[0])
+    return _on_cells_of(reach, coarse, steady(coarse, ends, _first_guess(coarse, discharge, surface), change))
 
 
 def _first_guess(reach: Reach, discharge: float, surface: Field) -> Flow:

@@ -86,7 +86,7 @@ def test_no_listed_effect_is_left_out(study, monkeypatch):
     names += [f"unlisted:{name}" for name in OBJECTS]
     called = []
 
-    def flow(truth, discharge, level, cells, change):
+    def flow(truth, discharge, level, cells, change, start=None):
         called.append((truth, discharge, level))
         raise ZeroDivisionError
 
