@@ -13,31 +13,35 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from blind_held_out import held_out
 from blind_page import write_page
-from blind_sets import INSTRUMENTS, NULL_NOISE, OBJECTS, PAIRS, DataSet, Trial, data_set, model_of
+from blind_sets import (
+    EDITION,
+    INSTRUMENTS,
+    NULL_NOISE,
+    OBJECTS,
+    PAIRS,
+    DataSet,
+    Trial,
+    as_measured,
+    model_of,
+    told,
+)
 
-from vegglue.arrays import Array
-from vegglue.calibration.baseline import baseline
-from vegglue.case.parameter_space import z_at
-from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
 from vegglue.cluster import on_cluster
-from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.excluded_stations import excluded_by, excluding
-from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
-from vegglue.inference.likelihood import root_mean_square
 from vegglue.parallel import as_finished, at_most
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of
 from vegglue.twins.hidden_effect import VisibilityError
 from vegglue.twins.sealed_answer import UNLISTED
-from vegglue.workflow.extend import found_additions
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"
@@ -46,15 +50,15 @@ KEPT = ROOT / "data" / "blind" / "records.jsonl"
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
-        "null-perfect": 120, "null-site": 120, "listed6": 90, "listed3": 60, "unlisted": 25, "instrument": 18,
-        "pair": 10, "probe": 10,
-    },
-    ("second", "campaign"): {
-        "null-perfect": 30, "null-site": 30, "listed6": 46, "listed3": 30, "unlisted": 15, "instrument": 12,
+        "null-perfect": 100, "null-site": 100, "listed6": 40, "listed3": 28, "unlisted": 14, "instrument": 10,
         "pair": 5, "probe": 5,
     },
+    ("second", "campaign"): {
+        "null-perfect": 50, "null-site": 50, "listed6": 20, "listed3": 14, "unlisted": 8, "instrument": 6, "pair": 3,
+        "probe": 3,
+    },
     ("own", "twin"): {
-        "null-perfect": 60, "listed6": 60, "listed3": 30, "unlisted": 15, "instrument": 9, "pair": 5, "probe": 5,
+        "null-perfect": 20, "listed6": 18, "listed3": 9, "unlisted": 5, "instrument": 4, "pair": 2, "probe": 2,
     },
 }  # fmt: skip
 RATIO = {"listed3": 3.0}
@@ -99,26 +103,44 @@ def _hide(case: str, group: str, number: int) -> tuple[str, ...]:
     return (name, "bad_probe") if group == "probe" else (name,)
 
 
-def study(trial: Trial) -> dict[str, Any]:
+def study(trial: Trial, runs: Path) -> dict[str, Any]:
     """The record of one data set: what was hidden, what was said, and what came of it."""
-    record: dict[str, Any] = {"key": trial.key, **asdict(trial)}
-    began = time.process_time()
+    record: dict[str, Any] = {"key": trial.key, "edition": EDITION, **asdict(trial)}
     with at_most(1):
-        try:
-            data = data_set(trial)
-        except VisibilityError as error:
-            return record | {"left_out": str(error)}
-        except (InputError, RuntimeError) as error:
-            return record | {"left_out": f"no data: {error}"}
-        truth_seconds = time.process_time() - began
+        began = time.process_time()
+        made = truth_of(trial, runs / "truths")
+        if "left_out" in made:
+            return record | {"left_out": made["left_out"]}
+        data = as_measured(trial.case, made)
+        truth_seconds, began = time.process_time() - began, time.process_time()
         try:
             found = diagnose_model(data.model)
         except Exception as error:  # a crash is counted, and stops no study of hours
             return record | {"left_out": f"no diagnosis: {type(error).__name__}: {error}"}
-        seconds = time.process_time() - began - truth_seconds
-        record |= _said(data, found) | {"seconds": seconds, "truth_seconds": truth_seconds}
-        record["held_out"] = held_out(trial, data, found)
+        record |= _said(data, found) | {"seconds": time.process_time() - began, "truth_seconds": truth_seconds}
+        try:
+            record["held_out"] = held_out(data, found, trial.number % LOOKED_INTO == 0)
+        except Exception as error:  # as above
+            record |= {"held_out": None, "not_held_out": f"{type(error).__name__}: {error}"}
     return record
+
+
+def truth_of(trial: Trial, folder: Path) -> dict[str, Any]:
+    """What is measured in a data set and what is true, or why there is none: from its file, or made and kept there."""
+    path = folder / f"{trial.key}.json"
+    if path.exists():
+        kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if kept["edition"] == EDITION:
+            return kept
+    try:
+        made = told(trial)
+    except VisibilityError as error:
+        made = {"edition": EDITION, "left_out": str(error)}
+    except (InputError, RuntimeError) as error:
+        made = {"edition": EDITION, "left_out": f"no data: {error}"}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, json.dumps(made), "expected a folder to write to; give another one by --runs")
+    return made
 
 
 def _said(data: DataSet, found: Diagnosis) -> dict[str, Any]:
@@ -146,52 +168,13 @@ def _amplitude(hidden: dict[str, Any], found: Diagnosis) -> list[dict[str, Any]]
     return [{"name": hidden["name"], "low": low, "high": high, "true": hidden["amplitude"]}]
 
 
-def held_out(trial: Trial, data: DataSet, found: Diagnosis) -> dict[str, float | None]:
-    """Errors at sections that were not measured [m/s], with those of a probe added in quadrature."""
-    model, case = data.model, data.model.case
-    added = found_additions(case, found)
-    last = {name: three[0] for name, three in found.parameters.last.items()}
-    noise = float(data.unseen["standard_error"].median())
-    before = _error(data, case, found.parameters.first, noise)
-    after = _error(data, with_additions(case, added), last, noise) if added else None
-    listed = [one for one in data.hidden if one["kind"] == "listed"]
-    oracle = None
-    if after is not None and listed and trial.number % LOOKED_INTO == 0:
-        truth = [(candidate_named(case, model.station, one["name"]), one["shapes"]) for one in listed]
-        oracle = _calibrated_error(replace(model, case=with_additions(case, truth)), data, found, noise)
-    return {"before": before, "after": after, "oracle": oracle, "noise": noise}
-
-
-def _calibrated_error(model: Model, data: DataSet, found: Diagnosis, noise: float) -> float | None:
-    """Error of a model that is calibrated to the same stations, without those that the diagnosis set aside."""
-    try:
-        point = baseline(excluding(model, excluded_by(found))).fitted.point
-    except InputError:
-        return None
-    return _error_at(data, model.case, point.z, noise)
-
-
-def _error(data: DataSet, case: Case, theta: dict[str, float], noise: float) -> float | None:
-    if set(theta) != set(case.parameters):  # something was set by hand on the way
-        return None
-    return _error_at(data, case, z_at(case, {name: np.array([theta[name]]) for name in case.parameters})[0], noise)
-
-
-def _error_at(data: DataSet, case: Case, z: Array, noise: float) -> float | None:
-    point = linearise(replace(data.model, case=case, station=data.unseen), z)
-    if point is None:
-        return None
-    error = data.unseen["value"].to_numpy(float) - point.prediction
-    known = np.isfinite(error)
-    return float(np.hypot(root_mean_square(error[known]), noise))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--jobs", type=int, default=-1)
     parser.add_argument("--cluster", help="Dask scheduler, or local:N; workers need tests/studies on their PYTHONPATH")
     parser.add_argument("--share", type=float, default=1.0, help="share of all data sets, 0 to 1")
     parser.add_argument("--only", nargs="+", default=[""], help="how keys begin: second/twin, own/twin/listed6, ...")
+    parser.add_argument("--truths", action="store_true", help="make the truths, and diagnose nothing")
     parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
     parser.add_argument("--runs", type=Path, default=RUNS)
     parser.add_argument("--anew", action="store_true", help="leave aside what data/blind holds")
@@ -200,36 +183,52 @@ def main() -> None:
     kept = [] if given.anew else list(records_in(KEPT))
     if not given.page:
         with on_cluster(given.cluster):
-            run(path, {record["key"] for record in kept}, given.jobs, given.share, given.only)
+            todo = planned(given.share, given.only)
+            if given.truths:
+                make_truths(todo, given.runs, given.jobs)
+                return
+            run(todo, path, {record["key"] for record in kept}, given.jobs)
     write_page(list({record["key"]: record for record in (*kept, *records_in(path))}.values()), ROOT / "docs")
 
 
-def run(path: Path, kept: set[str], jobs: int, share: float, only: list[str]) -> None:
-    """Do what is not yet done of the first part of each kind."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    trials = [
+def planned(share: float, only: list[str]) -> list[Trial]:
+    """The first part of each kind whose keys begin so."""
+    return [
         one
         for one in planned_trials()
         if one.number < share * SIZES[one.truth, one.case][one.group] and one.key.startswith(tuple(only))
     ]
+
+
+def make_truths(todo: list[Trial], runs: Path, jobs: int) -> None:
+    """Truths of data sets, kept where `study` looks for them."""
+    for count, made in enumerate(as_finished(truth_of, ((trial, runs / "truths") for trial in todo), jobs), 1):
+        print(f"{count} of {len(todo)}: {made.get('key', made.get('left_out'))}", flush=True)
+
+
+def run(todo: list[Trial], path: Path, kept: set[str], jobs: int) -> None:
+    """Do what is not yet done."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     done = kept | {record["key"] for record in records_in(path)}
-    todo = [trial for trial in trials if trial.key not in done]
+    todo = [trial for trial in todo if trial.key not in done]
     with path.open("a", encoding="utf-8") as file:
-        for count, record in enumerate(as_finished(study, ((trial,) for trial in todo), jobs), 1):
+        for count, record in enumerate(as_finished(study, ((trial, path.parent) for trial in todo), jobs), 1):
             file.write(json.dumps(record) + "\n")
             file.flush()
             print(f"{count} of {len(todo)}: {record['key']} {record.get('verdict', 'left out')}", flush=True)
 
 
 def records_in(path: Path) -> Iterator[dict[str, Any]]:
-    """All whole lines; the last one of a study that was stopped may not be whole."""
+    """All whole lines of this edition; the last one of a study that was stopped may not be whole."""
     if not path.exists():
         return
     for line in path.read_text(encoding="utf-8").splitlines():
         try:
-            yield json.loads(line)
+            record = json.loads(line)
         except ValueError:
             continue
+        if record.get("edition") == EDITION:
+            yield record
 
 
 if __name__ == "__main__":

@@ -205,22 +205,44 @@ def amplitudes_held(record: Record) -> list[bool]:
 
 
 def error_of(record: Record, name: str) -> float | None:
-    """One of the held-out errors [m/s]: before, after, oracle or noise; None where it is not known."""
+    """One of the held-out errors [m/s], see `blind_held_out`; None where it is not known."""
     value = (record.get("held_out") or {}).get(name)
     return float(value) if value is not None and np.isfinite(value) else None
 
 
 def error_fell(record: Record) -> bool | None:
-    """The held-out error is less with what was accepted."""
-    before, after = error_of(record, "before"), error_of(record, "after")
-    if before is None or after is None or not (record["steps"] or record["places"]):
-        return None
-    return after < before
+    """The held-out error is less with all that was named, or held up to then."""
+    return _less(record, "after", "before") if record["steps"] or record["places"] else None
+
+
+def error_fell_where_said(record: Record) -> bool | None:
+    """The held-out error is less with what was named, where the verdict names."""
+    return error_fell(record) if named(record) else None
+
+
+def error_fell_as_kept(record: Record) -> bool | None:
+    """The held-out error is less with what `extend --auto` keeps, where it keeps something."""
+    return _less(record, "kept", "parent")
+
+
+def _less(record: Record, after: str, before: str) -> bool | None:
+    errors = error_of(record, after), error_of(record, before)
+    return None if errors[0] is None or errors[1] is None else errors[0] < errors[1]
 
 
 def near_oracle(record: Record) -> bool | None:
     """The held-out error is at most 1.1 times that with the true effect."""
-    after, oracle = error_of(record, "after"), error_of(record, "oracle")
+    return _near_oracle(record, "after")
+
+
+def near_oracle_as_kept(record: Record) -> bool | None:
+    """That of the model as `extend --auto` leaves it, with something added or not, is."""
+    kept = error_of(record, "kept")
+    return _near_oracle(record, "parent" if kept is None else "kept")
+
+
+def _near_oracle(record: Record, name: str) -> bool | None:
+    after, oracle = error_of(record, name), error_of(record, "oracle")
     return None if after is None or oracle is None else after <= ORACLE_SHARE * oracle
 
 

@@ -70,7 +70,7 @@ def draw_chances(told: Mapping[str, Sequence[Told]]) -> Figure:
 
 @styled
 def draw_held_out(records: Mapping[str, Sequence[Record]]) -> Figure:
-    """Errors of sections that were not measured, without and with what was accepted, one panel for each truth."""
+    """Errors of sections that were not measured, without and with what `extend --auto` kept, a panel for each truth."""
     pairs = {truth: _errors(chosen) for truth, chosen in records.items()}
     every = np.concatenate(list(pairs.values()))
     ends = (0.8 * every.min(), 1.25 * every.max()) if len(every) else (1.0, 100.0)
@@ -80,19 +80,19 @@ def draw_held_out(records: Mapping[str, Sequence[Record]]) -> Figure:
         before, after = pairs[truth].T
         axes.plot(ends, ends, color=COLOUR["muted"], linewidth=1)
         axes.loglog(before, after, "o", color=colour, markersize=4, markeredgewidth=0, alpha=0.5)
-        axes.set(title=f"{label} ({len(before)})", xlim=ends, ylim=ends, xlabel="without what was accepted [mm/s]")
+        axes.set(title=f"{label} ({len(before)})", xlim=ends, ylim=ends, xlabel="held-out error of the parent [mm/s]")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axis.set_minor_formatter(NullFormatter())
         axes.set_aspect("equal")
-    panels[0].set_ylabel("held-out error with it [mm/s]")
+    panels[0].set_ylabel("with what was kept [mm/s]")
     return figure
 
 
 def _errors(records: Sequence[Record]) -> np.ndarray:
-    """Before and after [mm/s] (n, 2), where something was accepted."""
-    pairs = [(error_of(one, "before"), error_of(one, "after")) for one in records]
+    """Before and after [mm/s] (n, 2), where something was kept."""
+    pairs = [(error_of(one, "parent"), error_of(one, "kept")) for one in records]
     return 1e3 * np.array([pair for pair in pairs if None not in pair], dtype=float).reshape(-1, 2)
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from blind_truth import Numbers, Site, perfect_site, site_of_nature, true_values
+from blind_truth import Numbers, Site, flows_of, perfect_site, site_of_nature, true_values
+from second_solver import Flow
 from site_reach import EDDY_VISCOSITY
 
 from vegglue.arrays import Array
@@ -41,8 +42,9 @@ PAIRS = (
     ("discharge_error[high]", "secondary_current"), ("viscosity", "gauge_datum"), ("inflow_skew", "probe_gain[C]"),
     ("station_shift[B]", "outlet_level_error[low]"), ("bank_difference", "discharge_error[mid]"),
 )  # fmt: skip
-# Sets of the editions before were seen when the errors of a site and the prior of viscosity were chosen.
-EDITION = "third edition: "
+# Sets of the editions before were seen when errors of a site, the prior of viscosity and rules of the diagnosis were
+# chosen.
+EDITION = "fourth edition: "
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,24 @@ def place_number(trial: Trial) -> int:
 
 
 def data_set(trial: Trial) -> DataSet:
-    """The data set of a trial. Errors: VisibilityError where an effect cannot be made visible, RuntimeError where the
-    second solver finds no steady flow.
+    """The data set of a trial, see `told`."""
+    return as_measured(trial.case, told(trial))
+
+
+def as_measured(study: str, made: Mapping[str, Any]) -> DataSet:
+    """The data set of what `told` gives."""
+    model = model_of(study)
+    value, unseen = (np.array(made[name], dtype=float) for name in ("value", "unseen"))
+    station = model.station.assign(value=value)
+    there = unseen_stations(model).assign(value=unseen)
+    return DataSet(replace(model, station=station), tuple(made["hidden"]), made["also_true"], there)
+
+
+def told(trial: Trial) -> dict[str, Any]:
+    """What is measured and what is true besides, as it lies in a file: no diagnosis has a part in it.
+
+    Errors: VisibilityError where an effect cannot be made visible, RuntimeError where the second solver finds no
+    steady flow.
     """
     base, columns = place_of(trial.case, place_number(trial))
     seed = hash_of(EDITION + trial.key)
@@ -123,14 +141,16 @@ def data_set(trial: Trial) -> DataSet:
     sizing = with_model_error(with_grid_error(errors, base.difference), columns)
     found = [_hidden(base, sizing, name, trial.signal, random) for name in trial.hide]
     flows = [one for one in found if not one["stations"]]
-    station, unseen = base.model.station, unseen_stations(base.model)
+    station = base.model.station
     truly, also_true = _truly(trial, base, _everywhere(base.model), flows, seed)
     value = truly[: len(station)].copy()
     value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
     for one in found:
         value[one["stations"]] += one["amplitude"]
-    model = replace(base.model, station=station.assign(value=value))
-    return DataSet(model, tuple(found), also_true, unseen.assign(value=truly[len(station) :]))
+    return {
+        "key": trial.key, "edition": EDITION, "hidden": found, "also_true": dict(also_true), "value": value.tolist(),
+        "unseen": truly[len(station) :].tolist(),
+    }  # fmt: skip
 
 
 def hash_of(text: str) -> int:
@@ -179,13 +199,14 @@ def _truly(
     """What is true at stations, and what may rightly be named besides what is hidden."""
     if trial.truth == "own":
         return _own_truth(base, station, hidden), {}
-    site = _perfect_site(base, trial.case)
+    site, number = _perfect_site(base, trial.case), place_number(trial)
     if trial.imperfect:
         site = site_of_nature(site, base.model.case, seed % 2**31, trial.hide)
     elif not hidden:
-        return _perfect_values(trial.case, place_number(trial)), site.also_true
+        return _perfect_values(trial.case, number), site.also_true
     numbers: dict[str, Numbers] = {one["name"]: {one["parameter"]: one["amplitude"], **one["shapes"]} for one in hidden}
-    return true_values(site, base.model.case, trial.case, station, numbers), site.also_true
+    starts = _perfect_flows(trial.case, number)
+    return true_values(site, base.model.case, trial.case, station, numbers, starts=starts), site.also_true
 
 
 def _perfect_site(base: TwinBase, study: str) -> Site:
@@ -198,7 +219,15 @@ def _perfect_site(base: TwinBase, study: str) -> Site:
 def _perfect_values(study: str, number: int) -> Array:
     """True values where nothing is hidden on a perfect site: the same in all data sets of one true place."""
     base, _ = place_of(study, number)
-    return true_values(_perfect_site(base, study), base.model.case, study, _everywhere(base.model), {})
+    starts = _perfect_flows(study, number)
+    return true_values(_perfect_site(base, study), base.model.case, study, _everywhere(base.model), {}, starts=starts)
+
+
+@lru_cache(maxsize=2 * PLACES)
+def _perfect_flows(study: str, number: int) -> dict[str, Flow]:
+    """Flows where nothing is hidden on a perfect site: those of other sites of this place start from them."""
+    base, _ = place_of(study, number)
+    return flows_of(_perfect_site(base, study), base.model.case, study)
 
 
 def _everywhere(model: Model) -> pd.DataFrame:

@@ -169,6 +169,14 @@ def test_amplitudes_and_held_out_errors() -> None:
     unknown = SILENT | {"held_out": errors | {"after": None, "oracle": None}}
     assert [what.error_fell(one) for one in (NAMED, unknown)] == [None, None]
     assert [what.near_oracle(one) for one in (NAMED, unknown)] == [None, None]
+    assert what.error_fell_where_said(looked) is True
+    assert what.error_fell_where_said(looked | {"verdict": "cannot-tell"}) is None
+    assert what.error_fell_as_kept(looked) is None, "nothing was kept"
+    kept = NAMED | {"held_out": errors | {"parent": 0.02, "kept": 0.013}}
+    assert what.error_fell_as_kept(kept) is True
+    assert what.near_oracle_as_kept(kept) is True
+    left = NAMED | {"held_out": errors | {"parent": 0.02, "kept": None}}
+    assert what.near_oracle_as_kept(left) is False, "the model was left as it was"
     assert what.silent_beside_error(unknown) is True
     assert what.silent_beside_error(SILENT | {"held_out": errors | {"before": 0.015}}) is False
     assert what.silent_beside_error(looked) is None, "it did not say that nothing is missing"

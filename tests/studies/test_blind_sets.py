@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from blind import SIZES, planned_trials, records_in, study
+from blind import SIZES, planned_trials, records_in, study, truth_of
 from blind_sets import Trial, data_set, hash_of, model_of, unseen_stations
 from blind_truth import PROBE, perfect_site, site_of_nature
 from second_channel import SHORT
@@ -107,12 +107,18 @@ def test_a_seed_is_the_same_on_every_machine():
 
 
 def test_the_record_of_a_data_set_holds_what_the_page_asks_for(tmp_path):
-    record = study(trial("listed6", hide=("discharge_error[high]",)))
+    hidden = trial("listed6", hide=("discharge_error[high]",))
+    record = study(hidden, tmp_path)
+    assert truth_of(hidden, tmp_path / "truths")["hidden"] == record["hidden"], "kept, and not made again"
+    assert len(list((tmp_path / "truths").rglob("*.json"))) == 1
     path = tmp_path / "records.jsonl"
-    path.write_text(json.dumps(record) + "\n" + '{"key": "cut of', encoding="utf-8")
+    other = json.dumps(record | {"edition": "an earlier one"})
+    path.write_text(json.dumps(record) + "\n" + other + '\n{"key": "cut of', encoding="utf-8")
     (read,) = records_in(path)
     assert read["hidden"][0]["name"] == "discharge_error[high]"
     assert "discharge_error[high]" in read["set"]
     assert read["held_out"]["after"] < read["held_out"]["before"]
+    assert read["held_out"]["kept_names"] == ["discharge_error[high]"]
+    assert read["held_out"]["kept"] < read["held_out"]["parent"]
     assert read["held_out"]["oracle"] is not None
     assert read["amplitudes"][0]["low"] < read["amplitudes"][0]["true"] < read["amplitudes"][0]["high"]
