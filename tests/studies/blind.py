@@ -65,14 +65,16 @@ RATIO = {"listed3": 3.0}
 USUAL_RATIO = 6.0
 # Every so many data sets with a listed effect, the model with the true effect is calibrated too.
 LOOKED_INTO = 2
+# Where something is hidden, a data set costs so many times as much, or more: sets with nothing hidden go on before.
+DEARER = 2.5
 # Effects are hidden in steps of so many names, a prime, so that few data sets already hold effects of every kind.
 STRIDE = 29
 
 
 def planned_trials() -> list[Trial]:
-    """All data sets, mixed so that a study that is stopped has some of each kind."""
+    """All data sets, mixed so that a study that is stopped has some of each kind, and more of what is cheap."""
     found = [
-        ((number + 0.5) / size, _trial(truth, case, group, number))
+        (number / size * (1.0 if group.startswith("null") else DEARER), _trial(truth, case, group, number))
         for (truth, case), sizes in SIZES.items()
         for group, size in sizes.items()
         for number in range(size)
@@ -188,7 +190,8 @@ def main() -> None:
                 make_truths(todo, given.runs, given.jobs)
                 return
             run(todo, path, {record["key"] for record in kept}, given.jobs)
-    write_page(list({record["key"]: record for record in (*kept, *records_in(path))}.values()), ROOT / "docs")
+    records = {record["key"]: record for record in (*kept, *records_in(path))}
+    write_page(list(records.values()), ROOT / "docs", {key: sum(sizes.values()) for key, sizes in SIZES.items()})
 
 
 def planned(share: float, only: list[str]) -> list[Trial]:

@@ -6,7 +6,8 @@ from typing import Any
 import blind_definitions as what
 import pytest
 from blind_lines import LINES, Line, chances_told, counts, distances, instead, interval, is_met, shares_that_reach
-from blind_page import AFFORDED, wanted_of, write_page
+from blind_page import wanted_of, write_page
+from blind_text import AFFORDED
 from scipy import stats
 
 
@@ -234,14 +235,15 @@ def test_the_page(tmp_path: Path) -> None:
         NAMED, WRONG, MANY, SILENT, NAMED | {"truth": "own"}, NAMED | {"case": "campaign", "seconds": 20.0},
         out | {"left_out": reason}, out | {"left_out": "no steady flow"},
     ]  # fmt: skip
-    write_page(records, tmp_path)
+    planned = {("second", "twin"): 9, ("second", "campaign"): 5, ("own", "twin"): 3}
+    write_page(records, tmp_path, planned)
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     line = "| Listed effect in the set, ratio 6 | at least 90 % |"
     assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | too few | 100.0 % (1) |" in page
     assert f"{line} 100.0 % (1) |" in page.partition("## The field campaign")[2]
     assert f"{line} 75.0 % (4) |" in page.partition("## The small channel")[2]
     assert "ratio 3" not in page.partition("## The field campaign")[2], "lines without data are left out"
-    assert "| stranger's truth | the small channel | 4 | 2 | 3 |" in page
+    assert "| stranger's truth | the small channel | 9 | 4 | 2 | 3 |" in page
     assert "at any plausible size: `sun`. Left out for other reasons: no steady flow (1)." in page
     assert "| 60 to 70 % | 65.0 % | 4 | 2 | 50.0 % |" in page
     assert "| `eddies` | `wind` | 2 | 1 | 5 |" in page
@@ -252,6 +254,6 @@ def test_the_page(tmp_path: Path) -> None:
 
 
 def test_a_page_without_records(tmp_path: Path) -> None:
-    write_page([], tmp_path)
+    write_page([], tmp_path, {})
     assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert len(list(tmp_path.glob("blind-*.svg"))) == 4
