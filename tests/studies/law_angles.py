@@ -24,8 +24,7 @@ from law_sets import RATIOS, STUDY, knowing_hidden
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.diagnosis.competition import tempered_chances
-from vegglue.discovery.search import HELD, MOST_QUANTITIES
+from vegglue.discovery.search import HELD, MOST_QUANTITIES, chances_in_set
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 from vegglue.screening import score_test
@@ -104,7 +103,7 @@ def chances_told(rivals: Sequence[Rival], residual: Array, whole: bool) -> list[
     kept[laws[np.argsort(-evidence[laws])[MOST_QUANTITIES:]]] = False
     evidence = np.where(kept, evidence, -np.inf)
     weight = np.exp(evidence - evidence.max())
-    chance = weight / weight.sum() if whole else tempered_chances(evidence)
+    chance = weight / weight.sum() if whole else chances_in_set(evidence)
     order = np.argsort(-chance)
     count = int(np.searchsorted(np.cumsum(chance[order]), HELD)) + 1
     return [(rivals[int(j)].said, float(chance[j])) for j in order[:count]]

@@ -71,6 +71,12 @@ def near_truth(record: Record, probe: float = 0.0) -> bool | None:
     return bool(np.hypot(after, probe) <= NEAR * np.hypot(errors["truth"], probe))
 
 
+def told_near_truth(record: Record) -> bool | None:
+    """The same with what was likeliest added to the model, law or listed effect or place; None in older records."""
+    told, truth = record["held_out"].get("told"), record["held_out"]["truth"]
+    return None if told is None or truth is None else bool(told <= NEAR * truth)
+
+
 def wrote_a_law(record: Record) -> bool:
     """A law was the likeliest cause, and was written."""
     return bool(record["best"])

@@ -14,6 +14,7 @@ from law_answers import (
     near_truth,
     quantity_alone,
     says_term,
+    told_near_truth,
     wrote_a_law,
 )
 from law_limits import angle_lines, chance_lines, told_at_most
@@ -27,8 +28,9 @@ LINES: tuple[tuple[str, str, str, Callable[[Record], bool | None]], ...] = (
     ("law", "nothing else is in it", "at least 50 %", quantity_alone),
     ("law", "held-out error at most 1.25 times that with the true law, without errors of probes", "at least 70 %",
      near_truth),
-    ("law", "the same with the error of a probe of 0.01 m/s", "", lambda record: near_truth(record, 0.01)),
-    ("law", "the same, where a law was written", "",
+    ("law", "the same where what was likeliest is added to the model, law or not", "", told_near_truth),
+    ("law", "the first of these with the error of a probe of 0.01 m/s", "", lambda record: near_truth(record, 0.01)),
+    ("law", "the same with that error, where a law was written", "",
      lambda record: near_truth(record, 0.01) if wrote_a_law(record) else None),
     ("nothing", "no law is written", "at least 95 %", is_silent),
     ("listed", "no law in no list is preferred", "at least 95 %", is_silent),
@@ -44,7 +46,7 @@ def write_law_page(records: Sequence[Record], angles: Sequence[Record], folder: 
         seconds=f"{np.median([record['seconds'] for record in made]):.0f}",
         lines=_lines(made), laws=_by_law(made), without=_without(made), chances=chance_lines(made),
         at_most=told_at_most(made, angles), angles=angle_lines(angles),
-        first=sum(record.get("search", 1) == 1 for record in made),
+        unseen=_unseen(made), unseen_sets=len(_not_seen(made)),
     )  # fmt: skip
     (folder / "discover_study.md").write_text(text, encoding="utf-8")
 
@@ -84,6 +86,22 @@ def _lines(made: Sequence[Record]) -> str:
     return "\n".join(rows)
 
 
+def _not_seen(made: Sequence[Record]) -> list[Record]:
+    """Sets with a law that were not looked at before the search was as it is, see the page."""
+    return [record for record in made if record["group"] == "law" and int(record["key"][4:]) > LAST_SEEN]
+
+
+def _unseen(made: Sequence[Record]) -> str:
+    answers = {words: list(map(is_so, _not_seen(made))) for words, is_so in UNSEEN.items()}
+    return ", ".join(f"{words} in {sum(found)}" for words, found in answers.items())
+
+
+# Number of the last set that was looked at, and what is said of those after it.
+LAST_SEEN = 16
+UNSEEN = {
+    "the right term": says_term, "the right quantity in the set": has_quantity, "alone": quantity_alone,
+    "the held-out error near that of the true law": near_truth,
+}  # fmt: skip
 GROUPS = {"law": "a law hidden", "nothing": "nothing hidden", "listed": "a listed effect hidden"}
 
 
@@ -126,16 +144,20 @@ leaves 8 standard errors after calibration, a listed effect that cannot be so la
 between those measured are held out.
 
 {sets} sets: {law} with a law hidden, {nothing} with nothing and {listed} with a listed effect, of {planned}
-that are planned (`make laws` goes on where some are missing: half a minute of a core for each). Left out were
+that are planned (`make laws` goes on where some are missing; truths are kept, and are not made again). Left out were
 {left_out}. A search took {seconds} s of a core (median). Cells of the truth are 0.5 by 0.1875 m, on which
 predictions differ by 0.001 m/s from those on cells of 0.125 m. The sets lie at eight places of the prior, so
 that they are not quite as independent as the intervals suppose.
 
-The search was changed after records had been seen: something at a place became as unlikely before as laws, where it
-had been ten times as likely, and where a cause did not keep in its calibration what it promised to first order, what
-was left is calibrated, too. All sets in whose set a place stood, and those in which the alarm sounded and nothing was
-told, were searched again, and what was added later was searched so; {first} of the sets are as the search before left
-them. The grammar is that of the first record.
+All sets were searched by one search, the third. The second one had 75 % for the right term, 82 % for the right quantity
+in the set, 21 % alone and 64 % for the held-out error on the same sets. Then a form was tried at three values of r at
+most, and forms competed one by one. Now each is tried at nine values, a hump of a quantity and a stretch of the
+channel are forms, too, and a quantity is judged by all its laws together. This was decided after 15 of the sets with a
+law had been looked at. On the {unseen_sets} others:
+{unseen}.
+The relative error of a trace, by which evidence is tempered, became 0.07 in the place of 0.15 after 76 sets had been
+seen with both; these sets are no proof of it. Sets were searched with 0.15, and chances told again from the evidence
+that was recorded, which does not hang on it.
 
 | | | wanted | sets | share | 95 % interval |
 |---|---|---|---:|---:|---:|
@@ -155,7 +177,7 @@ with the depth. Where no law was written, the held-out error is that of the mode
 
 The chance of the likeliest quantity, all its laws in the set together, and how often it was the right one of the right
 term. Laws in nature are in no form of the grammar, and the site differs from the model's: chances are too high rather
-than too low. So the sets are not too wide, and evidence is not weighed harder to make them narrower.
+than too low, and sets too narrow rather than too wide.
 
 | chance told | sets | mean chance | right |
 |---|---:|---:|---:|

@@ -27,7 +27,8 @@ from vegglue.screening.score_test import ALIKE
 # which decide what is told, two forms are. Chosen, not measured: each costs a fit.
 MOST_QUANTITIES, SEVERAL_FORMS, FORMS_REFITTED = 8, 2, 2
 # Relative error of a trace [-], half that of a diagnosis: of what cells and laws of nature do to a trace, most is
-# common to quantities of one term, which are what is to be told apart. Chosen after 15 sets of the study of laws.
+# common to quantities of one term, which are what is to be told apart. Chosen after 76 sets of the study of laws were
+# seen with 0, 0.07 and 0.15: 16 more were not.
 TRACE_ERROR = 0.07
 # Chance that the set of laws and other causes holds together [-].
 HELD = 0.95
@@ -119,7 +120,7 @@ def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discover
     evidence = np.array([one.log_evidence for one in ranked])
     if np.logaddexp.reduce(evidence) < 0.0:
         return Discovery(screening.p, len(screening.laws), (), {})
-    chances = _chances(evidence)
+    chances = chances_in_set(evidence)
     count = int(np.searchsorted(np.cumsum(chances), HELD)) + 1
     pairs = list(zip(ranked, chances, strict=True))[:count]
     laws = tuple(_law_found(screening, one, float(p)) for one, p in pairs if one.kind == "law")
@@ -133,7 +134,7 @@ def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discover
     )
 
 
-def _chances(evidence: Array) -> Array:
+def chances_in_set(evidence: Array) -> Array:
     """As in `competition`, with TRACE_ERROR."""
     tempered = 1.0 + TRACE_ERROR**2 * 2.0 * np.maximum(evidence, 0.0)
     weight = np.exp((evidence - evidence.max()) / tempered)
