@@ -23,7 +23,6 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
-from vegglue.memory import reuse_freed_memory
 from vegglue.parallel import as_finished, in_threads
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ensemble import Header
@@ -161,7 +160,6 @@ def solve_chunk(
     (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from, coarser cells
     if not given.
     """
-    reuse_freed_memory()
     rows = _no_rows(case, site, observations, len(sample.points))
     coarse = [] if start_from else ever_coarser(case, site)[:-1]
     for experiment in case.experiments:
