@@ -57,23 +57,16 @@ def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> 
     state, spent, largest = near, 0, np.inf
     for _ in range(rounds):
         shared = factors(problem, state)
-        # From afar only until factors made anew lead on faster: neighbours need those all the same.
-        end = chord(problem, state, shared, max(tolerance, CLOSE), most=14)
+        end = chord(problem, state, shared, tolerance, most=14)
         spent += int(end.iterations[0])
-        if end.converged[0] and _moved(end, state) < CLOSE:
-            end = chord(problem, end.state, shared, tolerance, most=14)
-            spent += int(end.iterations[0])
-            if end.converged[0]:
-                found = replace(end, iterations=np.array([spent]))
-                return found, shared if _moved(end, state) < CLOSE else factors(problem, end.state)
+        moved = float(np.abs(end.state - state).max())
+        end = replace(end, iterations=np.array([spent]))
+        if end.converged[0]:
+            return end, shared if moved < CLOSE else factors(problem, end.state)
         if not end.correction[0] < min(largest, LONGEST_CORRECTION):
             break
         state, largest = end.state, float(end.correction[0])
-    return replace(end, iterations=np.array([spent]), converged=np.array([False])), None
-
-
-def _moved(end: ChordSolution, start: Array) -> float:
-    return float(np.abs(end.state - start).max())
+    return end, None
 
 
 def _bounded_step(
