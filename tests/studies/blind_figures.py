@@ -64,7 +64,7 @@ def draw_chances(told: Mapping[str, Sequence[Told]]) -> Figure:
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), xlabel="chance told", ylabel="share that came true")
     axes.set_aspect("equal")
     axes.grid()
-    axes.legend(frameon=False, fontsize=SMALL, loc="upper left")
+    axes.legend(frameon=False, fontsize=SMALL, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
@@ -82,7 +82,7 @@ def draw_held_out(records: Mapping[str, Sequence[Record]]) -> Figure:
         axes.loglog(before, after, "o", color=colour, markersize=4, markeredgewidth=0, alpha=0.5)
         axes.set(title=f"{label} ({len(before)})", xlim=ends, ylim=ends, xlabel="held-out error of the parent [mm/s]")
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0)))
             axis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axis.set_minor_formatter(NullFormatter())
         axes.set_aspect("equal")

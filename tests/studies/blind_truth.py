@@ -132,9 +132,7 @@ def flows_of(site: Site, case: Case, study: str) -> dict[str, Flow]:
     return {name: steady_flow(*each, CELLS[study], SETTLED) for name, each in told.items()}
 
 
-def _hiding(
-    site: Site, case: Case, experiment: str, hidden: Mapping[str, Numbers]
-) -> tuple[Truth, float, float]:
+def _hiding(site: Site, case: Case, experiment: str, hidden: Mapping[str, Numbers]) -> tuple[Truth, float, float]:
     """Truth, discharge and level at the outlet of an experiment with what is hidden."""
     truth, setting = site.truth, case.experiments[experiment]
     discharge = float(next(iter(setting.discharge.values()))) * site.discharges[experiment]
