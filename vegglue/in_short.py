@@ -1,6 +1,6 @@
 """How values show themselves where they are printed: a heading, and below it a few lines with units."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 def in_short(heading: str, lines: Iterable[str]) -> str:
@@ -11,6 +11,11 @@ def in_short(heading: str, lines: Iterable[str]) -> str:
 def so_many(number: int, one: str, many: str = "") -> str:
     """`1 station`, `1,024 stations`; many: where it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def listed(parts: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:

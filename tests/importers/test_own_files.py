@@ -271,3 +271,44 @@ def test_nines_that_may_be_a_mark_are_said_and_kept(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert taken.numbers["u"][1] == pytest.approx(0.9999)
     assert np.isnan(read_rows(tmp_path / "v.csv", FileWords(missing=(99.99,))).numbers["u"][1])
+
+
+TWO = "experiments: {12 May: {discharge: 0.6, level: 0.5}, 3 June: {discharge: 2.0, level: 0.95}}\n"
+SURVEYED = "Survey;Remark;x (m);y (m);u (cm/s)\n12 May;;8;0;21\n3 June;;8;0;40\n"
+
+
+def test_a_column_of_names_of_experiments_is_known_by_what_it_holds(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "brook", CHANNEL + TWO, adv__csv=SURVEYED)
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    table = read_observations(case).table
+    assert dict(zip(table["experiment"], table["value"], strict=True)) == {"12 May": 0.21, "3 June": 0.40}
+    assert case.imported is not None
+    assert "experiment from Survey" in case.imported[0].taken
+
+
+def test_rows_of_no_experiment_are_refused_with_the_line_to_write(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "brook", CHANNEL + TWO, adv__csv=SURVEYED.replace("12 May;", "May;"))
+    with pytest.raises(InputError, match=r"under `files`, `adv\.csv: \{experiment: 12 May\}`"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+@pytest.mark.parametrize(("heading", "errors"), [("SE (cm/s)", [0.008, 0.008]), ("u_se (cm/s)", [0.008, np.nan])])
+def test_an_error_of_the_velocity_is_that_of_both_components(tmp_path: Path, heading: str, errors: list[float]) -> None:
+    table = f"x;y;Vx (cm/s);Vy (cm/s);{heading}\n8;0;21;1;0.8\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv=table), tmp_path / "brook.yaml")
+    found = read_observations(case).table
+    assert found["kind"].tolist() == ["velocity", "velocity_across"]
+    assert found["standard_error"].tolist() == pytest.approx(errors, nan_ok=True)
+
+
+def test_import_says_which_measurements_lack_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv="x;y;Vx (cm/s)\n8;0;21\n")
+    assert said_to(monkeypatch, capsys, "import", "brook", "--quiet") == (
+        0,
+        "`diagnose` and `run` will refuse this: no standard error is stated for 1 of velocity, the first at "
+        "x = 8, y = 0 m: add a column `u_se`, or "
+        "`standard_error` to the observation (of a folder: to the file, under `files` in its site file).\n",
+    )

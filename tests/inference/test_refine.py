@@ -199,7 +199,10 @@ def test_the_method_can_be_chosen(
 def test_missing_standard_errors_are_told(reach: tuple[Case, Observations, Ensemble]) -> None:
     case, observations, ensemble = reach
     unknown = replace(observations, table=observations.table.assign(standard_error=math.nan))
-    with pytest.raises(InputError, match="standard error above 0"):
+    with pytest.raises(
+        InputError,
+        match="no standard error is stated for 15 of velocity, the first at x = 8, y = -2 m: add",
+    ):
         refine(ensemble, case, unknown)
 
 

@@ -18,7 +18,7 @@ import scipy.special
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
-from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.kinds import kind_of, unstated_errors
 from vegglue.parallel import in_threads
 
 # Error of the grid over the difference of predictions to a grid of twice the cell size [-]: 1/(2^p - 1) for an order p
@@ -96,12 +96,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     for kind, value in (fallback or {}).items():
         error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value
     if not (error > 0).all():
-        first = used.iloc[int(np.flatnonzero(~(error > 0))[0])]
-        column = kind_of(str(first["kind"])).error_column
-        raise InputError(
-            f"observations: expected a standard error above 0 at every used station, got none at x = {first['x']:g}, "
-            f"y = {first['y']:g} m; add the column {column}, or `standard_error` to the observation."
-        )
+        raise InputError(f"observations: {unstated_errors(used.assign(standard_error=error))}")
     zero = np.zeros(len(used))
     rows = np.flatnonzero(station["used"].to_numpy(bool))
     value = used["value"].to_numpy(float)

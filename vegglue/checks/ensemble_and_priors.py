@@ -9,12 +9,13 @@ from vegglue.case.messages import KeyPath
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.checks.stations import station_in_words
+from vegglue.measurements.kinds import unstated_errors
 from vegglue.measurements.observations import OUTSIDE, Observations
 from vegglue.results.fields import excess
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site
 
-# Fewer members leave two or three in each tail of 2.5 %.
+# Fewer members leave two or three in each tail of 2.5 %. Draws around the best of them need no more than a start.
 FEW_MEMBERS = 100
 
 
@@ -27,7 +28,7 @@ def shown_bounds(bounds: Bounds) -> str:
 def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]:
     """Its size against what quantiles and Sobol' points need, and what the observations can settle."""
     members, table = case.simulate.members, observations.table
-    if members < FEW_MEMBERS:
+    if members < FEW_MEMBERS and case.infer.method == "glue":
         yield f"Only {members} members will be simulated: quantiles need some hundreds."
     if members & (members - 1):
         power = 2 ** round(np.log2(members))
@@ -38,9 +39,9 @@ def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]
     used = table[table["used"].astype(bool)]
     if len(used) < len(case.parameters):
         yield f"{len(used)} used observations cannot settle {len(case.parameters)} parameters."
-    if case.infer.sigma == "known" and used["standard_error"].isna().any():
-        count = int(used["standard_error"].isna().sum())
-        yield f"`infer.sigma` is known, but {count} of {len(used)} used observations have no standard error."
+    if (unstated := unstated_errors(table)) is not None:
+        refusing = "`infer`, `diagnose` and `run`" if case.infer.sigma == "known" else "`diagnose` and `run`"
+        yield f"{refusing} will refuse this: {unstated}"
     for name in case.experiments:
         if not (used["experiment"] == name).any():
             yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."

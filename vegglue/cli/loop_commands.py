@@ -1,5 +1,6 @@
 """The shell of the loop: import, diagnose, discover, extend, compare, next."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -35,17 +36,18 @@ def import_command(
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
     imported = [one.model_dump() for one in case.imported or ()]
-    from vegglue.workflow.import_folder import assumptions_of
+    from vegglue.workflow.import_folder import assumptions_of, without_errors
 
-    assumed = assumptions_of(folder)
+    assumed, unstated = assumptions_of(folder), without_errors(case)
+    if unstated is not None:
+        print(f"`diagnose` and `run` will refuse this: {unstated}", file=sys.stderr)
     if as_object:
         names = {"experiments": list(case.experiments), "patches": patches, "parameters": list(case.parameters)}
         print_object({"config": target, "case": case.name, **names, "imported": imported, "assumed": assumed})
         return
-    for one in case.imported or ():
-        print(f"{one.name}: {one.taken}.")
-    for sentence in assumed:
-        print(sentence)
+    if not quiet:
+        for sentence in [*(f"{one.name}: {one.taken}." for one in case.imported or ()), *assumed]:
+            print(sentence)
     print(
         f"{target}: {len(case.experiments)} experiment(s), {len(patches)} patches, "
         f"{len(case.parameters)} parameters with wide priors."

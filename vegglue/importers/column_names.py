@@ -65,11 +65,11 @@ _ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
 def role_of(heading: str) -> tuple[str, str | None] | None:
     """The role of a column and the unit its heading states, `('u', 'cm/s')` for `U [cm/s]`; None for an unknown one."""
     bare, unit = _apart(heading)
-    if (found := _ROLE_OF.get(_words(bare))) is not None:
+    if (found := _ROLE_OF.get(words_of(bare))) is not None:
         quantity = ROLES[found].quantity
         return found, unit_named(unit, quantity) if unit and quantity else None
     for name, word in _suffixed(bare):
-        found = _ROLE_OF.get(_words(name))
+        found = _ROLE_OF.get(words_of(name))
         if found is not None and ROLES[found].quantity and (said := unit_named(word, ROLES[found].quantity)):
             return found, said
     return None
@@ -90,6 +90,7 @@ def _suffixed(name: str) -> list[tuple[str, str]]:
     return [("_".join(parts[:-last]), "/".join(parts[-last:])) for last in (1, 2) if len(parts) > last]
 
 
-def _words(name: str) -> str:
+def words_of(name: str) -> str:
+    """Letters and digits in lower case, apart where anything else stood: `u se` for `U_SE`."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
     return " ".join(re.findall(r"[a-z0-9]+", plain))

@@ -18,7 +18,7 @@ from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords, file_words
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words
+from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
 from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_file
 from vegglue.importers.stations import StationTable, station_tables
@@ -161,7 +161,8 @@ def _brought(
                 f"{shown_path(path)}: expected no `flip` of places on the map of a centreline; where velocities run "
                 "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
             )
-    placed = [in_the_channel(reader_of(path)(path, words), place, words) for path, words in group]
+    read = [with_experiments(reader_of(path)(path, words), experiments) for path, words in group]
+    placed = [in_the_channel(one, place, words) for one, (_, words) in zip(read, group, strict=True)]
     path, words = group[0]
     tables = station_tables(joined_rows(placed), path.stem, words, experiments, place, f"{shown_path(path)}:")
     made = ", ".join(table.said for table in tables) or "no measurement, left out"

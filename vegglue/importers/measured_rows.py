@@ -1,14 +1,14 @@
 """Rows of measurements in SI and in the frame of the model, and a line that says what was taken from which column."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, role_of
+from vegglue.importers.column_names import ROLES, role_of, words_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
 from vegglue.importers.placement import Placement
@@ -27,7 +27,8 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 @dataclass(frozen=True)
 class Taken:
     """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
-    each role came from; units: the unit of each; said: what was done, in short clauses.
+    each role came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns
+    that no role was found for, by heading.
     """
 
     numbers: Mapping[str, Array]
@@ -35,6 +36,7 @@ class Taken:
     columns: Mapping[str, str]
     units: Mapping[str, str]
     said: tuple[str, ...]
+    others: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -44,10 +46,11 @@ class Taken:
     def only(self, rows: Mask) -> "Taken":
         """The rows (rows,) that are true."""
         numbers = {role: values[rows] for role, values in self.numbers.items()}
-        words = {
-            role: [one for one, kept in zip(texts, rows, strict=True) if kept] for role, texts in self.words.items()
-        }
-        return replace(self, numbers=numbers, words=words)
+        words, others = (
+            {name: [one for one, kept in zip(column, rows, strict=True) if kept] for name, column in texts.items()}
+            for texts in (self.words, self.others)
+        )
+        return replace(self, numbers=numbers, words=words, others=others)
 
     def having(self, numbers: Mapping[str, Array], *said: str) -> "Taken":
         """The rows with these numbers put in, None-valued roles left as they are, and what is said of it."""
@@ -89,7 +92,9 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
             f"name them by `columns` of this file, by what they hold: {known}."
         )
     named = {role: table.headings[place] for role, place in columns.items()}
-    return Taken(numbers, texts, named, units, tuple(said))
+    unread = [place for place in range(len(table.headings)) if place not in columns.values()]
+    others = {table.headings[place]: [row[place] for _, row in table.rows] for place in unread}
+    return Taken(numbers, texts, named, units, tuple(said), others)
 
 
 def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
@@ -126,12 +131,24 @@ def _errors_turned(taken: Taken, place: Placement, along: Array) -> Taken:
     return taken.having({"u_se": np.hypot(ee * east, ne * north), "v_se": np.hypot(en * east, nn * north)})
 
 
+def with_experiments(taken: Taken, experiments: Sequence[str]) -> Taken:
+    """The rows, their experiments read from a column, under any heading, of names of experiments and nothing else."""
+    heading = next((name for name, texts in taken.others.items() if texts and set(texts) <= set(experiments)), None)
+    if heading is None or "experiment" in taken.words:
+        return taken
+    others = {name: texts for name, texts in taken.others.items() if name != heading}
+    words = {**taken.words, "experiment": taken.others[heading]}
+    return replace(taken, words=words, columns={"experiment": heading, **taken.columns}, others=others)
+
+
 def joined_rows(parts: Sequence[Taken]) -> Taken:
     """The rows of several files one below the other, as far as all of them have a role."""
     first = parts[0]
     numbers = {r: np.concatenate([one.numbers[r] for one in parts]) for r in first.numbers if _in_all(r, parts)}
     words = {role: [text for one in parts for text in one.words[role]] for role in first.words}
-    return replace(first, numbers=numbers, words=words)
+    shared = [name for name in first.others if all(name in one.others for one in parts)]
+    others = {name: [text for one in parts for text in one.others[name]] for name in shared}
+    return replace(first, numbers=numbers, words=words, others=others)
 
 
 def _in_all(role: str, parts: Sequence[Taken]) -> bool:
@@ -142,10 +159,15 @@ def taken_in_words(taken: Taken) -> str:
     """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma, 12 rows`."""
     units = {role: f" [{unit}]" for role, unit in taken.units.items()}
     roles = [
-        f"{role} from {heading.removesuffix(units.get(role, ''))}{units.get(role, '')}"
+        f"{role} from {_without(heading, taken.units.get(role))}{units.get(role, '')}"
         for role, heading in taken.columns.items()
     ]
     return f"{', '.join(roles)}; {', '.join(taken.said)}; {so_many(taken.size, 'row')}"
+
+
+def _without(heading: str, unit: str | None) -> str:
+    """`U` for `U [cm/s]` and `U (cm/s)`."""
+    return heading.removesuffix(f"[{unit}]").removesuffix(f"({unit})").rstrip()
 
 
 def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
@@ -162,7 +184,16 @@ def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
         known = role_of(heading)
         if known is not None and known[0] not in found and place not in found.values():
             found[known[0]] = place
+    # One error for a velocity, not for a component of it, is that of both.
+    across = next((role for role in ("v", "north_velocity") if role in found), None)
+    if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
+        found["v_se"] = found["u_se"]
     return found
+
+
+def _of_one(heading: str) -> bool:
+    """Whether the heading of a standard error names a component, `u_se`."""
+    return "u" in words_of(heading).split()
 
 
 def _unit(path: Path, table: LooseTable, place: int, role: str, words: FileWords) -> str:

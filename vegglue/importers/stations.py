@@ -1,7 +1,7 @@
 """Measured rows as tables that a case names: points in the vertical, or stations of each kind."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,19 +54,26 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
     if "y" not in place:
         taken = taken.having({"y": np.zeros(taken.size)}, "y = 0 for want of a column")
-    if words.experiment is not None:
-        names = [words.experiment] * taken.size
-    elif "experiment" in taken.words:
-        names = list(taken.words["experiment"])
-    elif len(experiments) == 1:
-        names = [experiments[0]] * taken.size
-    else:
-        raise InputError(f"{where} expected a column `experiment`, or its `experiment` among {', '.join(experiments)}.")
+    names = _experiments(taken, words, experiments, where)
     sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
     if sections is None or "" in sections:
         sections = _sections(taken.numbers["x"])
-    return Taken(taken.numbers, {**taken.words, "experiment": names, "section": sections}, taken.columns, taken.units,
-                 taken.said)  # fmt: skip
+    return replace(taken, words={**taken.words, "experiment": names, "section": sections})
+
+
+def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> list[str]:
+    """The experiment of each row."""
+    if words.experiment is not None:
+        return [words.experiment] * taken.size
+    if "experiment" in taken.words:
+        return list(taken.words["experiment"])
+    if len(experiments) == 1:
+        return [experiments[0]] * taken.size
+    file = where.removesuffix(":").rpartition("/")[2]
+    raise InputError(
+        f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none; add one, or "
+        f"say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
+    )
 
 
 def _sections(x: Array) -> list[str]:

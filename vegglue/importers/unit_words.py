@@ -65,7 +65,8 @@ def in_si(value: object, quantity: str, where: str) -> float:
     if said is None or number is None:
         si = next(iter(UNITS[quantity]))
         raise InputError(f"{where} expected a number in {si}, or one with its unit, got {value!r}; correct it.")
-    return number * si_factor(said[2], quantity, where)
+    # 82 cm is 0.82 m, and not 0.8200000000000001.
+    return float(f"{number * si_factor(said[2], quantity, where):.12g}")
 
 
 def _plain(word: str) -> str:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
+from vegglue.measurements.kinds import unstated_errors
 from vegglue.results.ensemble import Ensemble
 from vegglue.solver.status import FAILED
 
@@ -73,13 +74,10 @@ def efficiency(residual: Array, station: pd.DataFrame) -> Array:
 
 def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Array:
     errors = station["standard_error"].to_numpy(float)
-    unknown = [int(row) for row in used if not errors[row] > 0]
-    if unknown:
-        first = station.iloc[unknown[0]]
+    if not (errors[used] > 0).all():
         raise InputError(
-            f"observations: `infer.sigma: known` needs a standard error above 0 at every used station, but "
-            f"{len(unknown)} of {len(used)} have none, the first at x = {first['x']:g} m, y = {first['y']:g} m; "
-            "add `standard_error` to the observation or use `sigma: best-member`."
+            f"observations: `infer.sigma: known` needs standard errors, but {unstated_errors(station)} "
+            "`sigma: best-member` estimates them from what the best member leaves."
         )
     return errors
 

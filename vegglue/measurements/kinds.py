@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.errors import InputError
-from vegglue.in_short import so_many
+from vegglue.in_short import listed, so_many
 
 
 @dataclass(frozen=True)
@@ -92,3 +92,19 @@ def stations_in_short(station: pd.DataFrame) -> str:
     used = station[station["used"].to_numpy(bool)]
     counts = [f"{(used['kind'] == name).sum()} of {kind_of(name).words}" for name in dict.fromkeys(station["kind"])]
     return f"{so_many(len(station), 'station')}, in use {', '.join(counts) or 'none'}"
+
+
+def unstated_errors(station: pd.DataFrame) -> str | None:
+    """Which of the used stations state no standard error, and what to write where; None where all do."""
+    used = station[station["used"].to_numpy(bool)]
+    bare = used[~(used["standard_error"].to_numpy(float) > 0)]
+    if bare.empty:
+        return None
+    kinds = [(kind_of(str(name)), int(count)) for name, count in bare.groupby("kind", sort=False).size().items()]
+    first = f"x = {bare['x'].iloc[0]:g}, y = {bare['y'].iloc[0]:g} m"
+    return (
+        f"no standard error is stated for {listed([f'{count} of {kind.words}' for kind, count in kinds])}, "
+        f"the first at {first}: add "
+        f"{listed([f'a column `{kind.error_column}`' for kind, _ in kinds])}, or `standard_error` to the observation "
+        "(of a folder: to the file, under `files` in its site file)."
+    )

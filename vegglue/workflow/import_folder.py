@@ -15,6 +15,8 @@ from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
+from vegglue.measurements.kinds import unstated_errors
+from vegglue.measurements.observations import read_observations
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -43,6 +45,11 @@ def assumptions_of(folder: Path | str) -> list[str]:
     if site_file(folder).is_file():
         return left_open(folder)
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
+
+
+def without_errors(case: Case) -> str | None:
+    """Which measurements state no standard error, which the loop needs; None where all do."""
+    return unstated_errors(read_observations(case).table)
 
 
 def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
