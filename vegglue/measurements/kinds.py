@@ -105,6 +105,6 @@ def unstated_errors(station: pd.DataFrame) -> str | None:
     return (
         f"no standard error is stated for {listed([f'{count} of {kind.words}' for kind, count in kinds])}, "
         f"the first at {first}: add "
-        f"{listed([f'a column `{kind.error_column}`' for kind, _ in kinds])}, or `standard_error` to the observation "
-        "(of a folder: to the file, under `files` in its site file)."
+        f"{listed([f'a column `{kind.error_column}`' for kind, _ in kinds])}, or say it in the site "
+        "file, `files: {NAME.csv: {standard_error: 5 mm}}`; in a config, as `standard_error` of the observation."
     )
