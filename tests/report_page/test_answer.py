@@ -56,16 +56,36 @@ def test_every_verdict_is_one_plain_sentence(toy: Run, found, said: str) -> None
 def test_the_page_of_a_child_tells_what_was_missing(toy: Run) -> None:
     """`run` makes no page of the case itself: that of its last child has to tell the whole."""
     first = a_diagnosis(verdict={"kind": "one-of"})
-    child = replace(toy, diagnosis=NOTHING, loop=LoopResults(behind=first, ladder=LADDER))
+    child = replace(toy, diagnosis=replace(NOTHING, name="child"), loop=LoopResults(behind=first, ladder=LADDER))
     said = plain(headline(child))
     assert f"was missing from {first.name}: most likely (70 %) störung" in said
     assert said.endswith("Nothing is missing from this model that these data could show.")
     assert of_which_model(child).startswith(f"This page is about the model made of {FIRST.name} by adding")
     assert child.behind is first, "of which both models are drawn"
-    # What is missing still goes before what was missing.
     more = replace(child, diagnosis=replace(first, name="child"))
-    assert "missing from this model" in plain(headline(more))
-    assert not of_which_model(more)
+    assert re.search(f"was missing from {first.name}: .* is missing from this model: ", plain(headline(more)))
+    assert of_which_model(more) == of_which_model(child)
+    assert more.behind is more.diagnosis, "whose models are drawn"
+
+
+def test_a_law_suspected_of_a_child_hides_nothing_of_what_was_found(toy: Run) -> None:
+    """The law is not calibrated: both models of what was found are drawn, and told first."""
+    first = a_diagnosis(steps=(), verdict={"kind": "none-of-these"})
+    suspected = replace(NOTHING, name="child", laws=laws_suspected_of("law_bank_speed_step"))
+    suspected = replace(suspected, verdict=replace(NOTHING.verdict, kind="none-of-these"))
+    child = replace(toy, diagnosis=suspected, loop=LoopResults(behind=first, ladder=_ending_with(toy)))
+    said = plain(headline(child))
+    assert said.startswith(
+        f"Something was missing from {first.name} that is in no list: more drag of 0.40 1/m at x = 33.0"
+    )
+    assert "Something is missing from this model that is in no list: friction of the banks changes" in said
+    assert child.behind is first
+    assert "vegglue discover toy.yaml" in next_steps(child)[0]
+    assert not any("Compare with" in step for step in next_steps(child)), "there is no page of the first model"
+
+
+def _ending_with(run: Run) -> Ladder:
+    return replace(LADDER, steps=(replace(FIRST, name="brook"), replace(LAST, name=run.case.name)))
 
 
 def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy: Run) -> None:

@@ -37,13 +37,15 @@ QUESTIONS_SHOWN = 3
 
 def headline(run: Run) -> str:
     """The verdict in one sentence; of a model that was extended, what was missing before and what is now."""
-    found, own = run.behind, run.diagnosis
-    if found is None:
+    before, own = run.before, run.diagnosis
+    if before is None and run.behind is None:
         return verdict_of(run.case, run.posterior)
-    if found is own:
-        return _said(found, "this model", "is")
-    before = _said(found, html.escape(found.name), "was")
-    return before if own is None else f"{before} {_said(own, 'this model', 'is')}"
+    parts = [] if before is None else [_said(before, html.escape(before.name), "was")]
+    if own is not None:
+        parts.append(_said(own, "this model", "is"))
+    elif before is None and run.behind is not None:
+        parts.append(_said(run.behind, html.escape(run.behind.name), "was"))
+    return " ".join(parts)
 
 
 def _said(found: Diagnosis, model: str, tense: str) -> str:
@@ -103,7 +105,7 @@ def _amplitude_in_words(amplitude: AmplitudeEstimate) -> str:
 def of_which_model(run: Run) -> str:
     """Which model the page is about, where it is not the one that was diagnosed; '' else."""
     ladder = run.loop.ladder
-    if run.behind is run.diagnosis or ladder is None:
+    if ladder is None or (run.before is None and run.behind is run.diagnosis):
         return ""
     added = [name for step in ladder.steps for name in step.added if name in run.case.effects]
     return (
@@ -228,7 +230,7 @@ def _of_instruments(found: Diagnosis) -> Iterator[str]:
 def _better_model(run: Run) -> Iterator[str]:
     ladder, found = run.loop.ladder, run.behind
     assert found is not None
-    if found.laws is not None and (ladder is None or len(ladder.steps) == 1):
+    if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
         command = html.escape(run.case.source.name)
         yield f"<code>vegglue discover {command}</code> calibrates laws that are in no list, and writes the best."
     if ladder is None:
@@ -238,7 +240,7 @@ def _better_model(run: Run) -> Iterator[str]:
         return
     if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:
         yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
-    elif len(ladder.steps) > 1:
+    elif len(ladder.steps) > 1 and ladder.steps[0].name in run.loop.pages:
         yield f"Compare with the model without it: {_page_of(run, ladder.steps[0])}."
 
 

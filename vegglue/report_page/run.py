@@ -62,17 +62,29 @@ class Run:
 
     @property
     def behind(self) -> Diagnosis | None:
-        """The diagnosis that says what is missing: of the case; of the model it extends where it has none, or names
-        nothing more.
+        """The diagnosis whose two models are drawn: of the case; of the model it extends where the case has none, or
+        has found nothing more that could be drawn.
         """
         own, first = self.diagnosis, self.loop.behind
         if own is None or first is None:
             return own or first
-        return first if _names_something(first) and not _names_something(own) else own
+        return first if _names_something(first) and not _has_calibrated(own) else own
+
+    @property
+    def before(self) -> Diagnosis | None:
+        """The diagnosis of the model that the case extends, where that named something; None for a case of its own."""
+        own, first = self.diagnosis, self.loop.behind
+        other = first is not None and (own is None or own.name != first.name)
+        return first if first is not None and other and _names_something(first) else None
+
+
+def _has_calibrated(found: Diagnosis) -> bool:
+    """Whether something was calibrated in; laws are only suspected, to first order."""
+    return bool(found.steps or found.places or found.instruments or found.field)
 
 
 def _names_something(found: Diagnosis) -> bool:
-    return bool(found.steps or found.places or found.instruments or found.field or found.laws)
+    return _has_calibrated(found) or bool(found.laws)
 
 
 def is_synthetic(case: Case) -> bool:
