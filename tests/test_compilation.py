@@ -94,3 +94,26 @@ def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
     stamps = {name: _stamp(PACKAGE / name) for name in ("flow/kernels.py", "flow/wet_and_dry.py", "solver/batch.py")}
     assert len(set(stamps.values())) == len(stamps)
     assert _stamp(tmp_path / "nothing.py") == ""
+
+
+FIRST_USE = """
+import numpy as np
+from vegglue.solver.block_elimination import solve
+from vegglue.engine.first_use import with_compilation
+print(with_compilation("calibrating"))
+solve(np.zeros((2, 3, 2, 2)), np.zeros((2, 2)), np.zeros((2, 2, 1)))
+print(with_compilation("calibrating"))
+"""
+
+
+@pytest.mark.slow
+def test_the_first_command_says_that_it_compiles(tmp_path: Path) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", FIRST_USE], env=environment, capture_output=True, text=True, check=True
+        ).stdout.splitlines()
+        for _ in range(2)
+    ]
+    told = "calibrating (compiling the solver for this machine first, once: up to a minute)"
+    assert said == [[told, "calibrating"], ["calibrating", "calibrating"]]

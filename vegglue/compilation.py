@@ -55,6 +55,13 @@ def _fresh(loop: Any) -> Any:
     return loop
 
 
+def is_kept(loop: Any) -> bool:
+    """Whether an earlier process has left machine code of the loop; True where that cannot be known."""
+    index: Any = getattr(getattr(loop, "_cache", None), "_cache_file", None)
+    # Documented nowhere, as above: an index is empty where there is no file, or it is of other code or another numba.
+    return not hasattr(index, "_load_index") or bool(index._load_index())
+
+
 @cache
 def _stamp(file: Path) -> str:
     """Hash of a file and of those it imports that hold loops, or constants and flags of loops."""

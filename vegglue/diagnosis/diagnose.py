@@ -31,6 +31,7 @@ from vegglue.diagnosis.rivals import followed_further, instrument_found, locatio
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
+from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import in_threads
@@ -69,7 +70,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     unseen: the model at measurements that no calibration sees, which silence has to agree with.
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    watch(Progress("calibrating the model as it is"))
+    watch(Progress(with_compilation("calibrating the model as it is")))
     base = kept_baseline(model)
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)

@@ -18,6 +18,7 @@ from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.effects.grammar import SAME_AS, Law
+from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent
 from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
@@ -39,7 +40,7 @@ def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = sile
 
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    watch(Progress("calibrating the model as it is"))
+    watch(Progress(with_compilation("calibrating the model as it is")))
     return laws_beyond(baseline(model), without, watch)
 
 

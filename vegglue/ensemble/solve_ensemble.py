@@ -16,6 +16,7 @@ from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, 
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_PREDICTIONS
+from vegglue.engine.first_use import with_compilation
 from vegglue.engine.model import ever_coarser
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.problem import Problem, take
@@ -71,7 +72,7 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
         todo = left_to_do(writer, case, chunks, watch)
         resumed = sum(chunks[index].size for index in writer.done)
         solved, failed, phase = resumed, 0, f"solving {case.name}"
-        watch(Progress(phase, solved, header.members, "members", failed, resumed))
+        watch(Progress(with_compilation(phase), solved, header.members, "members", failed, resumed))
         for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
             fields = rows.pop("fields")
             writer.append(index, chunks[index], rows, fields)

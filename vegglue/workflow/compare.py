@@ -10,6 +10,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import excluded_by, exclusion_in_words
+from vegglue.engine.first_use import with_compilation
 from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.parallel import at_most, one_thread
@@ -46,7 +47,7 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     rungs = []
     with at_most(jobs):
         for number, case in enumerate(cases):
-            watch(Progress(f"calibrating {case.name}", number, len(cases), "models"))
+            watch(Progress(with_compilation(f"calibrating {case.name}"), number, len(cases), "models"))
             rungs.append(rung_of(case, runs, aside, watch))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)

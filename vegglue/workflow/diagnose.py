@@ -10,6 +10,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.effects.definition import Effect
+from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -52,7 +53,7 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     """
     folder = folder_of(runs, case)
     path = folder / f"fingerprint_{effect.name}.png"
-    watch(Progress(f"calibrating {case.name}"))
+    watch(Progress(with_compilation(f"calibrating {case.name}")))
     trace, station = fingerprint_of(case, folder, effect, watch)
     amplitude = effect.amplitude
     plausible = amplitude.off + amplitude.scale

@@ -12,6 +12,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
+from vegglue.engine.first_use import with_compilation
 from vegglue.ensemble.solve_ensemble import solve_flow
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
@@ -57,7 +58,7 @@ def export(
     for library in (name for form in forms for name in LIBRARIES_OF_FORM[form]):  # before minutes are spent on the flow
         extra_library(library, "field", "vegglue export", "choose --only csv")
     folder = folder_of(runs, case)
-    watch(Progress(f"solving the flow of {case.name}"))
+    watch(Progress(with_compilation(f"solving the flow of {case.name}")))
     flows, predicted, words = _flow(case, folder)
     words += "" if case.engine is None else ", by the built-in engine"
     if not flows:

@@ -17,6 +17,7 @@ from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
+from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_short
@@ -106,7 +107,7 @@ def extend_stepwise(
 def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, force: bool) -> StepwiseExtension:
     """The parent and its children, each better than the one before; what is only tried leaves no file."""
     aside = excluded_by(found)
-    watch(Progress(f"calibrating {case.name}"))
+    watch(Progress(with_compilation(f"calibrating {case.name}")))
     parent = calibrated(case, folder_of(runs, case), aside, watch)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}

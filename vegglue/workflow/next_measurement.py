@@ -11,6 +11,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.effects.grammar import LAWS
+from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -85,7 +86,7 @@ def next_measurement(
     questions: list[Question] = []
     if asked:
         with at_most(jobs):
-            watch(Progress(f"calibrating {case.name}"))
+            watch(Progress(with_compilation(f"calibrating {case.name}")))
             base = calibrated(case, folder_of(runs, case), excluded_by(found), watch)
             watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
