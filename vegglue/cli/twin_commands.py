@@ -44,6 +44,7 @@ def reveal_command(
     folder: Annotated[Path, typer.Argument(help="Folder that `vegglue twin` made.", show_default=False)],
     runs: Runs = Path("runs"),
     as_object: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Open the seal of a twin, and say how well its diagnosis guessed."""
     lines = vegglue.reveal(folder, runs=runs)
