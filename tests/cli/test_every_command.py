@@ -53,6 +53,8 @@ def test_every_command_can_be_quiet_and_tell_an_object(name: str) -> None:
     command = typer.main.get_group(app).commands[name]
     options = {option for parameter in command.params for option in parameter.opts}
     assert {"--quiet", "-q", "--json"} <= options
+    flags = [parameter for parameter in command.params if getattr(parameter, "is_flag", False)]
+    assert all(str(flag.metavar).strip() == "" for flag in flags), "none is told as if it took a value"
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import typer
 import vegglue
 from vegglue.cli.doubts import opened_case, opened_cases
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
+from vegglue.cli.options import FLAG, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
@@ -103,7 +103,7 @@ def extend_command(
     ] = None,
     shape: Annotated[list[str] | None, typer.Option(help="Value of a shape of it, NAME=NUMBER.")] = None,
     auto: Annotated[
-        bool, typer.Option("--auto", help="Add what the diagnosis finds, while held-out errors fall.")
+        bool, typer.Option("--auto", metavar=FLAG, help="Add what the diagnosis finds, while held-out errors fall.")
     ] = False,
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,

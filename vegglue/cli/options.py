@@ -7,6 +7,9 @@ import typer
 
 from vegglue.errors import InputError
 
+# What stands for the value of an option that takes none: typer 0.29 would write `<bool>`, as if it took one.
+FLAG = " "
+
 Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
 Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
 
@@ -31,10 +34,16 @@ Members = Annotated[
     int | None,
     typer.Option(min=1, help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of words.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, not how far the command is.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace also what you made or edited, or a larger ensemble.")]
-Trust = Annotated[bool, typer.Option("--trust", help="Run the config's `effect_file` and the command of its `engine`.")]
+Json = Annotated[bool, typer.Option("--json", metavar=FLAG, help="Print one JSON object instead of words.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", metavar=FLAG, help="Print results only, not how far the command is.")
+]
+Force = Annotated[
+    bool, typer.Option("--force", metavar=FLAG, help="Replace also what you made or edited, or a larger ensemble.")
+]
+Trust = Annotated[
+    bool, typer.Option("--trust", metavar=FLAG, help="Run the config's `effect_file` and the command of its `engine`.")
+]
 
 
 def number_given(text: str) -> tuple[str, float]:
