@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Json, Quiet, Runs
+from vegglue.cli.options import FLAG, Json, Quiet, Runs
 from vegglue.cli.output import print_object
 from vegglue.errors import InputError
 
@@ -24,7 +24,9 @@ def effects_command(
     check: Annotated[Path | None, typer.Option(help="Check the effects of a Python file of your own.")] = None,
     as_object: Json = False,
     quiet: Quiet = False,
-    trust: Annotated[bool, typer.Option("--trust", help="Run the Python file of effects that is named.")] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", metavar=FLAG, help="Run the Python file of effects that is named.")
+    ] = False,
     runs: Runs = Path("runs"),
 ) -> None:
     """List the physical effects that can be added, or show one of them."""

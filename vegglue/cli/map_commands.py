@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Config, Json, Quiet, Runs, Trust
+from vegglue.cli.options import FLAG, Config, Json, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
 from vegglue.errors import shown_path
 
@@ -21,7 +21,7 @@ def new_command(
     slope: Annotated[float, typer.Option(help="Fall of the bed per length [-].")] = 0.001,
     depth: Annotated[float, typer.Option(help=r"Depth of the water at the outlet \[m].")] = 0.9,
     discharge: Annotated[float, typer.Option(help=r"Discharge \[m3/s].")] = 1.5,
-    plants: Annotated[bool, typer.Option(help="Whether there is a patch of plants.")] = True,
+    plants: Annotated[bool, typer.Option(metavar=FLAG, help="Whether there is a patch of plants.")] = True,
     folder: Annotated[Path, typer.Option(help="Folder to make it in.")] = Path("."),
     as_object: Json = False,
     quiet: Quiet = False,
