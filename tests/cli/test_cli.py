@@ -164,14 +164,14 @@ def test_a_mistake_in_the_config_is_one_sentence(
 
 @pytest.mark.parametrize(
     ("step", "expected"),
-    [("infer", "run `vegglue simulate CONFIG`"), ("report", "run `vegglue simulate CONFIG`")],
+    [("infer --method glue", "run `vegglue simulate CONFIG`"), ("report", "run `vegglue infer CONFIG`")],
 )
 def test_a_step_out_of_turn_names_the_one_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], step: str, expected: str
 ) -> None:
     config = write_reach(tmp_path)
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, step, config)
+    code, error = said_to(monkeypatch, capsys, *step.split(), config)
     assert (code, error.count("\n")) == (2, 1), error
     assert expected in error
 

@@ -23,6 +23,7 @@ from vegglue.errors import InputError
 from vegglue.inference.homogeneity import equal_values_test, one_experiment, transfer, without_prior
 from vegglue.inference.map_and_errors import distinct_modes, modes_and_errors, standardised_residual, starting_points
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
+from vegglue.inference.tried_members import members_of, points_of_prior
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
@@ -58,7 +59,8 @@ def refined(reach: tuple[Case, Observations, Ensemble]) -> Posterior:
 @pytest.fixture(scope="module")
 def noise(reach: tuple[Case, Observations, Ensemble]) -> Noise:
     case, observations, ensemble = reach
-    return modes_and_errors(model_of(case, observations), ensemble, "known").noise
+    model = model_of(case, observations)
+    return modes_and_errors(model, members_of(ensemble, model), "known").noise
 
 
 @pytest.mark.slow
@@ -234,6 +236,41 @@ def test_an_ensemble_without_a_solved_member_is_told(reach: tuple[Case, Observat
     case = case.model_copy(update={"infer": case.infer.model_copy(update={"sigma": rule})})
     with pytest.raises(InputError, match=f"none of the {len(none.status)} members was solved"):
         refine(none, case, observations)
+
+
+@pytest.mark.slow
+def test_points_of_the_prior_lead_to_the_same_posterior(
+    reach: tuple[Case, Observations, Ensemble], refined: Posterior
+) -> None:
+    case, observations, _ = reach
+    with at_most(1):
+        found = refine(None, case, observations)
+    assert found.settings.ensemble_hash == ""
+    assert found.weighting.effective_size >= 1000
+    assert found.refinement is not None
+    assert refined.refinement is not None
+    assert found.refinement.modes.mode_chi2 == pytest.approx(refined.refinement.modes.mode_chi2, rel=1e-3)
+    for name, quantiles in refined.marginals.quantiles.items():
+        sd = refined.marginals.sd[name]
+        assert found.marginals.quantiles[name] == pytest.approx(quantiles, abs=0.15 * sd)
+    assert "of the prior" in describe(found)[0]
+
+
+def test_points_of_the_prior_are_tried_on_coarse_cells(reach: tuple[Case, Observations, Ensemble]) -> None:
+    model = model_of(*reach[:2])
+    tried = points_of_prior(model)
+    assert tried.prediction.shape == (64, len(model.station))
+    own = linearise(model, tried.z[3])
+    assert own is not None
+    apart = np.abs(tried.prediction[3] - own.prediction).max()
+    assert 1e-6 < apart < 0.1
+    assert np.array_equal(tried.z, points_of_prior(model).z)
+
+
+def test_without_a_prior_nothing_is_tried(reach: tuple[Case, Observations, Ensemble]) -> None:
+    model = model_of(*reach[:2])
+    with pytest.raises(InputError, match="expected a prior or more"):
+        points_of_prior(replace(model, case=model.case.model_copy(update={"parameters": {}})))
 
 
 def test_ends_of_the_search_are_counted_once() -> None:

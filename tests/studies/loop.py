@@ -14,7 +14,7 @@ from typing import Any
 import vegglue
 
 WILLOWS = Path(__file__).parents[2] / "data" / "open_cases" / "open-b"
-# Members of the ensembles, the first of them those of the loop.
+# Members of the ensembles.
 SIZES = (32, 64, 256)
 
 
@@ -34,11 +34,11 @@ def main(sizes: tuple[int, ...] = SIZES) -> None:
         for members in sizes:
             words = f"{members} members x {len(case.experiments)} experiments, all cores"
             seconds_of(words, partial(vegglue.simulate, case, runs=folder / f"of-{members}", members=members))
-        first = {"runs": folder / f"of-{sizes[0]}", "members": sizes[0]}
-        seconds_of("diagnose", partial(vegglue.diagnose, case, runs=folder / "alone"))
-        seconds_of("infer to 1,000 effective draws", partial(vegglue.infer, case, **first))
-        seconds_of("report", partial(vegglue.report, case, **first))
-        seconds_of("run, the whole way", partial(vegglue.run, case, runs=folder / "whole", members=sizes[0]))
+        alone = folder / "alone"
+        seconds_of("diagnose", partial(vegglue.diagnose, case, runs=alone))
+        seconds_of("infer to 1,000 effective draws", partial(vegglue.infer, case, runs=alone))
+        seconds_of("report", partial(vegglue.report, case, runs=alone))
+        seconds_of("run, the whole way", partial(vegglue.run, case, runs=folder / "whole"))
 
 
 if __name__ == "__main__":

@@ -100,6 +100,24 @@ def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
         vegglue.report(case, runs=runs, members=9)
 
 
+@pytest.mark.slow
+def test_draws_and_their_page_need_no_ensemble(tmp_path: Path) -> None:
+    case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR))
+    runs = tmp_path / "runs"
+    with pytest.raises(vegglue.InputError, match="`vegglue simulate CONFIG`"):
+        vegglue.infer(case, runs=runs, method="glue")
+    posterior = vegglue.infer(case, runs=runs, jobs=2)
+    assert posterior.weighting.effective_size >= 1000
+    page = vegglue.report(case, runs=runs).read_text(encoding="utf-8")
+    assert f"{posterior.sample.members:,} draws, none of them failed" in page
+    assert "mass error" not in page
+    assert vegglue.overview([case], runs=runs).exists()
+    assert not (runs / "brook" / "ensemble.h5").exists()
+    shown = list[object]()
+    vegglue.run(case, runs=runs, jobs=2, show=lambda _, result: shown.append(result))
+    assert not list(runs.rglob("ensemble.h5"))
+
+
 def test_an_ensemble_of_another_case_is_refused(tmp_path: Path) -> None:
     case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL))
     ensemble = vegglue.simulate(case, runs=tmp_path / "runs", jobs=1)

@@ -30,7 +30,7 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
     """
     station = observations.table
     check_stations(ensemble, station)
-    fit = fit_members(ensemble, station, case.infer.sigma)
+    fit = fit_members(ensemble.prediction, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
     weights = member_weights(fit, case.infer.likelihood, threshold)
     settings = InferenceSettings(

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import unstated_errors
-from vegglue.results.ensemble import Ensemble
-from vegglue.solver.status import FAILED
 
 
 @dataclass(frozen=True)
@@ -31,8 +29,10 @@ def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
     return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}
 
 
-def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> MemberFit:
+def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFit:
     """Efficiency and Gaussian log-likelihood of each member at the stations, with the errors that `rule` asks for.
+
+    prediction (member, station), NaN where a member failed.
 
     best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2;
     known: the standard errors of the data. E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
@@ -41,11 +41,11 @@ def fit_members(ensemble: Ensemble, station: pd.DataFrame, rule: str) -> MemberF
     """
     kinds = stations_by_kind(station)
     used = np.concatenate(list(kinds.values()))
-    solved = (ensemble.status != FAILED) & np.isfinite(ensemble.prediction[:, used]).all(axis=1)
+    solved = np.asarray(np.isfinite(prediction[:, used]).all(axis=1))
     if not solved.any():
         raise InputError(f"ensemble: none of the {len(solved)} members was solved; see the reasons stored with them.")
     value = station["value"].to_numpy(float)
-    residual = np.where(solved[:, None], value - ensemble.prediction, np.nan)
+    residual = np.where(solved[:, None], value - prediction, np.nan)
     mean_square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
     errors = _known_errors(station, used) if rule == "known" else None
     if errors is None:

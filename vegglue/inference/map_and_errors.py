@@ -1,7 +1,7 @@
 """The modes of the posterior (MAP estimates) and the errors of the data, which importance sampling starts from.
 
-Fits start from several of the best members of an ensemble, on cells of four times the size where the grid can be
-coarsened so far, and are finished on ever finer ones. Fits that end at the same point count once.
+Fits start from several of the best members of an ensemble, or of points of the prior, on cells of four times the size
+where the grid can be coarsened so far, and are finished on ever finer ones. Fits that end at the same point count once.
 """
 
 from dataclasses import dataclass, replace
@@ -15,22 +15,18 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
 from vegglue.calibration.fit import MapEstimate, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error
-from vegglue.case.parameter_space import z_at
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
-from vegglue.engine.model import coarser, ever_coarser
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import fit_members
+from vegglue.inference.tried_members import TriedMembers, grids_of
 from vegglue.parallel import in_threads, side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
-from vegglue.results.ensemble import Ensemble
 from vegglue.screening.residual_screening import noise_given_all
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
 # prior]. Chosen, not measured: more starts find more modes and each costs a fit.
 MOST_STARTS, BEST_MEMBERS, START_DISTANCE = 4, 64, 0.7
-# Grids that fits go through: chosen. With the third the search for modes of the demo takes 24 s of one core, not 31; a
-# fourth hardly resolves a section.
-MOST_GRIDS = 3
 # Rise of the objective [-] above that of the best mode from which a mode is left out: its weight is below exp(-15).
 NEGLIGIBLE_MODE = 30.0
 
@@ -52,14 +48,12 @@ class FoundModes:
         return linearise_from(coarse, z, near)
 
 
-def find_modes(model: Model, noise: Noise, ensemble: Ensemble, watch: Watch = silent) -> FoundModes:
+def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch = silent) -> FoundModes:
     """The modes of the posterior under given errors.
 
     Errors: InputError when no steady flow is found from any of the members.
     """
-    starts = starting_points(noise, z_at(model.case, ensemble.parameters), ensemble.prediction)
-    places = ever_coarser(model.case, model.site)[-MOST_GRIDS:]
-    grids = [replace(model, case=case, site=site) for case, site in places]
+    starts, grids = starting_points(noise, tried.z, tried.prediction), grids_of(model)
     before: list[MapEstimate] = []
     ends = _apart(_fit_all(grids[0], noise, starts, watch))
     for coarse, finer in pairwise(grids):
@@ -159,16 +153,16 @@ class ModesAndErrors:
     grid_error_known: bool
 
 
-def modes_and_errors(model: Model, ensemble: Ensemble, rule: str, watch: Watch = silent) -> ModesAndErrors:
-    """The modes from the best members of an ensemble; then the errors, and the modes under these.
+def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch = silent) -> ModesAndErrors:
+    """The modes from the best of the members that were tried; then the errors, and the modes under these.
 
     rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
     model as the case allows it. rule best-member: errors of one size for each kind of measurement, from the residual at
     the best mode (which holds both). The correlation along a section is estimated in both, see `estimate_noise`.
     Errors: InputError when a standard error is missing (known) or no flow is found.
     """
-    noise = _initial_noise(model, ensemble, rule)
-    modes = find_modes(model, noise, ensemble, watch)
+    noise = _initial_noise(model, tried, rule)
+    modes = find_modes(model, noise, tried, watch)
     watch(Progress("estimating the errors"))
     fits, coarse = list(modes.fits), coarser(model)
     on_coarse = None if coarse is None else modes.coarse_point(coarse)
@@ -198,10 +192,10 @@ def standardised_residual(noise: Noise, point: Point) -> Array:
     return np.asarray(force / np.sqrt(np.diag(projected)))
 
 
-def _initial_noise(model: Model, ensemble: Ensemble, rule: str) -> Noise:
+def _initial_noise(model: Model, tried: TriedMembers, rule: str) -> Noise:
     if rule == "known":
         return noise_of(model.station)
-    sigma = fit_members(ensemble, model.station, rule).sigma
+    sigma = fit_members(tried.prediction, model.station, rule).sigma
     return noise_of(model.station.assign(standard_error=np.nan), sigma)
 
 

@@ -1,4 +1,5 @@
-"""A posterior by importance sampling around the best fits, which are searched from the best members of an ensemble.
+"""A posterior by importance sampling around the best fits, which are searched from the best members of an ensemble, or
+from points of the prior where there is none.
 
     p(z | y) ~ exp(-|W (y - f(z))|^2 / 2 - |z|^2 / 2),   W' W the inverse covariance of the errors
 
@@ -27,6 +28,7 @@ from vegglue.inference.map_and_errors import ModesAndErrors, modes_and_errors
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.refinement_summary import precision_of, refinement_of
 from vegglue.inference.student_mixture import Mixture, mixture_at_modes
+from vegglue.inference.tried_members import members_of, points_of_prior
 from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
@@ -42,21 +44,27 @@ DRAWN_WITHIN = 0.02
 
 
 def refine(
-    ensemble: Ensemble, case: Case, observations: Observations, watch: Watch = silent, engine: Engine = NEWTON
+    ensemble: Ensemble | None, case: Case, observations: Observations, watch: Watch = silent, engine: Engine = NEWTON
 ) -> Posterior:
     """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict unseen data.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
     or no flow is found from the best members.
     """
-    check_stations(ensemble, observations.table)
-    base = modes_and_errors(model_of(case, observations, engine), ensemble, case.infer.sigma, watch)
+    model = model_of(case, observations, engine)
+    if ensemble is None:
+        watch(Progress("trying points of the prior"))
+        tried = points_of_prior(model)
+    else:
+        check_stations(ensemble, observations.table)
+        tried = members_of(ensemble, model)
+    base = modes_and_errors(model, tried, case.infer.sigma, watch)
     run = partial(predict, solved_for(base.model, base.noise), [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
     finished = counted(watch, f"drawing around {len(base.fits)} mode(s)", EFFECTIVE_DRAWS, "effective draws")
     drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
     watch(Progress("summing up"))
-    posterior = _posterior(base, drawn, ensemble)
+    posterior = _posterior(base, drawn, "" if ensemble is None else ensemble.config_hash)
     return replace(
         posterior,
         refinement=refinement_of(base, drawn, posterior.sample.best),
@@ -94,7 +102,7 @@ def mixture_around(fits: tuple[MapEstimate, ...]) -> Mixture:
     return mixture_at_modes(np.stack([one.point.z for one in fits]), covariances, mass)
 
 
-def _posterior(base: ModesAndErrors, drawn: Sample, ensemble: Ensemble) -> Posterior:
+def _posterior(base: ModesAndErrors, drawn: Sample, ensemble_hash: str) -> Posterior:
     """What follows from the draws alone; `refine` adds `refinement` and `transfer`."""
     case, station, noise = base.model.case, base.model.station, base.noise
     error = noise.among_all(np.sqrt(np.diag(covariance_of(noise))), len(station))
@@ -104,7 +112,7 @@ def _posterior(base: ModesAndErrors, drawn: Sample, ensemble: Ensemble) -> Poste
         likelihood="gaussian",
         sigma_rule=case.infer.sigma,
         threshold=-np.inf,
-        ensemble_hash=ensemble.config_hash,
+        ensemble_hash=ensemble_hash,
         seed=case.simulate.seed,
         version=VERSION,
     )

@@ -147,7 +147,9 @@ def _of_posterior(posterior: Posterior) -> Iterator[str]:
         yield "a few members carry most of the weight, so that the parameters are less sure than they look"
 
 
-def _of_ensemble(ensemble: Ensemble) -> Iterator[str]:
+def _of_ensemble(ensemble: Ensemble | None) -> Iterator[str]:
+    if ensemble is None:
+        return
     failed = members_with(ensemble.status, FAILED)
     if failed > FAILED_TOLERATED * len(ensemble.status):
         yield f"{failed:,} of {count(len(ensemble.status), 'member')} failed"

@@ -75,8 +75,7 @@ def findings(run: Run) -> list[Finding]:
         *_flagged(observations),
         *_discharge(case, observations),
         _weights(posterior, notation),
-        _members(run.ensemble),
-        *_mass(run.ensemble),
+        *([] if run.ensemble is None else [_members(run.ensemble), *_mass(run.ensemble)]),
         *_engine(case),
     ]
     return sorted(found, key=lambda finding: not finding.doubt)

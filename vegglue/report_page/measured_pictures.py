@@ -24,6 +24,8 @@ from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import fitted_curve
 from vegglue.report_page.key_numbers import measurement_error
 from vegglue.report_page.run import Run, published_picture, station_zones
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.posterior import Posterior
 
 
 def residuals(run: Run) -> Iterator[Picture]:
@@ -141,22 +143,25 @@ def _stretch(verticals: list[Vertical]) -> float:
     return 1.5 * spacing / max(float(vertical.velocity.max()) for vertical in verticals)
 
 
-def weights_of_ensemble(run: Run) -> np.ndarray:
+def weights_of_ensemble(posterior: Posterior, ensemble: Ensemble) -> np.ndarray:
     """Of the members that were simulated, also where the posterior was drawn anew."""
-    if run.posterior.settings.method == "glue":
-        return run.posterior.sample.weights
-    fit = fit_members(run.ensemble, run.posterior.station, run.posterior.settings.sigma_rule)
+    if posterior.settings.method == "glue":
+        return posterior.sample.weights
+    fit = fit_members(ensemble.prediction, posterior.station, posterior.settings.sigma_rule)
     return member_weights(fit, "gaussian", -np.inf)
 
 
 def discharges(run: Run) -> Iterator[Picture]:
-    """Discharge by each rule beside what the model let through, for each ADV section."""
-    sections = [name for name, _ in run.ensemble.sections]
+    """Discharge by each rule beside what the model let through, for each ADV section; none without an ensemble."""
+    ensemble = run.ensemble
+    if ensemble is None or ensemble.by_command:  # a command says nothing of what passes a section
+        return
+    sections = [name for name, _ in ensemble.sections]
     for (experiment, section), rules in run.observations.discharge.items():
-        if section not in sections or run.ensemble.by_command:  # which says nothing of what passes a section
+        if section not in sections:
             continue
-        through = run.ensemble.section_flow[:, run.ensemble.experiments.index(experiment), sections.index(section)]
-        spread = weighted_quantile(through, weights_of_ensemble(run), [0.025, 0.5, 0.975])
+        through = ensemble.section_flow[:, ensemble.experiments.index(experiment), sections.index(section)]
+        spread = weighted_quantile(through, weights_of_ensemble(run.posterior, ensemble), [0.025, 0.5, 0.975])
         names = {"paper": "linear interpolation", "profile": "profile fit"}
         rows = [(names.get(rule, rule), found.value, found.standard_error) for rule, found in rules.items()]
         values = ", ".join(f"{plus_minus(value, error)} m³/s by {name}" for name, value, error in rows)

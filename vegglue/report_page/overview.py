@@ -86,8 +86,9 @@ def _page(run: Run) -> str:
 
 def _row(run: Run) -> OverviewRow:
     posterior = run.posterior
-    size, members = posterior.weighting.effective_size, len(run.ensemble.status)
-    drawn = f", {posterior.sample.members:,} drawn" if posterior.refinement else ""
+    size = posterior.weighting.effective_size
+    members = [] if run.ensemble is None else [f"{len(run.ensemble.status):,}"]
+    drawn = [f"{posterior.sample.members:,} drawn"] if posterior.refinement else []
     method = METHODS["refine" if posterior.refinement else "glue"]
     return OverviewRow(
         run.case.name,
@@ -95,7 +96,7 @@ def _row(run: Run) -> OverviewRow:
         _page(run),
         headline(run),
         method,
-        f"{members:,}{drawn}",
+        ", ".join(members + drawn),
         f"{max(size, 1.0):,.0f}",
     )
 

@@ -51,10 +51,10 @@ def render(run: Run) -> str:
         pictures=pictures(run),
         stations=stations,
         flagged=[row for row in stations if row.reason],
-        member_counts=member_counts(run.ensemble),
-        failure_reasons=failure_reasons(run.ensemble),
+        member_counts=[] if run.ensemble is None else member_counts(run.ensemble),
+        failure_reasons=[] if run.ensemble is None else failure_reasons(run.ensemble),
         health_facts=list(health_facts(run)),
-        health_words=health_in_words(run.ensemble),
+        health_words=health_in_words(run),
         provenance=list(provenance(run)),
         config=resolved_yaml(run.case),
     )

@@ -61,13 +61,21 @@ def _drawn_parameter(run: Run, name: str) -> DrawnParameter:
     values = run.posterior.sample.theta[name]
     return DrawnParameter(
         values,
-        run.ensemble.parameters[name],
+        _prior_values(run, name),
         float(low) if np.isfinite(low) and (low > 0 or not logarithmic) else float(values.min()),
         float(high) if np.isfinite(high) else float(values.max()),
         logarithmic,
         run.case.parameters[name].symbol or name,
         run.posterior.sample.unit[name],
     )
+
+
+def _prior_values(run: Run, name: str) -> np.ndarray:
+    """Members of the prior: those of the ensemble, or those that were drawn beside the posterior."""
+    if run.ensemble is not None:
+        return run.ensemble.parameters[name]
+    assert run.posterior.refinement is not None  # without an ensemble nothing but draws is a posterior
+    return run.posterior.refinement.draws.prior_theta[name]
 
 
 def _references(run: Run, name: str) -> list[ReferenceValue]:

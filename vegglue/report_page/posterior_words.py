@@ -184,7 +184,9 @@ def canopy_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> li
 def search_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
     """How a refined posterior was found: search, modes and draws first, then the errors they were weighed by."""
     modes, sample = refined.modes, posterior.sample
-    starts = f"{modes.starts} of the best members were followed" if modes.starts > 1 else "The best member was followed"
+    one = "member" if posterior.settings.ensemble_hash else "point of the prior"
+    many = one.replace("member", "members").replace("point", "points")
+    starts = f"{modes.starts} of the best {many} were followed" if modes.starts > 1 else f"The best {one} was followed"
     return [
         f"{starts} downhill and ended in {_modes(posterior, modes)}; {sample.members} members were drawn around, "
         f"{sample.failed or 'none'} of them failed (no weight).",

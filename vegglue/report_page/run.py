@@ -45,15 +45,16 @@ class LoopResults:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything a report may show. flow: the flow of the median parameters, by experiment; cylinder: if surveyed;
-    diagnosis: if there is one of this case; loop: what else is known of what it lacks.
+    """Everything a report may show. ensemble: None where the posterior needed none; flow: the flow of the median
+    parameters, by experiment; cylinder: if surveyed; diagnosis: if there is one of this case; loop: what else is known
+    of what it lacks.
     """
 
     folder: Path
     case: Case
     site: Site
     observations: Observations
-    ensemble: Ensemble
+    ensemble: Ensemble | None
     posterior: Posterior
     flow: dict[str, FlowFields]
     cylinder: RigidCylinder | None

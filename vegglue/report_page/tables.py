@@ -203,10 +203,13 @@ def member_counts(ensemble: Ensemble) -> list[tuple[str, int, str]]:
     return [(word, number, percent(number / len(ensemble.status))) for word, number in counts]
 
 
-def health_in_words(ensemble: Ensemble) -> str:
-    """How many members there are and how many failed (text)."""
-    failed = members_with(ensemble.status, FAILED)
-    return f"{count(len(ensemble.status), 'member')}, {failed or 'none'} of them failed"
+def health_in_words(run: Run) -> str:
+    """How many members there are, or draws without an ensemble, and how many failed (text)."""
+    if run.ensemble is None:
+        sample = run.posterior.sample
+        return f"{count(sample.members, 'draw')}, {sample.failed or 'none'} of them failed"
+    failed = members_with(run.ensemble.status, FAILED)
+    return f"{count(len(run.ensemble.status), 'member')}, {failed or 'none'} of them failed"
 
 
 def failure_reasons(ensemble: Ensemble) -> list[tuple[str, int]]:
@@ -217,24 +220,29 @@ def failure_reasons(ensemble: Ensemble) -> list[tuple[str, int]]:
 
 def health_facts(run: Run) -> Iterator[tuple[str, str]]:
     """Mass errors, weights and iterations, by which the numbers are trusted or not: a name and a value each."""
-    ensemble, posterior = run.ensemble, run.posterior
-    solved = ensemble.status != FAILED
-    if not ensemble.by_command:
-        yield "largest mass error of a member", short(largest_mass_error(ensemble), 2)
+    posterior = run.posterior
+    if run.ensemble is not None and not run.ensemble.by_command:
+        yield "largest mass error of a member", short(largest_mass_error(run.ensemble), 2)
     yield "effective members", f"{posterior.weighting.effective_size:,.0f} of {posterior.sample.members:,}"
     yield "largest weight", percent(posterior.weighting.largest_weight)
     yield "tail of the weights, k̂", f"{fixed(posterior.weighting.pareto_k, 2)} (to be trusted below {TRUSTED_K_HAT})"
+    if run.ensemble is not None:
+        yield from _work_done(run.ensemble)
+    for name in posterior.parameters:
+        low, high = posterior.marginals.bound_mass[name]
+        yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
+
+
+def _work_done(ensemble: Ensemble) -> Iterator[tuple[str, str]]:
+    """Iterations and time of its members."""
     if not ensemble.by_command:
-        most = ensemble.iterations.max()
-        yield "iterations of a solved member", f"{np.median(ensemble.iterations[solved]):.0f} (most {most})"
+        of_solved = ensemble.iterations[ensemble.status != FAILED]
+        yield "iterations of a solved member", f"{np.median(of_solved):.0f} (most {ensemble.iterations.max()})"
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
     yield (
         "time of the runs" if ensemble.by_command else "processor time",
         f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
     )
-    for name in posterior.parameters:
-        low, high = posterior.marginals.bound_mass[name]
-        yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
 
 
 def _duration(seconds: float) -> str:
@@ -252,8 +260,8 @@ def provenance(run: Run) -> Iterator[tuple[str, str]]:
     numerics, infer = run.case.numerics, run.case.infer
     yield "config", run.case.source.name
     yield "hash of config and data", case_hash(run.case)[:16]
-    yield "seed", str(run.ensemble.seed)
-    yield "vegglue", run.ensemble.version
+    yield "seed", str(run.posterior.settings.seed)
+    yield "vegglue", run.posterior.settings.version
     yield "Python", platform.python_version()
     yield (
         "grid",

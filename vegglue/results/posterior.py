@@ -35,7 +35,7 @@ class InferenceSettings:
     likelihood: str  # gaussian, nse or inverse-variance
     sigma_rule: str  # best-member or known
     threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
-    ensemble_hash: str  # config hash of the ensemble
+    ensemble_hash: str  # config hash of the ensemble, '' where none was needed
     seed: int
     version: str
 

@@ -170,6 +170,11 @@ def part_file(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def begun_or_finished(path: Path) -> bool:
+    """Whether a result is there, or a part of one that was stopped."""
+    return path.exists() or part_file(path).exists()
+
+
 def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header, kept: KeptRows | None) -> None:
     """All room a run will need, the fields first: a part of an ensemble without its fields cannot be.
 

@@ -15,6 +15,7 @@ from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.storage.result_files import read_ensemble, write_posterior
+from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.command_model import with_command
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size
@@ -36,10 +37,12 @@ def infer(
     """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
     runs/<name>/posterior.h5, and the flow of their medians in flow.h5.
 
-    ensemble: the one of this case, whose size counts then; read from the folder if not given. method: `refine` or
-    `glue` instead of the case's. members: size of the ensemble instead of the case's.
+    ensemble: the one of this case, whose size counts then; read from the folder if not given. Where none is there,
+    `refine` begins with points of the prior. method: `refine` or `glue` instead of the case's. members: size of the
+    ensemble instead of the case's.
 
-    Errors: InputError when there is no ensemble of this case, or its likelihood cannot be refined.
+    Errors: InputError when there is none and it is needed, or it is of another state of the case, or the likelihood
+    cannot be refined.
     """
     case = of_size(case, members if ensemble is None else len(ensemble.status))
     wanted = case_hash(case)  # before anything is read: what changes meanwhile then makes the result out of date
@@ -49,11 +52,14 @@ def infer(
             f"{case.name}: expected a station in use, got none: nothing can be inferred; `vegglue check` says why."
         )
     folder = folder_of(runs, case)
+    chosen = chosen_method(case, method)
     if ensemble is None:
-        ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
+        if members is not None or needs_ensemble(case, chosen) or begun_or_finished(folder / "ensemble.h5"):
+            ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
     elif ensemble.config_hash != simulation_hash(case):
         raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
-    if chosen_method(case, method) == "glue":
+    if chosen == "glue":
+        assert ensemble is not None
         posterior = glue(ensemble, case, observations)
     else:
         with at_most(jobs):
@@ -63,6 +69,11 @@ def infer(
     with at_most(jobs):
         median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior
+
+
+def needs_ensemble(case: Case, method: Method) -> bool:
+    """Whether a posterior is made of the members of an ensemble: by GLUE, or with a command, whose runs are dear."""
+    return method == "glue" or case.engine is not None
 
 
 def chosen_method(case: Case, asked: Method | None) -> Method:

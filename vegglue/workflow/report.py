@@ -14,17 +14,19 @@ from vegglue.report_page.run import LoopResults, Run
 from vegglue.site.gridded_site import build_site
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
+from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import as_solved, folder_of, of_size
 
 
 @one_thread()
 def report(case: Case, *, runs: Path | str = "runs", members: int | None = None, watch: Watch = silent) -> Path:
-    """Write runs/<name>/report.html and figures/ from the ensemble, the posterior and, where they fit, the diagnosis,
-    the comparison and the questions kept there; returns the page. members: size of the ensemble, if not given that of
-    the one there is.
+    """Write runs/<name>/report.html and figures/ from the posterior, its ensemble if it has one and, where they fit,
+    the diagnosis, the comparison and the questions kept there; returns the page. members: size of the ensemble, if not
+    given that of the one there is.
 
-    Errors: InputError when there is no ensemble or posterior of this case; StorageError when a file cannot be written.
+    Errors: InputError when there is no posterior of this case, or its ensemble is gone or of another state of it;
+    StorageError when a file cannot be written.
     """
     sized = as_solved(case, folder_of(runs, case)) if members is None else of_size(case, members)
     known = results_of(sized, case, runs)
@@ -38,12 +40,16 @@ def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = 
     """All that is kept of a run but its flow. sized: the case with as many members as its ensemble has, which is all
     that a diagnosis does not depend on; above: the folder of all runs, seen from the page that is made.
 
-    Errors: InputError when there is no ensemble or posterior of this case; StorageError for a broken file.
+    Errors: as those of `report`; StorageError for a broken file, too.
     """
     observations = read_observations(sized)
     folder = folder_of(runs, case)
-    ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(sized))
+    path, ensemble = folder / "ensemble.h5", None
+    if begun_or_finished(path):
+        ensemble = read_ensemble(path, simulation_hash(sized))
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
+    if ensemble is None and posterior.settings.ensemble_hash:
+        read_ensemble(path)  # says that it is gone
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
     loop = loop_results_of(case, runs, above)

@@ -12,11 +12,12 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.result_files import stored_hash
+from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
-from vegglue.workflow.infer import infer
+from vegglue.workflow.infer import chosen_method, infer, needs_ensemble
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of, of_size
 from vegglue.workflow.simulate import is_simulated, refuse_to_shrink, simulate
@@ -38,8 +39,9 @@ def run(
     show: Show = _unseen,
     force: bool = False,
 ) -> StepwiseExtension:
-    """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then ensemble,
-    posterior and report of the last child, or of the case if there is none. What is up to date is not made again. Where
+    """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then
+    posterior and report of the last child, or of the case if there is none, and an ensemble where `members` are asked
+    for, one is there, or the posterior needs it. What is up to date is not made again. Where
     none of the known effects explains the misfit, and it is not at a place, a law is searched that does, and kept where
     errors fall with it. members: size of the ensemble instead of the case's; force: replace a child that was edited by
     hand and a larger ensemble, too.
@@ -64,7 +66,8 @@ def run(
     show(last, f"Ladder drawn in {folder_of(runs, last) / 'ladder.png'}; last config: {last.source}")
     # A posterior of the case without what it lacks would be of a model that is known to be wrong. What the diagnosis
     # said is of the case, whatever its size.
-    if _has_posterior(of_size(last, members), runs, jobs, watch, show, force):
+    wanted = members is not None or _is_wanted(last, runs)
+    if _has_posterior(of_size(last, members), wanted, runs, jobs, watch, show, force):
         from vegglue.workflow.report import report
 
         show(last, report(last, runs=runs, members=members, watch=watch))
@@ -98,12 +101,23 @@ def _with_a_law(
     return law.child
 
 
-def _has_posterior(case: Case, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool) -> bool:
-    """Makes the ensemble and the posterior of a case where they are not up to date; False where it has none."""
-    folder = folder_of(runs, case)
-    current = is_simulated(case, runs)
-    ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
-    show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
+def _is_wanted(case: Case, runs: Path | str) -> bool:
+    """Whether an ensemble is to be made: the posterior needs it, its fields are to be kept, or there was one."""
+    there = begun_or_finished(Path(runs) / case.name / "ensemble.h5")
+    return there or case.simulate.fields is not None or needs_ensemble(case, chosen_method(case, None))
+
+
+def _has_posterior(
+    case: Case, wanted: bool, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
+) -> bool:
+    """Makes the ensemble, if `wanted`, and the posterior of a case where they are not up to date; False where it has no
+    posterior.
+    """
+    folder, ensemble = folder_of(runs, case), None
+    if wanted:
+        current = is_simulated(case, runs)
+        ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
+        show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
     if stored_hash(folder / "posterior.h5") == case_hash(case):
         show(case, f"{folder / 'posterior.h5'} is up to date.")
     else:
