@@ -233,7 +233,7 @@ def test_threshold_out_of_reach_is_told() -> None:
 def test_missing_standard_errors_are_told() -> None:
     table = stations(measured(), SIGMA)
     table.loc[2, "standard_error"] = math.nan
-    with pytest.raises(InputError, match=r"1 of 5 have none, the first at x = 2\.5 m"):
+    with pytest.raises(InputError, match=r"stated for 1 of velocity, the first at x = 2\.5"):
         infer(table, sigma="known")
 
 
