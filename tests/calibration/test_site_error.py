@@ -23,7 +23,7 @@ def flowing() -> tuple[Model, Point]:
 
 @pytest.fixture(scope="module")
 def cells(flowing: tuple[Model, Point]) -> CellResponses:
-    return cell_responses(*flowing, ("friction",))
+    return cell_responses(*flowing, ("friction", "drag"))
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,9 @@ def test_a_side_further_out_is_a_larger_patch(
     moved = first.model_copy(update={"y": (first.y[0], first.y[1] + cell)})
     plants = model.case.plants.model_copy(update={"patches": (moved, *others)})
     true = change(flowing, model.case.model_copy(update={"plants": plants}))
-    found = max((cell * column for column in columns["edges"].T), key=lambda one: float(one @ true))
+    outwards, inwards = columns["edges"][:, 0::2].T, columns["edges"][:, 1::2].T
+    sides = cell * np.sqrt(2.0) * (outwards if sign > 0.0 else inwards)
+    found = max(sides, key=lambda one: float(one @ true))
     assert found @ true > alike * np.linalg.norm(found) * np.linalg.norm(true)
     assert 0.4 < np.linalg.norm(found) / np.linalg.norm(true) < 2.5
 

@@ -44,7 +44,7 @@ PAIRS = (
 )  # fmt: skip
 # Sets of the editions before were seen when errors of a site, the prior of viscosity and rules of the diagnosis were
 # chosen.
-EDITION = "fourth edition: "
+EDITION = "fifth edition: "
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ def place_of(study: str, number: int) -> tuple[TwinBase, Array]:
     z = true_place(len(model.names), number)
     here, coarse = linearise(model, z), coarser(model)
     on_coarse = None if coarse is None else linearise(coarse, z)
-    if here is None or on_coarse is None or coarse is None:
+    if here is None or on_coarse is None:
         raise InputError(f"{study}: no steady flow at place {number}")
     base = TwinBase(model, model, here, here, here.prediction - on_coarse.prediction)
-    return base, model_error_columns(coarse, on_coarse, model.case.model_error)
+    return base, model_error_columns(model, here, model.case.model_error)
 
 
 def place_number(trial: Trial) -> int:

@@ -66,6 +66,15 @@ def search_model(base: Baseline) -> SearchModel:
     return SearchModel(base.coarse, replace(base.noise, value=base.noise.value - shift), base.on_coarse)
 
 
+def model_that_errs(base: Baseline) -> SearchModel:
+    """The model on the cells from which its own error is told: those of the case where sides of patches may lie off,
+    since cells of twice the size do not resolve what water does there; else those of the search.
+    """
+    if base.model.case.model_error.edges:
+        return SearchModel(base.model, base.noise, base.fitted.point)
+    return search_model(base)
+
+
 def baseline(model: Model, known: Array | None = None) -> Baseline:
     """The calibrated model, from z = `known` (p,), else from the best points of the prior on coarse grids.
 
@@ -84,7 +93,7 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     start = None if z is None else linearise_from(model, z, near)
     first = with_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
     base = with_error_of_grid(with_coarse_point(first))
-    if near is not None and base.noise.model_error.any() and _is_near(base, near.z):
+    if _has_own_error(base) and near is not None and _is_near(base, near.z):
         return with_coarse_point(base)
     # The model's own error moves the best place, and is another there.
     return with_own_error(base)
@@ -118,6 +127,11 @@ def with_error_of_grid(base: Baseline) -> Baseline:
     return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
 
 
+def _has_own_error(base: Baseline) -> bool:
+    """Whether the noise holds the model's own error, from the cells that it takes."""
+    return bool(base.noise.model_error.any()) and not base.model.case.model_error.edges
+
+
 def _is_near(base: Baseline, z: Array) -> bool:
     """Whether the best place lies within FAR_MOVED standard errors of z (p,) in every parameter."""
     moved = np.abs(base.fitted.point.z - z) / np.sqrt(np.diag(base.fitted.covariance))
@@ -129,8 +143,8 @@ def with_own_error(base: Baseline) -> Baseline:
     allowed = base.model.case.model_error
     if not any_error(allowed):
         return base
-    search = search_model(base)
-    noise = with_model_error(base.noise, model_error_columns(search.model, search.point, allowed))
+    where = model_that_errs(base)
+    noise = with_model_error(base.noise, model_error_columns(where.model, where.point, allowed))
     fitted = fit(base.model, noise, base.fitted.point)
     return with_coarse_point(replace(base, noise=noise, fitted=fitted))
 

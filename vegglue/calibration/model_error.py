@@ -85,7 +85,7 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
     if not any_error(allowed):
         return np.zeros((len(model.station), 0))
     objects = unlisted_in(model.case)
-    terms = dict.fromkeys(("friction", "bed", *(one.term for one in objects)))
+    terms = dict.fromkeys(("friction", "drag", "bed", *(one.term for one in objects)))
     responses, half, grid = cell_responses(model, point, tuple(terms)), half_width(model.site), model.site.grid
     friction = bumps(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
     bed = bumps(grid, BED_RADIUS * half, BED_RADIUS * half)

@@ -16,7 +16,7 @@ import pandas as pd
 import scipy.linalg
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, search_model
+from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import linearise
@@ -32,9 +32,9 @@ def largest_error_between(base: Baseline) -> float:
     """The root mean square of e and the errors of the data, over that of those alone [-]: so much in SHARE_BELOW of the
     cases. NaN where there are no velocities, or the flow is not found.
     """
-    search = search_model(base)
+    where = model_that_errs(base)
     seen = base.model.station["kind"].to_numpy()[base.noise.rows] == STREAMWISE
-    found = _errors_between(search)
+    found = _errors_between(where)
     if found is None or not seen.any():
         return float("nan")
     mean, covariance = found
@@ -53,19 +53,19 @@ def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
     return velocity.assign(x=np.minimum(velocity["x"] + middle.map(ahead), end))
 
 
-def _errors_between(search: SearchModel) -> tuple[Array, Array] | None:
+def _errors_between(where: SearchModel) -> tuple[Array, Array] | None:
     """Mean (m,) and covariance (m, m) of e [m/s], None where no flow is found."""
-    model, noise = search.model, search.noise
+    model, noise = where.model, where.noise
     both = pd.concat([model.station, halfway(model.station, model.case.grid.x[1])], ignore_index=True)
     wide, count = replace(model, station=both), len(model.station)
-    point = linearise(wide, search.point.z, search.point)
+    point = linearise(wide, where.point.z, where.point)
     if point is None or len(both) == count:
         return None
     # A probe beside its place reads another place, and is no error of the model there.
     allowed = model.case.model_error.model_copy(update={"probes": 0.0})
     columns = np.hstack([point.slope, model_error_columns(wide, point, allowed)])
     at_stations, there = columns[:count][noise.rows], columns[count:]
-    whole, residual = free_of_prior(search)
+    whole, residual = free_of_prior(where)
     factor = scipy.linalg.cho_factor(whole, lower=True)
     shared = at_stations @ there.T
     mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - point.slope[count:] @ point.z
