@@ -131,8 +131,14 @@ def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
     hidden = OpenQuestion("eddies from a change of k_s", (replace(GAUGE, enough=False),))
     unknown = OpenQuestion("eddies from wind", ())
     steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden, unknown))))
-    said = "to see whether eddies hides behind a change of k_s; nor to tell eddies from wind."
-    assert steps == [f"No single measurement would do {said}"]
+    said = "to test eddies, which a change of k_s hides; nor to tell eddies from wind."
+    assert list(map(plain, steps)) == [f"No single measurement would do {said}"]
+
+
+def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:
+    hidden = OpenQuestion("steep_bank from a change of k_s", (GAUGE,))
+    (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden,))))
+    assert "to test “Steep banks touch more water than their width says” (steep_bank), which a change" in plain(step)
 
 
 def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from vegglue.effects.library import library
 from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
@@ -280,5 +281,12 @@ def _to_see(question: OpenQuestion) -> str:
     """What a question asks, as a purpose."""
     one, hidden, other = question.tells_apart.partition(HIDDEN_BEHIND)
     if hidden:
-        return f"to see whether {html.escape(one)} hides behind a change of {html.escape(other)}"
+        return f"to test {_told(one)}, which a change of <code>{html.escape(other)}</code> hides"
     return f"to tell {html.escape(question.tells_apart)}"
+
+
+def _told(name: str) -> str:
+    """'“Steep banks touch more water than their width says” (steep_bank)': an effect of the library by its title."""
+    known = library().get(name.partition("[")[0])
+    code = f"<code>{html.escape(name)}</code>"
+    return f"“{html.escape(known.title.partition(':')[0])}” ({code})" if known is not None else code

@@ -67,7 +67,7 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     """Four to six numbers for the first screen."""
     parameters = [
         KeyNumber(symbol(case, name), estimate(posterior, name), _remark(posterior, name))
-        for name in posterior.parameters[:PARAMETERS_SHOWN]
+        for name in _first_read(case, posterior)[:PARAMETERS_SHOWN]
     ]
     kind = next(iter(posterior.fit.sigma))
     error = measurement_error(posterior, kind)
@@ -80,6 +80,12 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     effective = f"{posterior.weighting.effective_size:,.0f}"
     size = KeyNumber("effective members", effective, f"of {posterior.sample.members:,}")
     return [*parameters, sigma, size]
+
+
+def _first_read(case: Case, posterior: Posterior) -> list[str]:
+    """The parameters, those of effects first: they are what was found."""
+    added = {value for effect in case.effects.values() for value in effect.values.values() if isinstance(value, str)}
+    return sorted(posterior.parameters, key=lambda name: name not in added)
 
 
 def _remark(posterior: Posterior, name: str) -> str:
