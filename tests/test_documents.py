@@ -2,15 +2,19 @@
 
 import json
 import re
+import shlex
 import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from reach import ENVIRONMENT, ROOT, block, command
+import typer
+import yaml
+from reach import ENVIRONMENT, ROOT, block, command, write_reach
 
 import vegglue
+from vegglue.cli.main import app
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.
@@ -83,6 +87,41 @@ def test_links_lead_somewhere(page: Path) -> None:
         if anchor:
             titles = re.findall(r"^#+ (.*)$", there.read_text(encoding="utf-8"), re.MULTILINE)
             assert anchor in [re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles]
+
+
+def lines_of_shell(page: Path) -> list[str]:
+    """Every `vegglue ...` that a page shows: in blocks of shell, and in the middle of its sentences."""
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    shown = [line.removeprefix("$ ").strip() for part in blocks for line in part.splitlines()]
+    spoken = [" ".join(words.split()) for words in re.findall(r"(?<!`)`(vegglue [^`]+)`", text)]
+    return [line for line in [*shown, *spoken] if line.startswith("vegglue ")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_options_that_are_shown_exist(page: Path) -> None:
+    commands = typer.main.get_group(app).commands
+    for line in lines_of_shell(page):
+        _, name, *rest = shlex.split(line, comments=True)
+        if not name.islower():  # COMMAND, or ...
+            continue
+        known = {option for parameter in getattr(commands.get(name), "params", []) for option in parameter.opts}
+        options = {word.partition("=")[0] for word in rest if re.match("--?[a-z]", word)}
+        assert name in commands or name.startswith("--"), line
+        assert options <= known | {"--help"}, line
+
+
+@pytest.mark.parametrize(
+    ("page", "key"), [("bends", "grid"), ("diagnosis", "model_error")], ids=lambda argument: argument
+)
+def test_keys_that_are_shown_make_a_case(tmp_path: Path, page: str, key: str) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    found = re.search(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert found
+    config = write_reach(tmp_path)
+    config.write_text(yaml.safe_dump(yaml.safe_load(config.read_text("utf-8")) | yaml.safe_load(found[1])), "utf-8")
+    assert key in yaml.safe_load(found[1])
+    vegglue.load_case(config)
 
 
 def test_the_readme_fits_two_screens() -> None:
