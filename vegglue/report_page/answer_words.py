@@ -289,4 +289,4 @@ def _told(name: str) -> str:
     """'“Steep banks touch more water than their width says” (steep_bank)': an effect of the library by its title."""
     known = library().get(name.partition("[")[0])
     code = f"<code>{html.escape(name)}</code>"
-    return f"“{html.escape(known.title.partition(':')[0])}” ({code})" if known is not None else code
+    return f"“{html.escape(known.title)}” ({code})" if known is not None else code
