@@ -48,6 +48,8 @@ def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
     save(draw_diagnosis(diagnosis, outlines(case)), path, dots_per_inch=130)
 
 
+# Width of a column of the misfit by zone [inch]: a square and two numbers stand in it.
+ZONE_WIDTH = 0.72
 # What the parts of the picture of a diagnosis show.
 TITLES = (
     "What would improve the fit, alone", "What leaves a like trace",
@@ -63,13 +65,14 @@ def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, size: str,
 @styled
 def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
-    figure = Figure(figsize=(14, 8.6), layout="constrained")
+    zones_width = max(4.7, 1.2 + ZONE_WIDTH * diagnosis.misfit.zones["zone"].nunique())
+    figure = Figure(figsize=(9.3 + zones_width, 8.6), layout="constrained")
     title = textwrap.fill(
         f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", VERDICT_LINE_LETTERS
     )
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
-    suspects, alike, zones = _split(upper, 1, 3, width_ratios=(1.25, 0.95, 1.1))
+    suspects, alike, zones = _split(upper, 1, 3, width_ratios=(5.3, 4.0, zones_width))
     for part, words in zip((suspects, alike, zones, lower), TITLES, strict=True):
         part.suptitle(words, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
