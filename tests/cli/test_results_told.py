@@ -12,6 +12,7 @@ from posteriors import changed
 from reach import COARSE, vegglue, write_reach
 
 from vegglue.cli.brief_posterior import COLUMNS, LINES, brief_posterior
+from vegglue.cli.output import left_out_of
 from vegglue.storage.result_files import read_posterior
 
 MEMBERS = 32
@@ -111,3 +112,18 @@ def test_help_lists_commands_as_they_are_used(tmp_path: Path) -> None:
     names = re.findall(r"^│ ([a-z]+) ", said, re.MULTILINE)
     assert names[:4] == ["new", "import", "check", "run"]
     assert names.index("diagnose") < names.index("extend") < names.index("compare") < names.index("next")
+
+
+@pytest.mark.parametrize(
+    ("width", "gone"),
+    [
+        (200, []),
+        (27, ["visible"]),
+        (19, ["chance", "visible"]),
+        (12, ["chance", "score", "visible"]),
+        (3, ["chance", "score", "visible"]),
+    ],
+)
+def test_a_narrow_window_loses_columns_and_no_names(width: int, gone: list[str]) -> None:
+    headings, rows = ("effect", "chance", "score", "visible"), [("streamlining", "7%", "+3", "0.9")]
+    assert left_out_of(headings, rows, ["score"], width) == gone

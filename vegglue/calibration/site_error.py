@@ -77,9 +77,7 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     return np.hstack(parts) / np.sqrt(2.0)
 
 
-def _side(
-    model: Model, cells: CellResponses, rate: Mapping[str, Array], index: int, axis: int, outwards: int
-) -> Array:
+def _side(model: Model, cells: CellResponses, rate: Mapping[str, Array], index: int, axis: int, outwards: int) -> Array:
     """O and I of one side of a patch (station, 2) [unit of a station per m]; rate k (nx, ny) [1/m] by experiment.
 
         O = (I + sum of dk / w over the cells beside it) / 2,   I = sum of dk / w over the cells within

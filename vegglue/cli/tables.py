@@ -3,15 +3,17 @@
 from collections.abc import Sequence
 
 import numpy as np
-from rich.table import Table
 
-from vegglue.cli.output import console
+from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.next_measurement import Question
+
+# Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
+FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
 
 
 def show_diagnosis(found: Diagnosis) -> None:
@@ -20,21 +22,19 @@ def show_diagnosis(found: Diagnosis) -> None:
     console().print(found.verdict.sentence)
     for remark in found.verdict.remarks:
         console().print(f"- {remark}")
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
-    for heading in headings:
-        table.add_column(heading, justify="left" if heading == "effect" else "right")
+    rows = []
     for one in found.suspects[:10]:
         share = f"{found.chances[one.name]:.0%}" if one.name in found.chances else ""
         amplitude, test, detectability = one.amplitude, one.test, one.detectability
         low, high = amplitude.interval95
         p_family = f"< {test.p_family:.1g}" if test.p_family < 5e-4 else f"{test.p_family:.2g}"
         unit = amplitude.unit.removesuffix("-")
-        table.add_row(
+        rows.append((
             one.name, share, f"{amplitude.value:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{test.score:+.1f}",
             p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
-        )  # fmt: skip
-    console().print(table)
+        ))  # fmt: skip
+    headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
+    print_table(headings, rows, headings[1:5])
     for off in found.instruments:
         at = ", ".join(f"{name} = {value:g}" for name, value in (("x", off.x), ("y", off.y)) if np.isfinite(value))
         console().print(f"- set aside: the {off.kind} at {at} m, {len(off.stations)} reading(s)")
@@ -48,24 +48,22 @@ def show_diagnosis(found: Diagnosis) -> None:
 def show_ladder(found: Comparison) -> None:
     """The error ladder as a table, what it leaves out, and which parameters differ between experiments."""
     rungs, note = found.rungs, exclusion_in_words(found.left_out)
-    table = Table(box=None, pad_edge=False, header_style="bold")
     others, validated = _other_kinds(rungs), any(np.isfinite(one.validation) for one in rungs)
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "held out (section)", "fell by", "held out (exp.)", "log score", "in 50 %", "in 95 %",
                 *(["validation"] if validated else []))  # fmt: skip
-    for heading in headings:
-        table.add_column(heading, justify="left" if heading == "model" else "right")
+    rows = []
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
         seen, scores = one.in_sample, one.predictive
-        table.add_row(
+        rows.append((
             one.name, str(len(one.values)), f"{seen.rmse[STREAMWISE]:.4f}", f"{seen.rmse[WATER_LEVEL]:.4f}",
             *(f"{seen.rmse[kind.name]:.4f}" for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
             f"{held_out_rmse(one):.4f}", gain, f"{held_out_rmse(one, 'experiments'):.4f}",
             f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}",
             *([f"{one.validation:.4f}"] if validated else []),
-        )  # fmt: skip
-    console().print(table)
+        ))  # fmt: skip
+    print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
     if rungs:
         console().print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
