@@ -109,8 +109,13 @@ def run_command(
             tell(of, runs, result, as_object)
 
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show, force=force)
+        extension = vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show, force=force)
     if as_object:
         from vegglue.cli.objects import run_object
 
         print_object(run_object(runs, results))
+    else:  # what was found scrolled by, with all that was done after it
+        from vegglue.workflow.discover import DiscoveredCase
+
+        laws = [result.found.sentence for _, result in results if isinstance(result, DiscoveredCase)]
+        print(" ".join(["In short:", extension.sentence, extension.reason, *laws]))
