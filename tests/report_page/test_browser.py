@@ -93,6 +93,25 @@ def test_experiments_and_models_are_switched(page: Path) -> None:
     assert said["after"] == ["none", "inline"]
 
 
+def test_paper_gets_what_is_folded_and_every_experiment(page: Path) -> None:
+    script = """(page, document) => {
+      const open = () => [...document.querySelectorAll("details")].map((one) => one.open);
+      const rest = open();
+      page.dispatchEvent(new page.Event("beforeprint"));
+      const printed = open();
+      page.dispatchEvent(new page.Event("afterprint"));
+      const rules = [...document.styleSheets[0].cssRules].filter((one) => one.conditionText === "print");
+      const told = rules.flatMap((one) => [...one.cssRules].map((rule) => rule.cssText)).join(" ");
+      return { rest, printed, after: open(), told };
+    }"""
+    said = found_in_page(page, 1200, script)
+    assert said["rest"]
+    assert not any(said["rest"])
+    assert all(said["printed"])
+    assert said["after"] == said["rest"]
+    assert ".controls { display: none; }" in said["told"]
+
+
 def test_without_the_script_every_experiment_stands_in_the_page(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     silent = page.with_name("silent.html")

@@ -83,4 +83,15 @@
     }
     if (sections.querySelectorAll(".experiment").length > 1) chooseExperiment(sections, 0);
   }
+
+  // On paper nothing can be unfolded.
+  const folded = () => document.querySelectorAll("details:not([open])");
+  let unfolded = [];
+  addEventListener("beforeprint", () => {
+    unfolded = [...folded()];
+    for (const one of unfolded) one.open = true;
+  });
+  addEventListener("afterprint", () => {
+    for (const one of unfolded) one.open = false;
+  });
 })();
