@@ -43,10 +43,10 @@ from vegglue.version import VERSION
 # Chosen, not measured: smaller chunks share the work more evenly and lose less when a run is killed, larger ones reach
 # fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
-# Members [-] up to which each is solved on coarser cells first. Of 64 on 9,600 cells that takes two thirds of the time
-# of one core, of 256 as long as neighbours alone (DECISIONS). Chunks then hold SPARSE_CHUNK at most, and half of the
-# members: smaller ones share less, larger ones leave a core idle.
-SPARSE_MEMBERS, SPARSE_CHUNK = 128, 32
+# Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
+# neighbours alone take (DECISIONS); more were not tried. Chunks then hold SPARSE_CHUNK at most, and half of the
+# members: smaller ones share less (with 32 in each, 128 take half as long again), larger ones leave cores idle.
+SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
 # Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
 READ_TOGETHER = 16
 Rows = dict[str, np.ndarray]

@@ -8,7 +8,7 @@ from member to member and is drawn from those solved before. A nested iteration 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -26,6 +26,7 @@ from vegglue.solver.batch import (
 )
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.march import FallBack
+from vegglue.solver.newton import CLOSE
 from vegglue.solver.parameter_metric import metric_of_flows, nearest_members, squared_distances
 from vegglue.solver.prolongation import on_grid
 from vegglue.solver.reference_member import ProblemOf, solve_alone
@@ -48,9 +49,10 @@ class GridProblem:
 @dataclass(frozen=True)
 class _Level:
     """Members (m,) on one grid: where they are, in coordinates as far apart as their flows (m, d); their flows on
-    coarser cells (nx, 3, ny, m), and who has one; what finer cells changed (m, nx, 3, ny), and the members solved.
+    coarser cells (nx, 3, ny, m), and who has one; what finer cells changed (m, nx, 3, ny), the members solved, and
+    where others stalled near their flow (nx, 3, ny).
 
-    The last two are filled in place while members are solved.
+    The last three are filled in place while members are solved.
     """
 
     problem: Problem
@@ -59,6 +61,7 @@ class _Level:
     known: np.ndarray
     changed: Array
     solved: SolvedMembers
+    stalled: dict[int, Array] = field(default_factory=dict)
 
     def keep(self, members: np.ndarray, states: Array) -> None:
         self.solved.status[members] = SOLVED_BY_NEWTON
@@ -124,9 +127,11 @@ def _delivered(level: _Level, part: Problem, band: tuple[int, int], members: np.
     good = ended.converged & ~overflows(part, ended.state, band, rows)
     if good.any():
         level.keep(members[good], widen(ended.state[..., good], rows, band))
+    for lane in np.flatnonzero(~good & (ended.correction < CLOSE)):
+        level.stalled[int(members[lane])] = widen(ended.state[..., lane : lane + 1], rows, band)[..., 0]
 
 
-def _starts(level: _Level, members: np.ndarray) -> Array:
+def _estimates(level: _Level, members: np.ndarray) -> Array:
     """P x_c + d of some members (nx, 3, ny, n), d from splines through the solved members nearest to them."""
     start = np.ascontiguousarray(level.lifted[..., members])
     done = np.flatnonzero((level.solved.status == SOLVED_BY_NEWTON) & level.known)
@@ -139,3 +144,12 @@ def _starts(level: _Level, members: np.ndarray) -> Array:
     kernel, degree = ("cubic", 1) if near.size >= 3 * (coordinates.shape[1] + 1) else ("linear", 0)
     spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel=kernel, degree=degree)
     return start + blend(level.changed, near, spline(coordinates[members]), 0, start.shape[2])
+
+
+def _starts(level: _Level, members: np.ndarray) -> Array:
+    """Where members begin, (nx, 3, ny, n): where they stalled with the factors of another reference, else estimates."""
+    start = _estimates(level, members)
+    for lane, member in enumerate(members):
+        if int(member) in level.stalled:
+            start[..., lane] = level.stalled[int(member)]
+    return start
