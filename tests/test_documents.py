@@ -20,6 +20,8 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.
 SHOWN = (ROOT / "docs" / "tutorial.md", ROOT / "README.md")
 LEFT_OUT = "..."
+# Kinds of blocks that hold commands.
+SHELL = ("sh", "bash", "console", "")
 NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?")
 # Share by which a number may differ on another machine [-]: arithmetic there is another in the last digits, and what is
 # drawn at random follows it. Where one unit of the last digit shown is more, that may be.
@@ -92,8 +94,8 @@ def test_links_lead_somewhere(page: Path) -> None:
 def lines_of_shell(page: Path) -> list[str]:
     """Every `vegglue ...` that a page shows: in blocks of shell, and in the middle of its sentences."""
     text = page.read_text(encoding="utf-8")
-    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    shown = [line.removeprefix("$ ").strip() for part in blocks for line in part.splitlines()]
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    shown = [line.removeprefix("$ ").strip() for kind, part in blocks if kind in SHELL for line in part.splitlines()]
     spoken = [" ".join(words.split()) for words in re.findall(r"(?<!`)`(vegglue [^`]+)`", text)]
     return [line for line in [*shown, *spoken] if line.startswith("vegglue ")]
 
