@@ -11,6 +11,8 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+# What these versions need in turn, before it warned of names that they use: matplotlib 3.9 and typer 0.19 do.
+OF_THEIR_TIME = ("click<8.3", "pyparsing<3.3")
 
 
 def lowest_versions() -> list[str]:
@@ -23,4 +25,4 @@ def lowest_versions() -> list[str]:
 
 
 if __name__ == "__main__":
-    print("\n".join(lowest_versions()))
+    print("\n".join([*lowest_versions(), *OF_THEIR_TIME]))
