@@ -78,7 +78,7 @@ def test_a_law_suspected_of_a_child_hides_nothing_of_what_was_found(toy: Run) ->
     assert said.startswith(
         f"Something was missing from {first.name} that is in no list: more drag of 0.40 1/m at x = 33.0"
     )
-    assert "Something is missing from this model that is in no list: friction of the banks changes" in said
+    assert "What is left looks like a law that is in no list: friction of the banks changes" in said
     assert child.behind is first
     assert "vegglue discover toy.yaml" in next_steps(child)[0]
     assert not any("Compare with" in step for step in next_steps(child)), "there is no page of the first model"

@@ -43,7 +43,9 @@ def headline(run: Run) -> str:
         return verdict_of(run.case, run.posterior)
     parts = [] if before is None else [_said(before, html.escape(before.name), "was")]
     if own is not None:
-        parts.append(_said(own, "this model", "is"))
+        suspected = bool(parts) and _only_suspects_a_law(own)
+        parts.append(f"What is left looks like a law that is in no list: {_law_in_words(own)}." if suspected
+                     else _said(own, "this model", "is"))  # fmt: skip
     elif before is None and run.behind is not None:
         parts.append(_said(run.behind, html.escape(run.behind.name), "was"))
     return " ".join(parts)
@@ -59,12 +61,22 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
         return f"The model is sound, but an instrument is off: {which}."
     if kind == "none-of-these" and found.field is not None:
         return f"Something is missing that is in no list: {field_in_words(found)}."
-    if kind == "none-of-these" and found.laws is not None and not found.places:
-        title = html.escape(found.laws.laws[0].title)
-        return f"Something {tense} missing from {model} that is in no list: {title[:1].lower()}{title[1:]}."
+    if _only_suspects_a_law(found):
+        return f"Something {tense} missing from {model} that is in no list: {_law_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
         return _what_is_missing(found, model, tense)
     return html.escape(found.verdict.sentence)
+
+
+def _only_suspects_a_law(found: Diagnosis) -> bool:
+    nothing_else = found.field is None and not found.places
+    return found.verdict.kind == "none-of-these" and found.laws is not None and nothing_else
+
+
+def _law_in_words(found: Diagnosis) -> str:
+    """The likeliest law by its title, within a sentence."""
+    title = html.escape(found.laws.laws[0].title) if found.laws is not None else ""
+    return f"{title[:1].lower()}{title[1:]}"
 
 
 def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
