@@ -20,7 +20,7 @@ from vegglue.cli.map_commands import export_command, new_command
 from vegglue.cli.twin_commands import reveal_command, twin_command
 from vegglue.version import VERSION
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+app = typer.Typer(rich_markup_mode="rich", no_args_is_help=True, pretty_exceptions_enable=False)
 
 
 @app.callback()
