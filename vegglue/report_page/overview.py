@@ -163,4 +163,4 @@ def _references(run: Run, name: str) -> Iterator[tuple[str, DrawnInterval]]:
         yield reference.source, DrawnInterval(low, middle, high, others=True)
     if name in reference.made_with:
         made = float(reference.made_with[name])
-        yield "made with", DrawnInterval(made, made, made, others=True)
+        yield "the record was made with", DrawnInterval(made, made, made, others=True)
