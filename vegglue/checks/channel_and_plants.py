@@ -98,8 +98,8 @@ def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
         if held:
             yield (
                 f"With k_s of class {class_name} {up_to}{roughest:.3g} m, water shallower than "
-                f"{floor * roughest / 12:.2g} m gets the friction of that depth, as 12 h/k_s is not let below "
-                f"{floor:g}. Of the wet cells of that class: {held}."
+                f"{floor * roughest / 12:.2g} m gets the friction of that depth: Keulegan's law has none where stones "
+                f"reach through the water (12 h/k_s below {floor:g}). Of the wet cells of that class: {held}."
             )
 
 
