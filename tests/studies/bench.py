@@ -19,12 +19,13 @@ from vegglue.case.parameter_space import parameters_at, sobol_sample
 from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.ensemble.solve_ensemble import linearised_medians, solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.flow.backwater import backwater
+from vegglue.flow.chord_equations import eased
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import crop
+from vegglue.flow.problem import crop, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
-from vegglue.solver.batch import solve_members
+from vegglue.solver.batch import MEMBER_LANES, solve_members
 from vegglue.solver.march import advance, march
 from vegglue.solver.parameter_metric import clusters, parameter_metric
 from vegglue.solver.reference_member import settled
@@ -55,6 +56,7 @@ def main() -> None:
     step = marching(case)
     member = steady(case)
     print(f"steady state by Newton / {PAPER_STEPS:,} marched steps: {PAPER_STEPS * step / member:.0f} times faster")
+    roofline(case)
     same(case)
     whole(case)
     whole(on_grid(case, (300.0, 471.0), (0.5, 0.375)))
@@ -104,6 +106,38 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
         count, spent = calls[name]
         print(f"  {words}: {count} calls, {100 * spent / seconds:.0f} % of the time")
     return seconds / len(chunk.points)
+
+
+def roofline(case) -> None:  # type: ignore[no-untyped-def]
+    """A chord step of MEMBER_LANES members by flops and bytes, beside what this core and its memory give."""
+    problem = build_problem(case, build_site(case), "D3a", sample_prior(case.parameters, MEMBER_LANES, 1))
+    solution, shared, band = settled(take(problem, np.array([0])), None, 1e-6)
+    assert shared is not None
+    part, state = crop(problem, *band), np.repeat(solution.state, MEMBER_LANES, axis=3)
+    rates = eased(part, state, shared.slope, part.boundaries.outlet)
+    residual = shortest(lambda: eased(part, state, shared.slope, part.boundaries.outlet))
+    solve = shortest(lambda: shared.step(rates))
+    nx, _, n, _ = shared.columns.shape
+    block, right = np.ones((n, n), np.float32), np.ones((n, MEMBER_LANES), np.float32)
+    flops, moved = 2.0 * shared.columns.size * MEMBER_LANES, shared.columns.nbytes + 3 * nx * right.nbytes
+    product = shortest(lambda: [block @ right for _ in range(nx)])
+    copied = shortest(lambda: shared.columns.copy())
+    print(
+        f"a chord step of {MEMBER_LANES} members, one core: residual {1e3 * residual:.0f} ms, "
+        f"{residual / rates.size * 3e9:.0f} ns a cell and member; solve {1e3 * solve:.0f} ms, "
+        f"{flops / solve / 1e9:.0f} Gflop/s (products of its size in cache: {flops / 3 / product / 1e9:.0f}), "
+        f"{moved / solve / 1e9:.1f} GB/s (a copy of its factors: {2 * shared.columns.nbytes / copied / 1e9:.1f})"
+    )
+
+
+def shortest(work) -> float:  # type: ignore[no-untyped-def]
+    """Least seconds of five times."""
+    spent = []
+    for _ in range(5):
+        began = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - began)
+    return min(spent)
 
 
 def sizes(case) -> None:  # type: ignore[no-untyped-def]
