@@ -286,6 +286,13 @@ def test_a_column_of_names_of_experiments_is_known_by_what_it_holds(tmp_path: Pa
     assert "experiment from Survey" in case.imported[0].taken
 
 
+def test_a_file_of_the_usual_name_need_not_name_the_only_experiment(tmp_path: Path) -> None:
+    """The config named such a file as it was, and every command after `import` refused it."""
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, velocities__csv="section,x,y,u,u_se\nA,4,0,0.4,0.01\n")
+    table = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+    assert table[["experiment", "section", "value"]].to_numpy().tolist() == [["June", "A", 0.4]]
+
+
 def test_rows_of_no_experiment_are_refused_with_the_line_to_write(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "brook", CHANNEL + TWO, adv__csv=SURVEYED.replace("12 May;", "May;"))
     with pytest.raises(InputError, match=r"under `files`, `adv\.csv: \{experiment: 12 May\}`"):

@@ -136,10 +136,11 @@ def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
 
 
 def _is_plain(path: Path, kind: Kind) -> bool:
-    """Whether a table is in the form that a case names as it is: commas, and the columns by their own names."""
+    """Whether a table is in the form that a case names as it is: commas, and all columns by their own names."""
     lines = readable_text(path).splitlines()
     heading = [name.strip() for name in lines[0].split(",")] if lines else []
-    return {"x", kind.column, *(["y"] if kind.at_point else [])} <= set(heading)
+    place = ("x", *(["y"] if kind.at_point else []), *(["section"] if kind.velocity else []))
+    return {"experiment", kind.column, *place} <= set(heading)
 
 
 def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, FileWords]]]:

@@ -65,7 +65,8 @@ def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, size: str,
 @styled
 def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     """Verdict, suspects, what looks alike, where the model misses, and the map of places, on one screen."""
-    zones_width = max(4.7, 1.2 + ZONE_WIDTH * diagnosis.misfit.zones["zone"].nunique())
+    missed = diagnosis.misfit.zones
+    zones_width = max(4.7, 1.2 + ZONE_WIDTH * missed["zone"].nunique()) if len(missed) else 4.7
     figure = Figure(figsize=(9.3 + zones_width, 8.6), layout="constrained")
     title = textwrap.fill(
         f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", VERDICT_LINE_LETTERS
@@ -78,8 +79,8 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
     paint_suspects(scores, visible, _suspect_table(diagnosis), diagnosis.first_screening.threshold)
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
-    if len(diagnosis.misfit.zones):
-        paint_zones(zones.subplots(), diagnosis.misfit.zones)
+    if len(missed):
+        paint_zones(zones.subplots(), missed)
     mapped = diagnosis.place_map
     if mapped.x.size:
         paint_places(lower.subplots(), mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, patches))
