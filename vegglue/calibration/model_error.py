@@ -85,7 +85,8 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
     if not any_error(allowed):
         return np.zeros((len(model.station), 0))
     objects = unlisted_in(model.case)
-    terms = dict.fromkeys(("friction", "drag", "bed", *(one.term for one in objects)))
+    of_sides: tuple[Term, ...] = ("drag",) if allowed.edges else ()
+    terms = dict.fromkeys(("friction", *of_sides, "bed", *(one.term for one in objects)))
     responses, half, grid = cell_responses(model, point, tuple(terms)), half_width(model.site), model.site.grid
     friction = bumps(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
     bed = bumps(grid, BED_RADIUS * half, BED_RADIUS * half)
