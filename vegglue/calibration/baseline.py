@@ -93,7 +93,7 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     start = None if z is None else linearise_from(model, z, near)
     first = with_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
     base = with_error_of_grid(with_coarse_point(first))
-    if _has_own_error(base) and near is not None and _is_near(base, near.z):
+    if _told_on_coarse_cells(base) and near is not None and _is_near(base, near.z):
         return with_coarse_point(base)
     # The model's own error moves the best place, and is another there.
     return with_own_error(base)
@@ -127,8 +127,8 @@ def with_error_of_grid(base: Baseline) -> Baseline:
     return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
 
 
-def _has_own_error(base: Baseline) -> bool:
-    """Whether the noise holds the model's own error, from the cells that it takes."""
+def _told_on_coarse_cells(base: Baseline) -> bool:
+    """Whether the noise holds the model's own error already, from coarse cells that are good enough for it."""
     return bool(base.noise.model_error.any()) and not base.model.case.model_error.edges
 
 
