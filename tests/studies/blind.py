@@ -221,8 +221,8 @@ def run(todo: list[Trial], path: Path, kept: set[str], jobs: int) -> None:
             print(f"{count} of {len(todo)}: {record['key']} {record.get('verdict', 'left out')}", flush=True)
 
 
-def records_in(path: Path) -> Iterator[dict[str, Any]]:
-    """All whole lines of this edition; the last one of a study that was stopped may not be whole."""
+def records_in(path: Path, edition: str = EDITION) -> Iterator[dict[str, Any]]:
+    """All whole lines of an edition; the last one of a study that was stopped may not be whole."""
     if not path.exists():
         return
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -230,7 +230,7 @@ def records_in(path: Path) -> Iterator[dict[str, Any]]:
             record = json.loads(line)
         except ValueError:
             continue
-        if record.get("edition") == EDITION:
+        if record.get("edition") == edition:
             yield record
 
 

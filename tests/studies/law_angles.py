@@ -20,7 +20,7 @@ from blind_sets import PLACES, place_of
 from hidden_laws import EFFECTS, HIDDEN_LAWS, HiddenLaw
 from law_answers import LISTED_SAYS, Said, is_true
 from law_limits import WAYS
-from law_sets import RATIOS, STUDY, knowing_hidden
+from law_sets import LAW_EDITION, RATIOS, STUDY, knowing_hidden
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
@@ -146,7 +146,7 @@ def angles_at(place: int, draws: int) -> list[dict[str, Any]]:
         if float(truth.size[0]) < LEAST_SEEN:
             continue
         cosine, said = nearest_other(law, truth, rivals)
-        record = {"place": place, "hide": law.name, "nearest": round(cosine, 3), "says": said}
+        record = {"edition": LAW_EDITION, "place": place, "hide": law.name, "nearest": round(cosine, 3), "says": said}
         found.append(record | counted(law, truth, rivals, draws, random))
     return found
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ import hidden_laws
 import numpy as np
 import pandas as pd
 from blind_sets import PLACES, hash_of, place_of
-from blind_truth import perfect_site, site_of_nature, true_values
+from blind_truth import Site, flows_of, perfect_site, site_of_nature, true_values
+from second_solver import Flow
 
 from vegglue.arrays import Array
 from vegglue.calibration.noise import noise_of, with_grid_error, with_model_error
@@ -33,9 +35,8 @@ STUDY = "twin"
 # Standard errors that are left of what is hidden after calibration; a listed effect that cannot be as visible is hidden
 # at the next one.
 RATIOS = {"law": (8.0,), "listed": (8.0, 5.0, 3.0)}
-# Cells of the truth [m] and change at which a flow is steady [m/s2]: with cells of 0.125 m across and half the change
-# predictions move by 0.001 m/s, a tenth of the error of a probe, and cost 2.4 times as much.
-CELLS_OF_TRUTH, STEADY_ENOUGH = (0.5, 0.1875), 2e-5
+# Sets of the edition before were seen when the search was chosen, and their truth lay on cells of 0.5 m.
+LAW_EDITION = "second edition of laws: "
 # Between the discharges that are measured: what a law says there is no guess. Level as h ~ Q^0.6.
 HELD_OUT, LIKE = "held out", "mid"
 HELD_OUT_SETTING = Experiment(discharge={"upstream": 2.6}, level=1.0)
@@ -147,20 +148,33 @@ def _made(trial: LawTrial) -> LawTruth:
     flow.
     """
     base, columns = place_of(STUDY, _place(trial))
-    seed = hash_of(f"laws: {trial.key}")
+    seed = hash_of(LAW_EDITION + trial.key)
     random = np.random.default_rng((seed, 2))
     errors = noise_of(base.model.station)
     hidden = _hidden_in(base, columns, trial, random) if trial.hide else None
     station, held_out, case = base.model.station, held_out_stations(base.model), _with_held_out(base.model.case)
-    theta = {name: float(values[0]) for name, values in theta_at(case, base.here.z).items()}
     of_kind = SAME_KIND.get(hidden_laws.BY_NAME[trial.hide].term, ()) if trial.group == "law" else (trial.hide,)
-    site = site_of_nature(perfect_site(case, STUDY, theta, len(station)), case, seed % 2**31, of_kind)
+    site = site_of_nature(_perfect_site(_place(trial)), case, seed % 2**31, of_kind)
     numbers = {hidden["name"]: {hidden["parameter"]: hidden["amplitude"], **hidden["shapes"]}} if hidden else {}
     everywhere = pd.concat([station, held_out], ignore_index=True)
-    truly = true_values(site, case, STUDY, everywhere, numbers, CELLS_OF_TRUTH, STEADY_ENOUGH)
+    truly = true_values(site, case, STUDY, everywhere, numbers, starts=_perfect_flows(_place(trial)))
     value = truly[: len(station)].copy()
     value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
     return LawTruth(hidden, value.tolist(), truly[len(station) :].tolist(), dict(site.also_true), 0.0)
+
+
+def _perfect_site(place: int) -> Site:
+    base, _ = place_of(STUDY, place)
+    case = _with_held_out(base.model.case)
+    theta = {name: float(values[0]) for name, values in theta_at(case, base.here.z).items()}
+    return perfect_site(case, STUDY, theta, len(base.model.station))
+
+
+@lru_cache(maxsize=PLACES)
+def _perfect_flows(place: int) -> dict[str, Flow]:
+    """Flows where nothing is hidden on a perfect site: those of other sites of this place start from them."""
+    base, _ = place_of(STUDY, place)
+    return flows_of(_perfect_site(place), _with_held_out(base.model.case), STUDY)
 
 
 def held_out_stations(model: Model) -> pd.DataFrame:

@@ -1,15 +1,14 @@
 """The study behind docs/discover_study.md: laws that stand in no list and not in the grammar, hidden and searched.
 
-    python tests/studies/laws.py [--most N] [--page] [--runs FOLDER]
+    python tests/studies/laws.py [--most N] [--page] [--runs FOLDER] [--anew]
 
 One line of JSON for each data set in runs/laws/records.jsonl: what stands there, or in data/blind/laws.jsonl, is not
-done again, so that the study may be stopped and go on.
+done again, so that the study may be stopped and go on. After a change of the search it has to be made --anew.
 """
 
 import argparse
 import json
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from blind import records_in
 from law_angles import ANGLES
 from law_page import write_law_page
-from law_sets import LawDataSet, LawTrial, knowing_hidden, law_data_set, law_trials, law_truth
+from law_sets import LAW_EDITION, LawDataSet, LawTrial, knowing_hidden, law_data_set, law_trials, law_truth
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
@@ -36,18 +35,13 @@ from vegglue.screening.candidates import Candidate, start_amplitude, with_effect
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "laws"
 KEPT = ROOT / "data" / "blind" / "laws.jsonl"
-# Counts changes of the search since the first record, which has no such field: the page tells how many are of which.
-# With the second one, places are as unlikely before as laws, and what is left is refitted where a promise is not kept.
-# With the third one, forms are tried at nine references, humps are among them, and a quantity is judged by its laws
-# together.
-SEARCH = 3
 
 
 def study_of_laws(trial: LawTrial, truths: Path) -> dict[str, Any]:
     """The record of one data set: what was hidden, what was found, and errors in an experiment that was held out;
     truths: the folder in which these are kept.
     """
-    record: dict[str, Any] = {"key": trial.key, "group": trial.group, "hide": trial.hide, "search": SEARCH}
+    record: dict[str, Any] = {"key": trial.key, "edition": LAW_EDITION, "group": trial.group, "hide": trial.hide}
     truth = law_truth(trial, truths)
     if truth.left_out:
         return record | {"left_out": truth.left_out}
@@ -131,19 +125,20 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=None, help="data sets to do at most")
     parser.add_argument("--page", action="store_true", help="write the page from what is there, and do no more")
     parser.add_argument("--runs", type=Path, default=RUNS)
+    parser.add_argument("--anew", action="store_true", help="leave aside what data/blind holds")
     given = parser.parse_args()
     path = given.runs / "records.jsonl"
+    kept = [] if given.anew else list(records_in(KEPT, LAW_EDITION))
     if not given.page:
-        _make(path, given.most)
-    found = {record["key"]: record for record in (*records_in(KEPT), *records_in(path))}
-    write_law_page(list(found.values()), list(records_in(ANGLES)), ROOT / "docs")
+        _make(path, {record["key"] for record in kept}, given.most)
+    found = {record["key"]: record for record in (*kept, *records_in(path, LAW_EDITION))}
+    write_law_page(list(found.values()), list(records_in(ANGLES, LAW_EDITION)), ROOT / "docs")
 
 
-def _make(path: Path, most: int | None) -> None:
+def _make(path: Path, kept: set[str], most: int | None) -> None:
     """Do what is not yet done, `most` data sets at most."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    found = (*records_in(KEPT), *records_in(path))
-    done = {record["key"] for record in found if record.get("search") == SEARCH or _has_no_truth(record)}
+    done = kept | {record["key"] for record in records_in(path, LAW_EDITION)}
     todo = [trial for trial in law_trials() if trial.key not in done][:most]
     with path.open("a", encoding="utf-8") as file, at_most(1):
         for count, trial in enumerate(todo, 1):
@@ -152,11 +147,6 @@ def _make(path: Path, most: int | None) -> None:
             file.flush()
             said = record.get("left_out") or record["best"] or ", ".join(record["others"]) or "nothing"
             print(f"{count} of {len(todo)}: {record['key']} {trial.hide}: {said}", flush=True)
-
-
-def _has_no_truth(record: Mapping[str, Any]) -> bool:
-    """Whether it was left out for what no search changes."""
-    return "left_out" in record and not record["left_out"].startswith("no search")
 
 
 if __name__ == "__main__":
