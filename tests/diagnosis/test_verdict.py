@@ -210,7 +210,7 @@ def test_a_place_wins_over_steps_and_all_are_told() -> None:
 @pytest.mark.parametrize(
     ("term", "more", "less"),
     [
-        ("drag", "holds the flow back", "lets the flow pass"),
+        ("drag", "holds the flow back", "lets the flow pass or pushes it on"),
         ("bed", "0.40 m higher", "0.40 m lower"),
         ("inflow", "water enters, 0.4 m3/s", "water leaves, 0.4 m3/s"),
         ("viscosity", "mixes more", "mixes less"),

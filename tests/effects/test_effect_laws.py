@@ -221,13 +221,13 @@ def test_an_effect_of_a_part_leaves_the_others_alone(name, elsewhere, unchanged)
     assert {key: float(np.ravel(found[key])[0]) for key in unchanged} == pytest.approx(unchanged)
 
 
-def test_less_than_nothing_is_nothing_at_a_place():
-    """Drag and viscosity that are taken away leave none, and no less."""
+def test_less_than_nothing_pushes_at_a_place_but_mixes_no_less():
+    """Drag that is taken away may push, as a jet does; viscosity leaves none, and no less."""
     middle = {"x": 1.6, "y": 2.0, "length": 0.3, "width": 0.5}
     values = {key: np.array([value]) for key, value in middle.items()}
     drag = library()["unlisted_object"].act(cells(on=NEAR), drag=np.array([-2.0]), **values)["rate"]
     added = library()["unlisted_viscosity"].act(cells(on=NEAR), viscosity=np.array([-0.3]), **values)["viscosity"]
-    assert not drag.any()
+    assert drag[2, 2, 0] == pytest.approx(0.1 - 2.0)
     assert added[2, 2, 0] == pytest.approx(-0.01), "what is there already, and no more"
 
 

@@ -61,7 +61,11 @@ class Bumps:
 def bumps(grid: Grid, length: float, width: float, cells: float = BUMP_CELLS) -> Bumps:
     """Bumps of half length l and half width w [m], as far apart, and of at least so many cells."""
     length, width = max(length, cells * grid.dx), max(width, cells * grid.dy)
-    x, y = _raster(grid.x, length), _raster(grid.y, width)
+    return bumps_at(grid, _raster(grid.x, length), _raster(grid.y, width), length, width)
+
+
+def bumps_at(grid: Grid, x: Array, y: Array, length: float, width: float) -> Bumps:
+    """Bumps of half length l and half width w [m] around all x (k,) and y (j,) [m]."""
     along = np.exp(-(((grid.x[None] - x[:, None]) / length) ** 2))
     across = np.exp(-(((grid.y[None] - y[:, None]) / width) ** 2))
     return Bumps(x, y, length, width, along, across)

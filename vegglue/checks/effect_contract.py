@@ -87,12 +87,14 @@ def _finite(tried: Trial) -> Iterator[str]:
 
 
 def _never_pushes(tried: Trial) -> Iterator[str]:
-    """Friction rate, viscosity, phi and canopy height stay at or above 0; discharge and spread stay above."""
-    problem = tried.problem(*sizes(tried.effect))
+    """Friction rate, viscosity, phi and canopy height stay at or above 0; discharge and spread stay above. What stands
+    for anything at a place may push: its friction rate may fall below 0.
+    """
+    problem, may_push = tried.problem(*sizes(tried.effect)), "search" in tried.effect.tags
     for state_of in (at_rest, moving_water, dry):
         state = state_of(problem)
         closed = closures(problem, state, faces(problem, state).cell)
-        if (closed.rate < 0.0).any():
+        if (closed.rate < 0.0).any() and not may_push:
             yield f"the friction rate falls below 0 in {_name(state_of)} water: drag would push"
         if (closed.viscosity < 0.0).any():
             yield f"the viscosity falls below 0 in {_name(state_of)} water"

@@ -29,7 +29,9 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 
 def _place_words(place: Location) -> str:
     what = {
-        "drag": "something holds the flow back" if place.amplitude > 0 else "something lets the flow pass",
+        "drag": "something holds the flow back"
+        if place.amplitude > 0
+        else "something lets the flow pass or pushes it on",
         "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
         "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
         "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",

@@ -18,11 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.calibration.baseline import SearchModel
+from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import HypothesisKind, log_factors, prior_shrinkage
+from vegglue.screening.evidence import HypothesisKind, prior_shrinkage
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
@@ -44,7 +46,7 @@ START_SHARES = (1.0, 0.3)
 @dataclass(frozen=True)
 class Contender:
     """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
-    fingerprint among those of its kind; what: its refit, or the instrument.
+    fingerprint among those of its kind; what: its refit, or the instrument; errors: of x and y of a place [m].
     """
 
     kind: str
@@ -52,6 +54,7 @@ class Contender:
     log_evidence: float
     column: int
     what: Refit | Instrument
+    errors: tuple[float, float] = (0.0, 0.0)
 
 
 def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Contender]:
@@ -126,19 +129,20 @@ def _refitted(
     for one, _ in of_round.places:
         of_term = zip(spots, refits[len(effects) :], strict=True)
         ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
-        found += _place_contender(kinds[one.term], ended)
+        found += _place_contender(screening.search, one, kinds[one.term], ended)
     return found
 
 
-def _place_contender(kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]) -> list[Contender]:
-    """The best refitted spot of a term with the evidence of all its spots, corrected as that of this one; none if no
-    flow was found with any.
-    """
+def _place_contender(
+    search: SearchModel, places: Places, kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]
+) -> list[Contender]:
+    """Something at the place where it explains most, see `place_search`; none if no flow was found at any spot."""
     if not refits:
         return []
     spot, best = max(refits, key=lambda one: one[1].log_factor)
-    first_order = float(log_factors(kind.scores, kind.size)[[spot for spot, _ in refits]].max())
-    return [Contender(kind.name, best.candidate.name, kind.total + best.log_factor - first_order, spot, best)]
+    there = found_place(search, places, kind, spot, best)
+    errors = (there.x_error, there.y_error)
+    return [Contender(kind.name, there.refit.candidate.name, there.log_evidence, spot, there.refit, errors)]
 
 
 def chances_of(contenders: Sequence[Contender]) -> Array:

@@ -141,12 +141,15 @@ def _screened(one: Following) -> Following:
 
 
 def _prospect(one: Following, found: Findings) -> float:
-    """ln evidence of a model and of the best that could come next, to first order, less that of the prior so far."""
+    """ln evidence of a model and of the best that could come next, to first order, less that of the prior so far; of a
+    place as it competed, without the error of its shape, which is there for what is found beside it.
+    """
     assert one.screening is not None
     further = 0.0
     if _with_alarm(one.screening, one.found).alarmed:
         further = max(0.0, *(kind.total for kind in one.screening.kinds))
-    return log_evidence(one.base) + one.found.log_prior - found.log_prior + further
+    before = found.log_prior + found.of_shape
+    return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further
 
 
 def _branch(

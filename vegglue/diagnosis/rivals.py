@@ -91,9 +91,9 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
     evidence |= {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
     ahead = {name: best.log_evidence - other for name, other in evidence.items() if name != best.kind}
     return Location(
-        **places.shapes(best.column),
-        x_error=_spread(places.x, kind.log_evidence),
-        y_error=_spread(places.y, kind.log_evidence),
+        **refit.shapes,
+        x_error=best.errors[0],
+        y_error=best.errors[1],
         term=best.kind,
         effect=refit.candidate.effect.name,
         amplitude=refit.amplitude,
@@ -103,13 +103,6 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
         experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
         odds={name: float(np.exp(min(gained, LARGEST_LOG_ODDS))) for name, gained in ahead.items()},
     )
-
-
-def _spread(where: Array, log_evidence: Array) -> float:
-    """Standard deviation of a coordinate (spot,) [m] over all spots, each as likely as its evidence says."""
-    chance = np.exp(log_evidence - log_evidence.max())
-    chance = chance / chance.sum()
-    return float(np.sqrt(max(float(chance @ where**2 - (chance @ where) ** 2), 0.0)))
 
 
 def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:

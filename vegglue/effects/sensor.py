@@ -33,7 +33,7 @@ def partial_depth(reading: Reading, excess: Array) -> dict[str, Array]:
     a = ln(1 - t) when the highest share t is (-0.16 for 0.15).
     """
     open_water = reading.velocity * (1.0 - reading.canopy_share)
-    shear = np.sqrt(reading.rate * reading.depth) / KARMAN
+    shear = np.sqrt(np.maximum(reading.rate, 0.0) * reading.depth) / KARMAN
     return {"value": reading.value + excess * shear * reading.component * open_water}
 
 

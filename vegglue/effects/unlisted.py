@@ -17,8 +17,8 @@ def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Ar
 
 
 def unlisted_object(cells: Cells, drag: Array, **place: Array) -> dict[str, Array]:
-    """k -> max(k + c spot, 0) [1/m]."""
-    return {"rate": np.maximum(cells.rate + drag * spot(cells.geometry, **place), 0.0)}
+    """k -> k + c spot [1/m]; below 0 it pushes, as a jet does."""
+    return {"rate": cells.rate + drag * spot(cells.geometry, **place)}
 
 
 def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
@@ -58,7 +58,7 @@ EFFECTS = (
     _at_place(
         "unlisted_object",
         "resistance",
-        "Something holds the flow back (or lets it pass) at one place",
+        "Something holds the flow back (or pushes it on) at one place",
         f"k -> k + c {SPOT}",
         unlisted_object,
         Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0),

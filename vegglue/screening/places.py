@@ -5,7 +5,7 @@
 A place has one fingerprint for all experiments: what lies there stays where it is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.calibration.model_error import TERM_OF, Bumps, bumps, responses_to_bumps
+from vegglue.calibration.model_error import TERM_OF, Bumps, bumps, bumps_at, responses_to_bumps
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, flow_at_centres
@@ -35,9 +35,11 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
 }
 # Least half length and half width of a spot in cells: below, it falls between their centres.
 SPOT_CELLS = 1.0
+# Spots around a place on either side of it: chosen, not measured.
+STEPS_AROUND = 4
 # Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
 # discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
-SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 0.3, 0.1, 0.05, 0.03
+SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 1.0, 0.3, 0.05, 0.03
 # Share of a spot that has to lie under water, of water that enters in all experiments, else in one of them [-].
 LEAST_SHARE = 0.5
 # Depth [m] above which a cell counts as under water.
@@ -67,13 +69,33 @@ class Places:
 
 def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
     """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
-    responses = cell_responses(model, point, tuple(EFFECT_AT_PLACE))
-    for experiment, rows in model.rows.items():
-        responses.of["inflow"][rows] *= _under_water(model, experiment)
+    width = SPOT_WIDTH * half_width
+    rasters = {
+        term: [bumps(model.site.grid, length * width, width, SPOT_CELLS) for length in lengths]
+        for term, lengths in SPOT_LENGTHS.items()
+    }
+    return _places_over(model, point, rasters)
+
+
+def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
+    """Spots of one term and size around a place, its x, y, length and width [m]; share: how far apart they stand over
+    their half length and half width.
+    """
+    grid, (length, width) = model.site.grid, (place["length"], place["width"])
+    steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1)
+    x, y = place["x"] + steps * length, place["y"] + steps * width
+    return _places_over(model, point, {term: [bumps_at(grid, x, y, length, width)]})[0]
+
+
+def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Bumps]]) -> tuple[Places, ...]:
+    responses = cell_responses(model, point, tuple(rasters))
+    if "inflow" in rasters:
+        for experiment, rows in model.rows.items():
+            responses.of["inflow"][rows] *= _under_water(model, experiment)
     wet = np.stack([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
     # Water that enters does so where there is water at all times.
-    seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in EFFECT_AT_PLACE}
-    tasks = [(model, responses, term, half_width, seen[term]) for term in EFFECT_AT_PLACE]
+    seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in rasters}
+    tasks = [(model, responses, term, over, seen[term]) for term, over in rasters.items()]
     return tuple(in_threads(_places_of_term, tasks))
 
 
@@ -88,11 +110,9 @@ def plausible_size(case: Case, term: Term) -> float:
     return SPOT_SHARE * float(np.mean(totals))
 
 
-def _places_of_term(model: Model, responses: CellResponses, term: Term, half_width: float, wet: Any) -> Places:
-    width = SPOT_WIDTH * half_width
+def _places_of_term(model: Model, responses: CellResponses, term: Term, rasters: Sequence[Bumps], wet: Any) -> Places:
     parts = []
-    for length in SPOT_LENGTHS[term]:
-        over = bumps(responses.grid, length * width, width, SPOT_CELLS)
+    for over in rasters:
         answers = responses_to_bumps(responses, term, over)
         if term == "inflow":
             answers = answers / _area_under_water(model, over)

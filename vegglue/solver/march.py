@@ -100,7 +100,9 @@ def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Arr
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
     shortest = _shortest(problem)
-    cell = 2.0 * closed.rate * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / shortest + np.abs(v) / problem.dy
+    cell = (
+        2.0 * np.abs(closed.rate) * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / shortest + np.abs(v) / problem.dy
+    )
     # Shear acts on a thin cell over the depth of its deeper corners.
     sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
     cell += 4.0 * closed.viscosity * (1.0 / shortest**2 + sheared / problem.dy**2)

@@ -1,0 +1,59 @@
+"""Something at a place is looked for between the spots of the screening, in the flow that it leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from coarse_twin import CASE, coarse_twin
+
+from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.calibration.fit import fit
+from vegglue.calibration.noise import noise_of
+from vegglue.case.parameter_space import z_of
+from vegglue.diagnosis.place_search import found_place
+from vegglue.diagnosis.refits import RefitTrial, refits_of, start_with
+from vegglue.effects.library import library
+from vegglue.engine.interface import linearise
+from vegglue.screening.candidates import place_candidate, with_effect
+from vegglue.screening.residual_screening import Screening, screen
+
+# Between the spots, which stand 0.5 m and 0.45 m apart: drag below zero pushes, as a jet does.
+OBJECT = library()["unlisted_object"]
+
+
+def measured_with(place: dict[str, float], drag: float) -> Screening:
+    """A screening of the coarse twin, measured without errors where something lies."""
+    model, point = coarse_twin()
+    candidate = place_candidate(OBJECT, place, 1.0)
+    case = with_effect(CASE, candidate, place)
+    there = np.append(point.z, z_of(case.parameters[candidate.parameter], drag))
+    truth = linearise(replace(model, case=case), there, point)
+    assert truth is not None
+    model = replace(model, station=model.station.assign(value=truth.prediction))
+    noise = noise_of(model.station)
+    return screen(Baseline(model, noise, fit(model, noise, point), None, None))
+
+
+@pytest.mark.parametrize("drag", [0.3, -0.2])
+def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None:
+    screening = measured_with({"x": 14.3, "y": 0.2, "length": 0.5, "width": 0.45}, drag)
+    search, kind = search_model(screening.base), next(one for one in screening.kinds if one.name == "drag")
+    places = next(one for one in screening.fingerprints.places if one.term == "drag")
+    short = np.flatnonzero(places.length == places.length.min())
+    spot = int(short[np.argmax(kind.log_evidence[short])])
+    shapes = places.shapes(spot)
+    candidate = place_candidate(OBJECT, shapes, places.plausible)
+    start = start_with(search.model.case, candidate, shapes, search.point.z, 0.5 * drag)
+    (refit,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
+    assert refit is not None
+
+    found = found_place(search, places, kind, spot, refit)
+
+    def away(place: dict[str, float]) -> float:
+        return float(np.hypot(place["x"] - 14.3, place["y"] - 0.2))
+
+    assert found.refit.log_factor >= refit.log_factor
+    assert away(dict(found.refit.shapes)) <= away(shapes)
+    assert away(dict(found.refit.shapes)) < 0.35
+    assert found.refit.amplitude * drag > 0.0
+    assert abs(found.refit.shapes["x"] - 14.3) < 2.0 * found.x_error + 0.1
