@@ -112,7 +112,8 @@ def _following(
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
-    come next: of its own kind within SAME_KIND_ODDS, of other kinds within LEAST_ODDS.
+    come next: of its own kind within SAME_KIND_ODDS, of other kinds within LEAST_ODDS. What is vaguer, a place, has to
+    lead by LEAST_ODDS; where a listed effect is nearly as likely, that is taken, and the place told beside it.
     """
     chance = chances_of(contenders)
     odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
@@ -126,8 +127,13 @@ def _following(
     best = int(np.argmax(score))
     following = ends[best]
     if len(following.found.places) > len(found.places):
-        clear = np.delete(score[best] - score, best).min() / tempering(score[best]) > np.log(LEAST_ODDS)
-        return following if clear else None
+        ahead = (score[best] - score) / tempering(score[best])
+        if np.delete(ahead, best).min() <= np.log(LEAST_ODDS):
+            named = [j for j, one in enumerate(ends) if len(one.found.steps) > len(found.steps)]
+            near = [j for j in named if ahead[j] < np.log(SAME_KIND_ODDS)]
+            if not near:
+                return None
+            following = ends[min(near, key=lambda j: float(ahead[j]))]
     if len(following.found.steps) > len(found.steps):
         *earlier, last = following.found.steps
         names = [contenders[j].name for j, _ in possible]
