@@ -31,6 +31,7 @@ def test_the_error_of_its_shape_takes_nothing_from_what_a_place_explained(
     before = SimpleNamespace(fitted=SimpleNamespace(point=None), noise=None, log_evidence=0.0)
     monkeypatch.setattr(diagnose, "calibrated_with", lambda *_: after)
     monkeypatch.setattr(diagnose, "log_evidence", lambda base: base.log_evidence)
+    monkeypatch.setattr(diagnose, "_without_error_of_shape", lambda *_: 21.0)
     monkeypatch.setattr(diagnose, "chi2", lambda *_: 287.0)
     monkeypatch.setattr(diagnose, "location_found", lambda *_: SimpleNamespace())
     monkeypatch.setattr(diagnose, "step_found", lambda *_: SimpleNamespace(accepted="a", groups=()))

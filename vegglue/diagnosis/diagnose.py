@@ -204,7 +204,7 @@ def _with_accepted(
         log_prior=found.log_prior + one.log_evidence - refit.log_factor,
     )
     if one.kind != "effect":
-        lost = refit.log_factor - (log_evidence(further) - log_evidence(screening.base))
+        lost = _without_error_of_shape(screening.base, further) - log_evidence(further)
         places = (*found.places, location_found(screening, contenders, j, refit))
         return Following(replace(found, places=places, of_shape=found.of_shape + lost), further)
     step = step_found(screening, contenders, j, further, found.p)
@@ -213,6 +213,12 @@ def _with_accepted(
     further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
     return Following(replace(found, steps=(*kept, step)), further)
+
+
+def _without_error_of_shape(before: Baseline, further: Baseline) -> float:
+    """ln evidence of a model with a place more under the errors that the model had before."""
+    fitted = fit(further.model, before.noise, further.fitted.point)
+    return log_evidence(replace(further, noise=before.noise, fitted=fitted))
 
 
 def _kept(suspects: Mapping[str, Suspect], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
