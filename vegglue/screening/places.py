@@ -81,10 +81,10 @@ def places_around(model: Model, point: Point, term: Term, place: Mapping[str, fl
     """Spots of one term and size around a place, its x, y, length and width [m]; share: how far apart they stand over
     their half length and half width.
     """
-    grid, (length, width) = model.site.grid, (place["length"], place["width"])
-    steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1)
+    length, width = place["length"], place["width"]
+    steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1, dtype=float)
     x, y = place["x"] + steps * length, place["y"] + steps * width
-    return _places_over(model, point, {term: [bumps_at(grid, x, y, length, width)]})[0]
+    return _places_over(model, point, {term: [bumps_at(model.site.grid, x, y, length, width)]})[0]
 
 
 def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Bumps]]) -> tuple[Places, ...]:
