@@ -150,8 +150,12 @@ def with_own_error(base: Baseline) -> Baseline:
 
 
 def log_evidence(base: Baseline) -> float:
-    """ln p(y) - 1/2 ln|C| of a calibrated model, C the covariance of its errors, up to a constant of the data [-]."""
-    return log_evidence_under(base.fitted) - float(np.log(np.diag(base.noise.lower)).sum())
+    """ln p(y) - 1/2 ln|C| of a calibrated model, C the covariance of its errors, up to a constant of the data [-].
+
+    Under the errors as they are told now: a screening tells them anew, and keeps the place of the fit.
+    """
+    here = at_point(base.noise, base.fitted.point)
+    return log_evidence_under(here) - float(np.log(np.diag(base.noise.lower)).sum())
 
 
 def for_prediction(base: Baseline) -> Baseline:

@@ -53,7 +53,7 @@ MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 MOST_FOLLOWED = 3
 # Odds within which another of the same kind is followed: the grid that hypotheses are searched on decides no closer.
 SAME_KIND_ODDS = 3.0
-# Odds by which a place may lead a listed effect that is taken all the same, for what is known goes before what is vague.
+# Odds by which a place may lead a listed effect that is taken all the same: what is known goes before what is vague.
 # Chosen after open-n, where a push far upstream of all sections led the skewed inflow by 4.7, and a scour hole of the
 # blind study that led one section's probes by 7.
 KNOWN_FIRST_ODDS = 5.0
