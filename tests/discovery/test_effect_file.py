@@ -9,9 +9,9 @@ import pytest
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Experiment
-from vegglue.discovery.discovered import Discovery, LawFound
+from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
 from vegglue.discovery.effect_file import effect_name, effect_text
-from vegglue.effects.grammar import LAWS, Law
+from vegglue.effects.grammar import LAWS, PRODUCTS, Law
 from vegglue.errors import InputError
 from vegglue.workflow import discover as verb
 from vegglue.workflow.check import check_effects, doubts_of
@@ -49,7 +49,7 @@ def test_the_file_does_what_the_law_does(law: Law) -> None:
     for reference in (0.3, -0.2) if law.quantity.name == "along" else (0.3,):
         found = found_law(law, reference=reference if law.form.quantiles else None)
         names: dict[str, object] = {}
-        exec(effect_text(found, None), names)
+        exec(effect_text([found], None), names)
         (effect,) = names["EFFECTS"]
         strength = np.array([-0.8, 1.3])
         written = effect.act(water(), strength=strength)
@@ -57,6 +57,57 @@ def test_the_file_does_what_the_law_does(law: Law) -> None:
         assert written.keys() == wanted.keys()
         for name, values in written.items():
             np.testing.assert_allclose(values, wanted[name], rtol=1e-12, atol=1e-15)
+
+
+PRODUCT = found_law(
+    next(one for one in PRODUCTS["law_bank_speed_step"] if one.quantity.name == "depth"), reference=0.5, first=0.3
+)
+
+
+@pytest.mark.parametrize("name", ["law_viscosity_along_part", "law_floor_depth_hump", "law_plants_front_fading"])
+def test_the_file_of_a_product_does_what_it_and_its_law_do(name: str) -> None:
+    law = found_law(LAWS[name], reference=-0.2 if "along" in name else 0.3)
+    for product in PRODUCTS[name]:
+        shapes = {"reference": 0.4} if product.form.quantiles else {}
+        found = found_law(product, reference=shapes.get("reference"), first=law.reference)
+        names: dict[str, object] = {}
+        exec(effect_text([law, found], None), names)
+        first, second = names["EFFECTS"]
+        assert first.name == effect_name(law)
+        assert second.name == f"{first.name}_by_{product.quantity.name}"
+        strength = np.array([-0.8, 1.3])
+        wanted = product.effect.act(water(), strength=strength, first=law.reference, **shapes)
+        for key, values in second.act(water(), strength=strength).items():
+            np.testing.assert_allclose(values, wanted[key], rtol=1e-12, atol=1e-15)
+
+
+def product_found(product: LawFound) -> ProductFound:
+    """A product as a search finds it, but for its refit, which no file asks for."""
+    return ProductFound(product, SimpleNamespace(), strength_of_law=-0.7)
+
+
+def test_a_product_is_written_and_told_beside_its_law(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = Discovery(0.001, 44, (LAW,), {}, product=product_found(PRODUCT))
+    monkeypatch.setattr(verb, "discover_laws", lambda *_: found)
+    result = discover(load_case(CONFIG), to=tmp_path / "child.yaml")
+    assert result.child is not None
+    assert result.effect_file is not None
+    assert list(result.child.effects) == ["bank_speed_step", "bank_speed_step_by_depth"]
+    assert check_effects(result.effect_file, trust=True) == {"bank_speed_step": [], "bank_speed_step_by_depth": []}
+    assert found.sentence.endswith("What the speed does to friction of the banks changes evenly with the depth.")
+    title, equation, seen, _ = found.product.lines
+    assert title == "What the speed does to friction of the banks changes evenly with the depth (chance 90 %)."
+    assert equation == (
+        "k -> k exp(c g) on the banks, g = (tanh(5 (|U|/0.3 m/s - 1)) / 2) (h/0.5 m - 1, at most 2), "
+        "c = -0.80 (95 %: -1.00 to -0.60), beside a = -0.70"
+    )
+    assert seen.startswith("seen for h from 0.1 to 0.6 m: there the term, where the first g is 1, changes by a factor")
+    assert found.lines[-len(found.product.lines) :] == found.product.lines
+
+
+def test_no_product_is_written_where_no_law_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = Discovery(0.001, 44, (replace(LAW, same_as="bank_trend"),), {}, product=product_found(PRODUCT))
+    assert found.written == ()
 
 
 def discovered(monkeypatch: pytest.MonkeyPatch, config: Path, target: Path, law: LawFound) -> DiscoveredCase:

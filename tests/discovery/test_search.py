@@ -14,7 +14,7 @@ from vegglue.discovery.discovered import Discovery
 from vegglue.discovery.search import discover_laws
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
-from vegglue.screening.laws_in_case import LEAST_SPREAD, laws_in_case
+from vegglue.screening.laws_in_case import LEAST_SPREAD, laws_in_case, products_in_case
 from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
 
@@ -55,6 +55,24 @@ def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
     return discover_laws(replace(model, station=station))
 
 
+def test_products_have_the_references_of_both_laws(model: Model) -> None:
+    coarse = coarser(model)
+    assert coarse is not None
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    law = next(one for one in laws_in_case(coarse, point, []) if one.law.name == "law_viscosity_offset_step")
+    products = {one.law.quantity.name: one for one in products_in_case(coarse, point, law, 0.6)}
+    assert {"depth", "speed", "along", "edge"} <= set(products)
+    assert "offset" not in products
+    for one in products.values():
+        assert {settings["first"] for settings in one.candidate.settings()} == {0.6}
+    assert len(products["along"].candidate.settings()) == 1
+    assert len(products["edge"].candidate.settings()) > 5
+    # The step changes by nearly 1 over what was seen, and the trend by what was seen of x/L.
+    low, high = products["along"].seen
+    assert products["along"].candidate.amplitude.scale == pytest.approx(0.5 / (high - low), rel=0.05)
+
+
 @pytest.mark.parametrize(("p", "words"), [(0.4, "errors alone leave as much in 40 % of cases"), (0.001, "is missing")])
 def test_silence_says_whether_something_is_missing(p: float, words: str) -> None:
     assert words in Discovery(p, 65, (), {}).sentence
@@ -77,6 +95,19 @@ def test_a_hidden_law_is_found(model: Model, hidden: str, seed: int) -> None:
     found = searched(model, [hidden], seed)
     assert found.best is not None, found
     assert found.best.law.name.rsplit("_", 1)[0] == hidden.rsplit("_", 1)[0]
+    assert found.product is None, found.product
+
+
+@pytest.mark.slow
+def test_a_law_that_changes_along_the_channel_is_a_product(model: Model) -> None:
+    hidden = ["law_viscosity_offset_step=-1.12", "law_viscosity_offset_step_by_along=-3"]
+    found = searched(model, hidden, 2)
+    assert found.best is not None, found
+    assert found.best.law.subject == ("viscosity", "offset")
+    assert found.product is not None, found
+    assert found.product.found.law.name == f"{found.best.law.name}_by_along"
+    low, high = found.product.found.interval95
+    assert low < -3.0 < high
 
 
 @pytest.mark.slow

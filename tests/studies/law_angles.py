@@ -24,7 +24,8 @@ from law_sets import LAW_EDITION, RATIOS, STUDY, knowing_hidden
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.discovery.search import HELD, MOST_QUANTITIES, chances_in_set
+from vegglue.discovery.chances import chances_in_set
+from vegglue.discovery.search import HELD, MOST_QUANTITIES
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 from vegglue.screening import score_test

@@ -24,6 +24,7 @@ from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.refits import Refit
 from vegglue.discovery.discovered import Discovery
 from vegglue.discovery.search import laws_beyond
 from vegglue.engine.interface import linearise
@@ -74,6 +75,7 @@ def _found_in(found: Discovery) -> dict[str, Any]:
              "chance": one.chance, "strength": one.strength, "reference": one.reference, "same_as": one.same_as}
             for one in found.laws
         ],
+        "product": "" if found.product is None else found.product.found.law.name,
         "others": found.others,
         "compared": dict(found.compared),
     }  # fmt: skip
@@ -88,6 +90,8 @@ def _errors_held_out(trial: LawTrial, data: LawDataSet, base: Baseline, found: D
     if found.likeliest is not None:
         one = found.likeliest
         told = _error_with(data, replace(base, model=model), one.candidate, dict(one.shapes), one.amplitude)
+    if found.product is not None and found.likeliest is not None:
+        told = _error_with_both(data, replace(base, model=model), found.likeliest, found.product.refit)
     if data.hidden is not None:
         known = replace(model, case=knowing_hidden(model.case)) if trial.group == "law" else model
         one = candidate_named(known.case, model.station, trial.hide)
@@ -109,6 +113,17 @@ def _error_with(
     except InputError:
         return None
     return _error_of(data, case, there)
+
+
+def _error_with_both(data: LawDataSet, base: Baseline, law: Refit, product: Refit) -> float | None:
+    """Of the model with a law and its product, calibrated from where both were found."""
+    case = with_effect(base.model.case, law.candidate, law.shapes)
+    both = replace(base.model, case=with_effect(case, product.candidate, product.shapes))
+    try:
+        there = baseline(both, product.fitted.point.z).fitted.point.z
+    except InputError:
+        return None
+    return _error_of(data, both.case, there)
 
 
 def _error_of(data: LawDataSet, case: Case, z: Array) -> float | None:

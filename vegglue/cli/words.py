@@ -52,8 +52,10 @@ def show(case: Case, runs: Path, result: Any) -> None:
 
 def _show_discovery(result: DiscoveredCase) -> None:
     print(result.found.sentence)
-    for law in result.found.laws:
-        first, *further = law.lines
+    told = [law.lines for law in result.found.laws]
+    if result.found.product is not None:
+        told.append(result.found.product.lines)
+    for first, *further in told:
         print("\n".join([f"- {first}", *(f"  {line}" for line in further)]))
     for name, chance in result.found.others.items():
         print(f"- {name} (chance {chance_told(chance)})")

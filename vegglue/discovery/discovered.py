@@ -24,6 +24,15 @@ def signed(reference: float) -> str:
     return f"({reference:g})" if reference < 0.0 else f"{reference:g}"
 
 
+def unit_of(law: Law) -> str:
+    """Of the quantity of a law, with a space before it; nothing for a pure number."""
+    return "" if law.quantity.unit == "-" else f" {law.quantity.unit}"
+
+
+def _with_unit(reference: float | None, law: Law) -> str:
+    return "" if reference is None else f"{signed(reference)}{unit_of(law)}"
+
+
 @dataclass(frozen=True)
 class LawFound:
     """A law with its reference r, its strength a and the 95 % interval of it [-].
@@ -31,7 +40,8 @@ class LawFound:
     chance: that its term changes with its quantity, in whatever form; the law is the form that explains most.
 
     scale: a plausible strength; same_as: the listed effect that it restates, or empty; seen: from where to where the
-    data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations.
+    data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations; first: the
+    reference of the law that a product multiplies, where that has one.
     """
 
     law: Law
@@ -44,6 +54,7 @@ class LawFound:
     log_evidence: float
     seen: tuple[float, float]
     alike: tuple[str, ...]
+    first: float | None = None
 
     @property
     def name(self) -> str:
@@ -53,12 +64,13 @@ class LawFound:
     @property
     def unit(self) -> str:
         """Of its quantity, with a space before it; nothing for a pure number."""
-        return "" if self.law.quantity.unit == "-" else f" {self.law.quantity.unit}"
+        return unit_of(self.law)
 
     @property
     def equation(self) -> str:
-        """With the reference in it, the strength as a letter."""
-        return self.law.equation("" if self.reference is None else f"{signed(self.reference)}{self.unit}")
+        """With the references in it, the strength as a letter."""
+        of_first = "" if self.law.times is None else _with_unit(self.first, self.law.times)
+        return self.law.equation(_with_unit(self.reference, self.law), of_first)
 
     @property
     def factor(self) -> float:
@@ -77,13 +89,33 @@ class LawFound:
         """The law in words, as an equation, and how far to trust it."""
         low, high = self.interval95
         same = f" It is the listed effect {self.same_as}." if self.same_as else ""
+        letter, where = (
+            ("a", "there it") if self.law.times is None else ("c", "there the term, where the first g is 1,")
+        )
         told = [
             f"{self.law.title} (chance {chance_told(self.chance)}).{same}",
-            f"{self.equation}, a = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
-            f"seen for {self.range_seen}: there it changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
+            f"{self.equation}, {letter} = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
+            f"seen for {self.range_seen}: {where} changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
         ]
         more = f" and {len(self.alike) - MOST_ALIKE} more" if len(self.alike) > MOST_ALIKE else ""
         return [*told, f"the same trace: {', '.join(self.alike[:MOST_ALIKE])}{more}"] if self.alike else told
+
+
+@dataclass(frozen=True)
+class ProductFound:
+    """found: a product of the best law with another quantity, told as any law; refit: of it, beside that law, whose a
+    is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
+    """
+
+    found: LawFound
+    refit: Refit
+    strength_of_law: float
+
+    @property
+    def lines(self) -> list[str]:
+        """As those of a law."""
+        first, equation, *further = self.found.lines
+        return [first, f"{equation}, beside a = {self.strength_of_law:.2f}", *further]
 
 
 @dataclass(frozen=True)
@@ -92,7 +124,8 @@ class Discovery:
 
     laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together; none
     where nothing is found. compared: ln evidence of all that was calibrated, by name [-];
-    likeliest: the likeliest of these, where it is in the model and not in the data.
+    likeliest: the likeliest of these, where it is in the model and not in the data; product: of the best law with
+    another quantity, where that law leaves a misfit.
     """
 
     p: float
@@ -101,6 +134,7 @@ class Discovery:
     others: dict[str, float]
     compared: Mapping[str, float] = field(default_factory=dict)
     likeliest: Refit | None = None
+    product: ProductFound | None = None
 
     @property
     def best(self) -> LawFound | None:
@@ -116,7 +150,8 @@ class Discovery:
         if best is not None and best.same_as:
             return f"The law that explains most is the listed effect {best.same_as}; add it by that name."
         if best is not None:
-            return f"{best.law.title}: a law explains the misfit, with a chance of {chance_told(best.chance)}."
+            more = "" if self.product is None else f" {self.product.found.law.title}."
+            return f"{best.law.title}: a law explains the misfit, with a chance of {chance_told(best.chance)}.{more}"
         if self.others:
             name, chance = max(self.others.items(), key=lambda pair: pair[1])
             return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
@@ -125,4 +160,18 @@ class Discovery:
         return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
 
     def __repr__(self) -> str:
-        return in_short(f"Discovery: {self.sentence}", [line for law in self.laws for line in law.lines])
+        return in_short(f"Discovery: {self.sentence}", self.lines)
+
+    @property
+    def written(self) -> tuple[LawFound, ...]:
+        """What a child config holds: the best law and its product; none where it only restates a listed effect."""
+        best = self.best
+        if best is None or best.same_as:
+            return ()
+        return (best,) if self.product is None else (best, self.product.found)
+
+    @property
+    def lines(self) -> list[str]:
+        """All laws, and the product."""
+        told = [line for law in self.laws for line in law.lines]
+        return told if self.product is None else [*told, *self.product.lines]

@@ -3,7 +3,8 @@
 The model is calibrated and screened as for a diagnosis. While errors alone leave as much for laws, nothing is said.
 Else the most promising laws are calibrated with the model and ranked by their evidence beside listed effects, places
 and instruments, which are as likely before as in a diagnosis; all laws together are a tenth as likely as all listed
-effects (`law_screening`), and so is something at a place, which is as vague.
+effects (`law_screening`), and so is something at a place, which is as vague. A law that is best is looked at again for
+products with another quantity (`product`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,12 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempering
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.discovery.discovered import Discovery, LawFound
+from vegglue.discovery.chances import chances_in_set
+from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
+from vegglue.discovery.product import product_beside
 from vegglue.effects.grammar import SAME_AS, Law
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
@@ -27,10 +29,6 @@ from vegglue.screening.score_test import ALIKE
 # Quantities of terms of which a law is calibrated at most; as many as listed effects in a diagnosis. Of the first two,
 # which decide what is told, two forms are. Chosen, not measured: each costs a fit.
 MOST_QUANTITIES, SEVERAL_FORMS, FORMS_REFITTED = 8, 2, 2
-# Relative error of a trace [-], half that of a diagnosis: of what cells and laws of nature do to a trace, most is
-# common to quantities of one term, which are what is to be told apart. Chosen after 76 sets of the study of laws were
-# seen with 0, 0.07 and 0.15: 16 more were not.
-TRACE_ERROR = 0.07
 # Chance that the set of laws and other causes holds together [-].
 HELD = 0.95
 
@@ -55,7 +53,8 @@ def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = sile
         return Discovery(screening.p, len(screening.laws), (), {})
     known = _as_vague(screening, contenders_of(screening.listed, watch, screening.kind.total))
     laws = _laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
-    return _discovery(screening, sorted([*known, *laws], key=lambda one: -one.log_evidence))
+    found = _discovery(screening, sorted([*known, *laws], key=lambda one: -one.log_evidence))
+    return replace(found, product=_product(screening, found, watch))
 
 
 def _as_vague(screening: LawScreening, found: Sequence[Contender]) -> list[Contender]:
@@ -135,13 +134,6 @@ def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discover
     )
 
 
-def chances_in_set(evidence: Array) -> Array:
-    """As in `competition`, with TRACE_ERROR."""
-    tempered = 1.0 + TRACE_ERROR**2 * 2.0 * np.maximum(evidence, 0.0)
-    weight = np.exp((evidence - evidence.max()) / tempered)
-    return np.asarray(weight / weight.sum())
-
-
 def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFound:
     refit = one.what
     assert isinstance(refit, Refit)
@@ -158,6 +150,15 @@ def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFou
         seen=of_law.seen,
         alike=_alike(screening, one, of_law.law),
     )
+
+
+def _product(screening: LawScreening, found: Discovery, watch: Watch) -> ProductFound | None:
+    """Of the best law with another quantity, where that law leaves a misfit."""
+    best, refit = found.best, found.likeliest
+    if best is None or best.same_as or refit is None:
+        return None
+    of_law = next(one for one in screening.laws if one.law.name == best.law.name)
+    return product_beside(screening.listed.search, screening.listed.fingerprints, of_law, refit, watch)
 
 
 def _alike(screening: LawScreening, one: Contender, own: Law) -> tuple[str, ...]:

@@ -5,11 +5,12 @@
 A law is a term, a quantity and a form: friction of the banks, with the speed, as a step. exp keeps every term above 0.
 Quantities q are measured by a reference r, the middle of what the data have seen; a form makes g of q and r, 0 or
 nearly so at q = r, so that a law does not stand in for the calibrated coefficient of its term. Each law is an effect
-as any other, with the tag `law`, which the search of a diagnosis leaves out. A product of two g is a quantity more.
+as any other, with the tag `law`, which the search of a diagnosis leaves out. A product c g_1 g_2 is a law beside the
+law a g_1 that it belongs to: what the one quantity does then changes evenly with another.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -70,14 +71,19 @@ class LawForm:
 
 @dataclass(frozen=True)
 class Law:
-    """A law of the grammar, `effect` as the library lists it."""
+    """A law of the grammar, `effect` as the library lists it; times: the law whose g its own g is multiplied by, which
+    has a reference of its own, `first`.
+    """
 
     term: LawTerm
     quantity: LawQuantity
     form: LawForm
+    times: "Law | None" = None
 
     @property
     def name(self) -> str:
+        if self.times is not None:
+            return f"{self.times.name}_by_{self.quantity.name}"
         return f"law_{self.term.name}_{self.quantity.name}_{self.form.name}"
 
     @property
@@ -88,39 +94,61 @@ class Law:
     @property
     def title(self) -> str:
         words = self.form.words.format(q=self.quantity.words)
+        if self.times is not None:
+            return f"What {self.times.quantity.words} does to {self.term.words} {words}"
         return f"{self.term.words[0].upper()}{self.term.words[1:]} {words}"
 
-    def equation(self, reference: str = "r") -> str:
-        """In one line; reference: the value of r, where it is known."""
-        g = self.form.equation.format(q=self.quantity.symbol, r=reference)
-        return f"{self.term.symbol} -> {self.term.symbol} exp(a g) {self.term.where}, g = {g}"
+    def equation(self, reference: str = "r", first: str = "r_1") -> str:
+        """In one line; reference: the value of r, where it is known; first: the same of the law that it multiplies."""
+        a, g = ("a", self.g_in_words(reference))
+        if self.times is not None:
+            a, g = ("c", f"({self.times.g_in_words(first)}) ({g})")
+        return f"{self.term.symbol} -> {self.term.symbol} exp({a} g) {self.term.where}, g = {g}"
 
-    def g(self, cells: Cells, reference: Array | float = 1.0) -> Array:
+    def g_in_words(self, reference: str) -> str:
+        """Its own g, without that of the law that it multiplies."""
+        return self.form.equation.format(q=self.quantity.symbol, r=reference)
+
+    def g(self, cells: Cells, reference: Array | float = 1.0, first: Array | float = 1.0) -> Array:
         """g (nx, ny, m) [-]."""
-        return self.form.of(self.quantity.of(cells), reference)
+        own = self.form.of(self.quantity.of(cells), reference)
+        return own if self.times is None else own * self.times.g(cells, first)
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Its reference, and that of the law that it multiplies, where g has one."""
+        of_first = () if self.times is None else _reference("first", self.times)
+        return (*_reference("reference", self), *of_first)
 
     @property
     def effect(self) -> Effect:
-        quantity, strongest = self.quantity, self.form.strongest
-        low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
-        meaning = f"reference r of {quantity.words}"
-        shape = Shape("reference", quantity.unit, meaning, quantity.usual, low, high)
+        strongest, letter = self.form.strongest, "a" if self.times is None else "c"
         return Effect(
             name=self.name,
             stage=self.term.stage,
             title=self.title,
             equation=self.equation(),
             act=partial(_by_law, self),
-            amplitude=Amplitude("strength", "-", "strength a", PLAUSIBLE_STRENGTH, -strongest, strongest),
-            shapes=(shape,) if self.form.quantiles else (),
+            amplitude=Amplitude("strength", "-", f"strength {letter}", PLAUSIBLE_STRENGTH, -strongest, strongest),
+            shapes=self.shapes,
             source="definition",
             checked=True,
             tags=("law",),
         )
 
 
-def _by_law(law: Law, cells: Cells, strength: Array, reference: Array | float = 1.0) -> dict[str, Array]:
-    factor = np.exp(strength * law.g(cells, reference) * law.term.share(cells))
+def _reference(name: str, law: Law) -> tuple[Shape, ...]:
+    """The reference of a law as a shape of that name; none where its g has none."""
+    quantity = law.quantity
+    low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
+    shape = Shape(name, quantity.unit, f"reference r of {quantity.words}", quantity.usual, low, high)
+    return (shape,) if law.form.quantiles else ()
+
+
+def _by_law(
+    law: Law, cells: Cells, strength: Array, reference: Array | float = 1.0, first: Array | float = 1.0
+) -> dict[str, Array]:
+    factor = np.exp(strength * law.g(cells, reference, first) * law.term.share(cells))
     if law.term.stage == "exchange":
         return {"viscosity": cells.viscosity * (factor - 1.0)}
     return {"rate": cells.rate * factor}
@@ -224,6 +252,19 @@ LAWS: dict[str, Law] = {
     for terms, quantities, forms in _SENTENCES
     for law in (Law(term, quantity, form) for term in terms for quantity in quantities for form in forms)
 }
+# By what a law is multiplied: the even form of each quantity, which says whether the one changes with the other at all.
+_EVEN = {
+    "depth": "ramp", "speed": "ramp", "froude": "ramp", "shear": "ramp", "along": "trend", "offset": "ramp",
+    "front": "fading", "edge": "fading",
+}  # fmt: skip
+PRODUCTS: dict[str, tuple[Law, ...]] = {
+    name: tuple(
+        replace(other, times=law)
+        for other in LAWS.values()
+        if other.term == law.term and other.quantity != law.quantity and other.form.name == _EVEN[other.quantity.name]
+    )
+    for name, law in LAWS.items()
+}
 # Laws that only restate an effect of the list, within the range in which they are not held.
 SAME_AS = {
     "law_bank_along_trend": "bank_trend",
@@ -232,3 +273,4 @@ SAME_AS = {
     "law_floor_depth_power": "depth_dependent_bed",
 }
 EFFECTS = tuple(law.effect for law in LAWS.values())
+EFFECTS_OF_PRODUCTS = tuple(product.effect for some in PRODUCTS.values() for product in some)

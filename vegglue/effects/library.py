@@ -24,11 +24,12 @@ SHIPPED: tuple[Effect, ...] = (
 
 @lru_cache
 def library(own: Path | None = None) -> Mapping[str, Effect]:
-    """All effects by name: those shipped, laws of the grammar, then those of a user's file, which is run to read them.
+    """All effects by name: those shipped, laws of the grammar and their products, then those of a user's file, which is
+    run to read them.
 
     Errors: InputError when the file cannot be run, has no EFFECTS, or repeats a name.
     """
-    known = {effect.name: effect for effect in (*SHIPPED, *grammar.EFFECTS)}
+    known = {effect.name: effect for effect in (*SHIPPED, *grammar.EFFECTS, *grammar.EFFECTS_OF_PRODUCTS)}
     if own is None:
         return MappingProxyType(known)
     for effect in effects_of(own):

@@ -5,6 +5,7 @@ correlated errors. Listed effects, places and instruments keep their kinds and c
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -96,7 +97,7 @@ def law_fingerprints(
     search = search_model(base)
     listed = _left(known or fingerprints_of(search, half_width(base.model.site)), without)
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
-    return LawFingerprints(listed, laws, _with_laws(listed, laws, search) if laws else listed)
+    return LawFingerprints(listed, laws, with_laws(listed, laws, search) if laws else listed)
 
 
 def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
@@ -105,9 +106,9 @@ def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...]
     full = screen(base, flagged, every, LAW_SEED)
     count = len(listed.settings)
     columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
-    kind = _kind_of_laws(full, laws, columns, count)
+    kind = kind_of_laws(full, laws, columns, slice(count, None))
     return LawScreening(
-        listed=_of_listed(full, listed),
+        listed=of_listed(full, listed),
         laws=laws,
         kind=kind,
         columns=columns,
@@ -133,7 +134,7 @@ def _left(found: Fingerprints, without: tuple[str, ...]) -> Fingerprints:
     )
 
 
-def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel) -> Fingerprints:
+def with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel) -> Fingerprints:
     """Fingerprints of listed effects, then of laws."""
     first = len(listed.settings)
     columns, settings, amplitudes, causes = list(listed.columns), list(listed.settings), list(listed.amplitudes), []
@@ -166,16 +167,21 @@ def _part(projected: score_test.Projected, columns: slice) -> score_test.Project
     )
 
 
-def _kind_of_laws(full: Screening, laws: list[LawInCase], columns: list[np.ndarray], first: int) -> HypothesisKind:
-    """All quantities of all terms are as likely before, all forms of one, and all references of a form."""
-    plausible = np.array([one.plausible_gain for one in full.fingerprints.amplitudes[first:]])
+def kind_of_laws(
+    full: Screening, laws: Sequence[LawInCase], columns: Sequence[np.ndarray], part: slice
+) -> HypothesisKind:
+    """All quantities of all terms are as likely before, all forms of one, and all references of a form.
+
+    part: where the fingerprints of these laws stand in `full`; columns: of each law, in that part.
+    """
+    plausible = np.array([one.plausible_gain for one in full.fingerprints.amplitudes[part]])
     prior, forms = np.empty(plausible.size), Counter(one.law.subject for one in laws)
     for one, of_law in zip(laws, columns, strict=True):
         prior[of_law] = 1.0 / (GROUPS * LISTED_ODDS * len(forms) * forms[one.law.subject] * of_law.size)
-    return kind_of_hypotheses("law", _part(full.projected, slice(first, None)), plausible, prior)
+    return kind_of_hypotheses("law", _part(full.projected, part), plausible, prior)
 
 
-def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
+def of_listed(full: Screening, listed: Fingerprints) -> Screening:
     """The screening of the listed effects alone, with the noise that was estimated with laws."""
     count, projected = len(listed.settings), _part(full.projected, slice(len(listed.settings)))
     return replace(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.effects.definition import Effect
-from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, SAME_AS, Law
+from vegglue.effects.definition import Effect, Shape
+from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, PRODUCTS, SAME_AS, Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.measurements.kinds import velocity_rows
@@ -44,43 +44,74 @@ class LawInCase:
 
 def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
     """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
-    flows = [centre_cells(model, point, experiment) for experiment in model.case.experiments]
-    measured = [at_sections(model, cells, name) for cells, name in zip(flows, model.case.experiments, strict=True)]
-    found = []
-    for law in LAWS.values():
-        if SAME_AS.get(law.name) in listed or law.name in model.case.effects:
-            continue
-        values = np.concatenate([_values(law, cells) for cells in measured])
-        if values.size < FEWEST_SEEN:
-            values = np.concatenate([_values(law, cells) for cells in flows])
-        if values.size < FEWEST_SEEN:
-            continue
-        low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
-        if high - low < LEAST_SPREAD * abs(middle):
-            continue
-        effect = _with_references(law, values)
-        found.append(LawInCase(law, Candidate(effect, scale=_plausible(effect, law, low, high)), (low, high)))
-    return found
+    water = _water_of(model, point)
+    return [
+        found
+        for law in LAWS.values()
+        if SAME_AS.get(law.name) not in listed and law.name not in model.case.effects
+        if (found := _in_case(law, water)) is not None
+    ]
 
 
-def _plausible(effect: Effect, law: Law, low: float, high: float) -> float:
-    """A plausible strength a: over what was seen exp(a g) changes by PLAUSIBLE_STRENGTH in ln.
+def products_in_case(model: Model, point: Point, law: LawInCase, reference: float | None) -> list[LawInCase]:
+    """Products of a law that is in the model with other quantities; reference: of that law, where it has one."""
+    water, change = _water_of(model, point), _change_of(law.law, law.seen, reference)
+    products = [_in_case(product, water, reference, change) for product in PRODUCTS[law.law.name]]
+    return [product for product in products if product is not None]
+
+
+@dataclass(frozen=True)
+class _Water:
+    """The flow of each experiment: in all cells, and dry but for the sections that were measured."""
+
+    everywhere: list[Cells]
+    measured: list[Cells]
+
+
+def _water_of(model: Model, point: Point) -> _Water:
+    experiments = list(model.case.experiments)
+    flows = [centre_cells(model, point, experiment) for experiment in experiments]
+    return _Water(flows, [at_sections(model, cells, name) for cells, name in zip(flows, experiments, strict=True)])
+
+
+def _in_case(law: Law, water: _Water, first: float | None = None, change: float = 1.0) -> LawInCase | None:
+    """A law with its references and a plausible strength; None where the data have seen too little of its quantity.
+
+    first, change: reference of the law that it multiplies, and how much the g of that law changes over what was seen.
+    """
+    values = np.concatenate([_values(law, cells) for cells in water.measured])
+    if values.size < FEWEST_SEEN:
+        values = np.concatenate([_values(law, cells) for cells in water.everywhere])
+    if values.size < FEWEST_SEEN:
+        return None
+    low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
+    if high - low < LEAST_SPREAD * abs(middle):
+        return None
+    effect = _with_references(law, values, first)
+    default = next((shape.default for shape in effect.shapes if shape.name == "reference"), None)
+    whole = max(change * _change_of(law, (low, high), default), 1e-9)
+    scale = min(PLAUSIBLE_STRENGTH / whole, 0.5 * effect.amplitude.high)
+    return LawInCase(law, Candidate(effect, scale=scale), (low, high))
+
+
+def _change_of(law: Law, seen: tuple[float, float], reference: float | None) -> float:
+    """How much g changes over what was seen [-]. A strength a is plausible where a times that is PLAUSIBLE_STRENGTH.
 
     So all laws are as free to change what the data see, however g is counted; at most half way to the support's end.
     """
-    reference = effect.shapes[0].default if effect.shapes else 1.0
-    change = float(np.ptp(law.form.of(np.linspace(low, high, VALUES_SEEN), reference)))
-    return min(PLAUSIBLE_STRENGTH / max(change, 1e-9), 0.5 * effect.amplitude.high)
+    return float(np.ptp(law.form.of(np.linspace(*seen, VALUES_SEEN), 1.0 if reference is None else reference)))
 
 
-def _with_references(law: Law, values: Array) -> Effect:
-    """The effect of a law that is tried with the quantiles of its quantity as references."""
-    effect = law.effect
-    if not effect.shapes:
-        return effect
+def _with_references(law: Law, values: Array, first: float | None) -> Effect:
+    """The effect of a law that is tried with the quantiles of its quantity as references; first: as in `_in_case`."""
     tried = sorted({_rounded(value) for value in np.quantile(values, law.form.quantiles)})
-    (shape,) = effect.shapes
-    return replace(effect, shapes=(replace(shape, default=tried[len(tried) // 2], grid=tuple(tried)),))
+
+    def told(shape: Shape) -> Shape:
+        if shape.name == "reference":
+            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried))
+        return shape if first is None else replace(shape, default=first)
+
+    return replace(law.effect, shapes=tuple(map(told, law.shapes)))
 
 
 def _rounded(value: float) -> float:

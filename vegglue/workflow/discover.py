@@ -33,8 +33,7 @@ class DiscoveredCase:
 
     def __repr__(self) -> str:
         written = [f"written to {self.effect_file}"] if self.effect_file else []
-        lines = [line for law in self.found.laws for line in law.lines]
-        return in_short(f"Discovery: {self.found.sentence}", [*lines, *written])
+        return in_short(f"Discovery: {self.found.sentence}", [*self.found.lines, *written])
 
 
 @one_thread()
@@ -61,23 +60,30 @@ def discover(
             raise InputError(f"--without: `{name}` is not an effect of the library: {nearest(name, known)}")
     with at_most(jobs):
         found = discover_laws(model_in(case), without, watch)
-    best = found.best
-    if best is None or best.same_as:
+    laws = found.written
+    if not laws:
         return DiscoveredCase(found, None, None)
-    name = effect_name(best)
+    name = effect_name(laws[-1])  # of a product, which begins with that of its law
     target = Path(to) if to is not None else case.source.with_name(f"{case.source.stem}+{name}{case.source.suffix}")
     file = target.with_name(f"{target.stem}.py")
-    return DiscoveredCase(found, file, _written(case, best, target, file, force))
+    return DiscoveredCase(found, file, _written(case, laws, target, file, force))
 
 
-def _written(parent: Case, best: LawFound, target: Path, file: Path, force: bool) -> Case:
+def _written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:
     """The child config and the effect file it names, read back as any other."""
     if target.resolve() == parent.source:
         raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
-    text, name, law = effect_text(best, parent.effect_file), effect_name(best), best.law.effect
-    effect = replace(law, name=name, shapes=(), amplitude=replace(law.amplitude, scale=best.scale))
-    tree = child_tree(parent, target, [(Candidate(effect), {})])
+    text, names = effect_text(laws, parent.effect_file), " and ".join(map(effect_name, laws))
+    tree = child_tree(parent, target, [(_candidate(one), {}) for one in laws])
     tree = {"extends": tree.pop("extends"), "effect_file": file.name, **tree}
-    head = f"# Made by `vegglue discover`: {parent.name} with {name}.\n# {best.equation}.\n"
+    equations = "".join(f"# {one.equation}.\n" for one in laws)
+    head = f"# Made by `vegglue discover`: {parent.name} with {names}.\n{equations}"
     write_made({file: text, target: head + as_yaml(tree)}, "give another file by --to", force)
     return load_case(target, trust=True)  # the file was written here
+
+
+def _candidate(found: LawFound) -> Candidate:
+    """A law as its effect file has it: by that name, with its references in it."""
+    effect = found.law.effect
+    amplitude = replace(effect.amplitude, scale=found.scale)
+    return Candidate(replace(effect, name=effect_name(found), shapes=(), amplitude=amplitude))
