@@ -28,8 +28,8 @@ from vegglue.solver.wet_band import widen
 
 # Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
 CELL_STRIDE = 5
-# Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 with
-# 64 or 32, and 2.6 all at once, when each holds some 50 bytes in every cell.
+# Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 s
+# with 64 or 32, and 2.6 s all at once, when each holds some 50 bytes in every cell.
 STATIONS_TOGETHER = 128
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
 SMALL_CHANGE: dict[Term, float] = {
