@@ -256,8 +256,9 @@ def test_points_of_the_prior_lead_to_the_same_posterior(
     assert "of the prior" in describe(found)[0]
 
 
-def test_points_of_the_prior_are_tried_on_coarse_cells(reach: tuple[Case, Observations, Ensemble]) -> None:
-    model = model_of(*reach[:2])
+def test_points_of_the_prior_are_tried_on_coarse_cells(tmp_path: Path) -> None:
+    case = load_case(write_reach(tmp_path, ("cell: [1.0, 0.5]", "cell: [0.625, 0.375]"), KNOWN, ERRORS))
+    model = model_of(case, read_observations(case))
     tried = points_of_prior(model)
     assert tried.prediction.shape == (64, len(model.station))
     own = linearise(model, tried.z[3])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Single
 from vegglue.case.schema import Case
 from vegglue.effects.definition import Amplitude
 from vegglue.flow.local_changes import Term
@@ -83,7 +83,7 @@ class Engine:
     linearise: Callable[["Model", Array, Point | None, Wanted], Point | None]
     predict: Callable[["Model", Sequence[Point], Array], Array]
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
-    responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Array]]
+    responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Single]]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
     by_itself: Callable[["Model", Point], Point]
 
@@ -139,7 +139,7 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     return model.engine.responses(model, point, causes)
 
 
-def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Array]:
+def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
     """d prediction / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
     return model.engine.responses_to_cells(model, point, experiment, terms)
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Single
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.backwater import backwater
@@ -90,7 +90,7 @@ def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: f
 
 def _responses_to_cells(
     model: Model, point: Point, experiment: str, terms: Sequence[Term], time_step: float, longest: float
-) -> dict[Term, Array]:
+) -> dict[Term, Single]:
     """(f(change) - f(-change)) / (2 change) for every cell of the grid: a member each; (f(change) - f(0)) / change for
     water that enters, which comes without momentum, while water that leaves takes its own along.
     """
@@ -98,7 +98,7 @@ def _responses_to_cells(
     one = _problem(model, experiment, point.z[None])
     geometry = channel_geometry(model.case, model.site, experiment)
     start = np.repeat(point.flows[experiment], nx * ny, axis=3)
-    found: dict[Term, Array] = {}
+    found: dict[Term, Single] = {}
     for term in terms:
         predictions = []
         ahead, behind = MARCHED_CHANGE[term], 0.0 if term == "inflow" else -MARCHED_CHANGE[term]
@@ -106,7 +106,7 @@ def _responses_to_cells(
             problem = with_changed_term(one, geometry, term, change * np.eye(nx * ny).reshape(nx, ny, nx * ny))
             predictions.append(_read(model, experiment, problem, _rested(problem, start, time_step, longest)))
         response = (predictions[0] - predictions[1]).T / (ahead - behind)
-        found[term] = response.reshape(-1, nx, ny)
+        found[term] = response.reshape(-1, nx, ny).astype(np.float32)
     return found
 
 

@@ -42,9 +42,9 @@ class FoundModes:
     on_coarse: tuple[MapEstimate, ...]
 
     def coarse_point(self, coarse: Model) -> Point | None:
-        """The best mode's place on cells of twice the size, from the nearest that is known there."""
-        z = self.fits[0].point.z
-        near = min((one.point for one in self.on_coarse), key=lambda point: float(np.linalg.norm(point.z - z)))
+        """The best mode's place on cells of twice the size, from the nearest that is known there, if any is."""
+        z, known = self.fits[0].point.z, [one.point for one in self.on_coarse]
+        near = min(known, key=lambda point: float(np.linalg.norm(point.z - z)), default=None)
         return linearise_from(coarse, z, near)
 
 
