@@ -20,6 +20,11 @@ NOISES = (
 )  # fmt: skip
 RATIOS = (("ratio 3", ("listed3",)), ("ratio 6", ("listed6",)))
 LISTED, TWO = ("listed3", "listed6"), ("pair", "probe")
+# Data sets that were looked at one by one when places were changed: what is said of them is no proof of it.
+LOOKED_AT = {
+    *(f"second/twin/unlisted/{number}" for number in range(10)),
+    *(f"second/campaign/unlisted/{number}" for number in range(2)),
+}
 # Bins of the stated chances, and the mean distance of what comes true that is wanted at most.
 BINS, DISTANCE = 10, 0.05
 
@@ -44,6 +49,11 @@ class Told:
     mean: float
     count: int
     true: int
+
+
+def not_looked_at(met: Met) -> Met:
+    """The same of data sets that were not looked at."""
+    return lambda record: None if record["key"] in LOOKED_AT else met(record)
 
 
 LINES: tuple[Line, ...] = (
@@ -74,6 +84,10 @@ LINES: tuple[Line, ...] = (
     Line("... a place within 1.5 m of it, of all", ("unlisted",), what.place_near, 0.7),
     Line("... and with the right term, of all", ("unlisted",), what.right_term, 0.7),
     Line("... with the right term, of those within 1.5 m", ("unlisted",), what.right_term_if_near),
+    Line("Unlisted object not looked at: none of these", ("unlisted",), not_looked_at(what.none_of_these), 0.85),
+    Line("... a place within 1.5 m of it", ("unlisted",), not_looked_at(what.place_near), 0.7),
+    Line("... and with the right term", ("unlisted",), not_looked_at(what.right_term), 0.7),
+    Line("... a name or an instrument alone for it", ("unlisted",), not_looked_at(what.wrong_for_object), 0.05, True),
     Line("Instrument off: named as an instrument", ("instrument",), what.instrument_found, 0.9),
     Line("... or some effect of instruments in the set", ("instrument",), what.sensor_in_set),
     Line("Two effects, ratio 6 each: both in the set", ("pair",), what.in_set),
