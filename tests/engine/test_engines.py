@@ -154,7 +154,10 @@ def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     measured = models[0].station.assign(value=truth.prediction + errors, standard_error=0.002)
     exact, marched = (diagnose_model(replace(model, station=measured)) for model in models)
     assert exact.set
-    assert (marched.verdict.kind, marched.set) == (exact.verdict.kind, exact.set)
+    assert (marched.verdict.kind, set(marched.set)) == (exact.verdict.kind, set(exact.set))
+    # Those that bend alike are as likely to a per cent: which comes first is no difference.
+    for one, other in zip(exact.steps, marched.steps, strict=True):
+        assert other.chance == pytest.approx(one.chance, abs=0.03)
     # The model's own error is that of where the search on coarse cells ends, up to 0.14 standard errors from the best
     # place: other starts of the same engine move chi2 by 0.6 %.
     assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.02)
