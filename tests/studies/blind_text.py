@@ -10,8 +10,8 @@ them (drag may push, objects may be as large as piers and scour holes, a place i
 bad reading beside a floor level error, the first of its kind in the small channel, was looked at when rules for a
 place beside a listed effect were changed. So these thirteen are no proof; lines of objects that were not looked at
 stand by themselves below. All sets were then diagnosed anew. Sets with nothing hidden went first, with the code before
-the last change; it bears on evidences of models in which something was accepted or followed further, and those of them
-in which anything stood out were diagnosed once more with it.
+the last change; it bears on evidences of models in which something was accepted or followed further, and those of the
+small channel in which anything stood out were diagnosed once more with it.
 
 The fourth edition, of 202 sets, is dropped: on imperfect sites with nothing hidden something was named in 18 of 82.
 Errors of the sides of patches were not told as they act (see `site_error`), which alone made a viscosity stand out by
