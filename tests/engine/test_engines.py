@@ -163,5 +163,5 @@ def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.05)
     for name, score in exact.first_screening.scores.items():
         if abs(score) > 2.0:  # what hardly shows has no direction that differences could find
-            # Their errors' correlation is told as 0.861 and 0.875, which these few stations hardly hold: 4 % of a score.
+            # Their errors' correlation is told as 0.86 and 0.87, which these few stations hardly hold: 4 % of a score.
             assert marched.first_screening.scores[name] == pytest.approx(score, abs=0.1, rel=0.06), name
