@@ -57,6 +57,7 @@ def a_location(**fields: Any) -> Location:
     usual = Location(
         x=33.0, y=-0.6, length=1.8, width=0.45, term="drag", effect="unlisted_object", amplitude=0.4,
         interval95=(0.3, 0.5), unit="1/m", score=12.0, experiments=("low", "high"), odds={"eddies": 30.0, "bed": 4.0},
+        plausible=1.0,
     )  # fmt: skip
     return replace(usual, **fields)
 

@@ -159,9 +159,8 @@ def test_a_whole_diagnosis_says_the_same(models: tuple[Model, Model]) -> None:
     for one, other in zip(exact.steps, marched.steps, strict=True):
         assert other.chance == pytest.approx(one.chance, abs=0.03)
     # The model's own error is that of where the search on coarse cells ends, up to 0.14 standard errors from the best
-    # place: the amplitudes of the two lie 0.13 standard errors apart, and chi2 3.6 %, 0.6 of 17.7.
-    assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.05)
+    # place: other starts of the same engine move chi2 by 0.6 %.
+    assert marched.misfit.chi2 == pytest.approx(exact.misfit.chi2, rel=0.02)
     for name, score in exact.first_screening.scores.items():
         if abs(score) > 2.0:  # what hardly shows has no direction that differences could find
-            # Their errors' correlation is told as 0.86 and 0.87, which these few stations hardly hold: 4 % of a score.
-            assert marched.first_screening.scores[name] == pytest.approx(score, abs=0.1, rel=0.06), name
+            assert marched.first_screening.scores[name] == pytest.approx(score, abs=0.1), name

@@ -62,8 +62,13 @@ def test_spots_lie_in_the_water_and_reach_all_of_it(
 
 def test_a_plausible_inflow_is_a_share_of_what_flows() -> None:
     totals = [1.0, 2.0, *(float(sum(one.discharge.values())) for one in list(CASE.experiments.values())[2:])]
-    assert plausible_size(CASE, "inflow") == pytest.approx(0.05 * float(np.mean(totals)))
-    assert {plausible_size(CASE, term) > 0.0 for term in EFFECT_AT_PLACE} == {True}
+    assert plausible_size(CASE, "inflow", 1.0) == pytest.approx(0.05 * float(np.mean(totals)))
+    assert {plausible_size(CASE, term, 1.0) > 0.0 for term in EFFECT_AT_PLACE} == {True}
+
+
+def test_a_plausible_rise_of_the_bed_is_a_share_of_the_depth() -> None:
+    assert plausible_size(CASE, "bed", 0.12) == pytest.approx(0.12 * plausible_size(CASE, "bed", 1.0))
+    assert plausible_size(CASE, "drag", 0.12) == plausible_size(CASE, "drag", 1.0)
 
 
 def test_shapes_are_those_of_the_effect_to_a_centimetre() -> None:

@@ -50,8 +50,8 @@ KEPT = ROOT / "data" / "blind" / "records.jsonl"
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
-        "null-perfect": 100, "null-site": 100, "listed6": 40, "listed3": 28, "unlisted": 14, "instrument": 10,
-        "pair": 5, "probe": 5,
+        "null-perfect": 100, "null-site": 100, "listed6": 70, "listed3": 50, "unlisted": 34, "instrument": 20,
+        "pair": 10, "probe": 10,
     },
     ("second", "campaign"): {
         "null-perfect": 50, "null-site": 50, "listed6": 20, "listed3": 14, "unlisted": 8, "instrument": 6, "pair": 3,

@@ -23,7 +23,7 @@ from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import start_amplitude
-from vegglue.workflow.extend import Addition, found_additions, in_doubt
+from vegglue.workflow.extend import Addition, found_additions, in_doubt, values_found
 from vegglue.workflow.run_folder import calibrated_anew
 
 Errors = dict[str, Any]
@@ -36,7 +36,7 @@ def held_out(data: DataSet, found: Diagnosis, looked_into: bool) -> Errors:
     names are in kept_names; oracle: with the true effect, where that was looked into; noise: of a probe.
     """
     case, added = data.model.case, found_additions(data.model.case, found)
-    last = {name: three[0] for name, three in found.parameters.last.items()}
+    last = values_found(case, found)
     errors: Errors = {"noise": float(data.unseen["standard_error"].median())}
     errors["before"] = _error(data, case, found.parameters.first)
     errors["after"] = _error(data, with_additions(case, added), last) if added else None
@@ -58,7 +58,7 @@ def _as_kept(data: DataSet, found: Diagnosis, added: Sequence[Addition], aside: 
     if parent is None:
         return {}
     named = {candidate.name: (candidate, shapes) for candidate, shapes in added}
-    last = {name: three[0] for name, three in found.parameters.last.items()}
+    last = values_found(data.model.case, found)
     tried: dict[Names, Baseline | None] = {(): parent}
 
     def rung_with(names: Names) -> Rung | None:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnoses import a_diagnosis, a_suspect, laws_suspected_of
 from reach import said_to
@@ -10,14 +11,14 @@ from reach import said_to
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error, with_additions
 from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
-from vegglue.screening.places import EFFECT_AT_PLACE, plausible_size
-from vegglue.workflow.extend import Addition, found_additions, in_doubt, in_words, write_child
+from vegglue.screening.places import EFFECT_AT_PLACE
+from vegglue.workflow.extend import Addition, found_additions, in_doubt, in_words, values_found, write_child
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,7 +45,7 @@ def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:
 
 
 def a_place(term: Term, x: float = 47.29, y: float = -0.29) -> Location:
-    return Location(x, y, 1.8, 0.45, term, EFFECT_AT_PLACE[term], 0.19, (0.14, 0.24), "m", 5.0, ("low",), {})
+    return Location(x, y, 1.8, 0.45, term, EFFECT_AT_PLACE[term], 0.19, (0.14, 0.24), "m", 5.0, ("low",), {}, 0.23)
 
 
 def at_places(case: Case, *places: Location) -> list[Addition]:
@@ -62,7 +63,7 @@ def test_a_child_holds_a_place_with_numbers_and_a_plausible_prior(term: Term, tm
     assert entry.effect == place.effect
     assert {name: entry.values[name] for name in place.shapes} == place.shapes
     assert parameter in entry.values.values()
-    assert child.parameters[parameter].sd == plausible_size(case, term)
+    assert child.parameters[parameter].sd == place.plausible
     assert child.parameters[parameter].mean == 0.0
 
 
@@ -93,6 +94,35 @@ def found_in(case: Case, kind: str, *, order: tuple[str, ...] = (), place: bool 
     return replace(found, places=(a_place("bed"),) if place else ())
 
 
+def test_a_place_is_spread_over_where_it_may_lie() -> None:
+    """A spot whose middle errs by a normal has a wider and lower one as its mean; as much as before is there."""
+    place = replace(a_place("bed"), x_error=3.0, y_error=0.2)
+    spread, u = spread_over_its_error(place), np.linspace(-30.0, 30.0, 2001)
+    middles = 3.0 * np.random.default_rng(1).standard_normal(4000)
+    mean = place.amplitude * np.exp(-(((u[:, None] - middles) / place.length) ** 2)).mean(axis=1)
+    across = place.width / spread.width
+    assert spread.amplitude * np.exp(-((u / spread.length) ** 2)) == pytest.approx(across * mean, abs=0.003)
+    assert spread.plausible / place.plausible == pytest.approx(spread.amplitude / place.amplitude)
+    assert spread_over_its_error(a_place("bed")) == a_place("bed")
+
+
+def test_water_that_enters_stays_as_much_where_it_is_spread() -> None:
+    place = replace(a_place("inflow"), x_error=3.0)
+    assert spread_over_its_error(place).amplitude == place.amplitude
+
+
+def test_a_place_that_was_found_is_added_as_it_is_spread() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    found = found_in(case, "none-of-these", order=("unlisted_bed_x47_29_y_0_29_rise",), place=True)
+    found = replace(found, places=(replace(a_place("bed"), x_error=3.0),))
+    ((candidate, shapes),) = [one for one in found_additions(case, found) if one[0].name != "streamlining"]
+    assert shapes["length"] == dict(candidate.fixed)["length"] == pytest.approx(np.hypot(1.8, 3.0 * 2**0.5), abs=0.01)
+    values = values_found(case, found)
+    assert values[candidate.parameter] == pytest.approx(1.8 / shapes["length"])  # 1.0 in `found_in`
+    words = in_words(case, found, Choice(((), (candidate.name,)), {}))
+    assert "half length 4.6 m" in words
+
+
 @pytest.mark.parametrize("turn", [1, -1])
 def test_effects_and_places_are_tried_in_the_order_found(turn: int) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
@@ -116,7 +146,7 @@ def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = found_in(case, kind)
     assert found_additions(case, found) == []
-    words = in_words(found, Choice(((),), {}))
+    words = in_words(case, found, Choice(((),), {}))
     assert said in words
     assert words.startswith("Nothing is added: ")
     assert words.count(".") == 1
@@ -125,7 +155,7 @@ def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
 def test_a_law_that_stands_out_is_left_to_discover() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = replace(found_in(case, "none-of-these"), laws=laws_suspected_of("law_bank_speed_step"))
-    assert "`vegglue discover` adds one" in in_words(found, Choice(((),), {}))
+    assert "`vegglue discover` adds one" in in_words(case, found, Choice(((),), {}))
 
 
 def test_doubt_is_a_verdict_that_cannot_tell() -> None:
@@ -136,7 +166,7 @@ def test_doubt_is_a_verdict_that_cannot_tell() -> None:
 
 def test_what_is_not_kept_is_told() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
-    words = in_words(found_in(case, "identified"), Choice(((), ("a",)), {"b": "held-out errors did not fall"}))
+    words = in_words(case, found_in(case, "identified"), Choice(((), ("a",)), {"b": "held-out errors did not fall"}))
     assert words == "Added: a. b was not kept: held-out errors did not fall."
 
 

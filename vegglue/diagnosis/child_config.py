@@ -4,8 +4,10 @@ import hashlib
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from vegglue.case.messages import nearest
@@ -26,7 +28,6 @@ from vegglue.screening.candidates import (
     where_it_may_act,
     with_effect,
 )
-from vegglue.screening.places import EFFECT_AT_PLACE, plausible_size
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -75,11 +76,32 @@ def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
     return place_candidate(effect, shapes)
 
 
+def spread_over_its_error(location: Location) -> Location:
+    """Something at a place, spread over where it may lie: to first order it does the mean of what it may do.
+
+        l' = (l^2 + 2 e_x^2)^(1/2),   w' = (w^2 + 2 e_y^2)^(1/2),   a' = a l w / (l' w')
+
+    A spot exp(-(x / l)^2) whose middle errs by a normal e_x has this as its mean. What enters stays as much as it is.
+    """
+    length, width = (
+        round(float(np.hypot(half, 2.0**0.5 * error)), 2)
+        for half, error in ((location.length, location.x_error), (location.width, location.y_error))
+    )
+    share = 1.0 if location.term == "inflow" else location.length * location.width / (length * width)
+    low, high = location.interval95
+    return replace(
+        location,
+        length=length,
+        width=width,
+        amplitude=share * location.amplitude,
+        interval95=(share * low, share * high),
+        plausible=share * location.plausible,
+    )
+
+
 def candidate_at(case: Case, location: Location) -> Candidate:
     """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
-    effect = library(case.effect_file)[location.effect]
-    term = next(term for term, name in EFFECT_AT_PLACE.items() if name == effect.name)
-    return place_candidate(effect, location.shapes, plausible_size(case, term))
+    return place_candidate(library(case.effect_file)[location.effect], location.shapes, location.plausible)
 
 
 def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:

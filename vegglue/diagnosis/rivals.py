@@ -102,6 +102,7 @@ def location_found(screening: Screening, contenders: Sequence[Contender], accept
         score=float(kind.scores[best.column]),
         experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
         odds={name: float(np.exp(min(gained, LARGEST_LOG_ODDS))) for name, gained in ahead.items()},
+        plausible=places.plausible,
     )
 
 

@@ -12,7 +12,7 @@ class Location:
 
     effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
     [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
-    other kind, by its name.
+    other kind, by its name. plausible: a plausible size there [unit].
     """
 
     x: float
@@ -27,6 +27,7 @@ class Location:
     score: float
     experiments: tuple[str, ...]
     odds: dict[str, float]
+    plausible: float
     x_error: float = 0.0
     y_error: float = 0.0
 

@@ -37,8 +37,8 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
 SPOT_CELLS = 1.0
 # Spots around a place on either side of it: chosen, not measured.
 STEPS_AROUND = 4
-# Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed [m]; of the
-# discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
+# Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed over the mean
+# depth [-]; of the discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
 SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 1.0, 0.3, 0.05, 0.03
 # Share of a spot that has to lie under water, of water that enters in all experiments, else in one of them [-].
 LEAST_SHARE = 0.5
@@ -92,17 +92,19 @@ def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Bum
     if "inflow" in rasters:
         for experiment, rows in model.rows.items():
             responses.of["inflow"][rows] *= _under_water(model, experiment)
-    wet = np.stack([flow_at_centres(model, point, name).depth > LEAST_DEPTH for name in point.flows])
+    depth = np.stack([flow_at_centres(model, point, name).depth for name in point.flows])
+    wet = depth > LEAST_DEPTH
     # Water that enters does so where there is water at all times.
     seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in rasters}
-    tasks = [(model, responses, term, over, seen[term]) for term, over in rasters.items()]
+    plausible = {term: plausible_size(model.case, term, float(depth[wet].mean())) for term in rasters}
+    tasks = [(model, responses, term, over, seen[term], plausible[term]) for term, over in rasters.items()]
     return tuple(in_threads(_places_of_term, tasks))
 
 
-def plausible_size(case: Case, term: Term) -> float:
-    """Of the effect that stands for a term at a place, in its unit."""
+def plausible_size(case: Case, term: Term, depth: float) -> float:
+    """Of the effect that stands for a term at a place, in its unit, in water of a mean depth [m]."""
     if term != "inflow":
-        return {"drag": SPOT_DRAG, "bed": SPOT_RISE, "viscosity": SPOT_VISCOSITY}[term]
+        return {"drag": SPOT_DRAG, "bed": SPOT_RISE * depth, "viscosity": SPOT_VISCOSITY}[term]
     totals = [
         sum(middle_value(case, value) for value in experiment.discharge.values())
         for experiment in case.experiments.values()
@@ -110,7 +112,9 @@ def plausible_size(case: Case, term: Term) -> float:
     return SPOT_SHARE * float(np.mean(totals))
 
 
-def _places_of_term(model: Model, responses: CellResponses, term: Term, rasters: Sequence[Bumps], wet: Any) -> Places:
+def _places_of_term(
+    model: Model, responses: CellResponses, term: Term, rasters: Sequence[Bumps], wet: Any, plausible: float
+) -> Places:
     parts = []
     for over in rasters:
         answers = responses_to_bumps(responses, term, over)
@@ -122,7 +126,7 @@ def _places_of_term(model: Model, responses: CellResponses, term: Term, rasters:
         size = np.full((2, a.size), [[over.length], [over.width]])
         parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
     x, y, length_of, width_of, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-    return Places(term, x, y, length_of, width_of, plausible_size(model.case, term), fingerprints)
+    return Places(term, x, y, length_of, width_of, plausible, fingerprints)
 
 
 def _under_water(model: Model, experiment: str) -> Any:

@@ -30,6 +30,11 @@ from vegglue.site.channel_geometry import half_width
 FREE_SIZE = 1e4
 
 
+# Sizes of spots over plausible ones when the noise is estimated [-]. Hundreds of spots overlap, one of them is there:
+# at their full sizes they explain, together, whatever neighbours share. Chosen, not measured.
+SPOTS_IN_NOISE = 0.3
+
+
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
 
@@ -174,10 +179,12 @@ def _kinds_of_instruments(
 def _plausible(
     noise: Noise, fingerprints: Fingerprints, instruments: Mapping[InstrumentKind, tuple[Instrument, ...]]
 ) -> Array:
-    """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c)."""
+    """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c);
+    spots of SPOTS_IN_NOISE of theirs.
+    """
     sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     parts = [noise.used(fingerprints.values) * sizes]
-    parts += [noise.used(one.fingerprints) * one.plausible for one in fingerprints.places]
+    parts += [noise.used(one.fingerprints) * (SPOTS_IN_NOISE * one.plausible) for one in fingerprints.places]
     for name in ("position", "probe", "gauge"):
         columns = offset_columns(instruments[name], noise.rows.size)
         parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))

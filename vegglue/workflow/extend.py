@@ -13,7 +13,13 @@ from vegglue.case.made_files import write_made
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
+from vegglue.diagnosis.child_config import (
+    candidate_at,
+    candidate_named,
+    child_tree,
+    spread_over_its_error,
+    with_additions,
+)
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
@@ -136,21 +142,33 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     unseen = [validation_of(one, folder_of(runs, one), watch) for one in cases]
     ladder = in_threads(rung, list(zip(bases, unseen, strict=True)))
     return StepwiseExtension(
-        tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, in_words(found, choice)
+        tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, in_words(case, found, choice)
     )
 
 
 def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """Effects and places of a diagnosis in the order they were found; none that is at work in the case already."""
+    """Effects and places of a diagnosis in the order they were found, places spread over where they may lie; none that
+    is at work in the case already.
+    """
     station = found.predictions.station
     added: list[Addition] = [
         (candidate_named(case, station, step.accepted), found.suspect(step.accepted).shapes) for step in found.steps
     ]
-    added += [(candidate_at(case, place), place.shapes) for place in found.places]
+    spread = [spread_over_its_error(place) for place in found.places]
+    added += [(candidate_at(case, place), place.shapes) for place in spread]
     # The last model of the diagnosis holds the parameters of what was found in that order.
     order = {name: position for position, name in enumerate(found.parameters.last)}
     added = [one for one in added if one[0].key not in case.effects]
     return sorted(added, key=lambda one: order.get(one[0].parameter, len(order)))
+
+
+def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
+    """Parameters of the last model of a diagnosis by name, sizes of places as large as they are spread."""
+    values = {name: three[0] for name, three in found.parameters.last.items()}
+    for place in found.places:
+        share = spread_over_its_error(place).plausible / place.plausible
+        values[candidate_at(case, place).parameter] *= share
+    return values
 
 
 def in_doubt(found: Diagnosis) -> bool:
@@ -158,14 +176,20 @@ def in_doubt(found: Diagnosis) -> bool:
     return found.verdict.kind == "cannot-tell" or found.field is not None
 
 
-def in_words(found: Diagnosis, choice: Choice) -> str:
+def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
     """What was added, or why nothing is, and why each of the others is not."""
     kept = choice.stages[-1]
     if not kept and not choice.refused:
         why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
         return f"Nothing is added: {LAW_TO_DISCOVER if found.laws is not None else why}."
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
-    return " ".join([first, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
+    spread = [(candidate_at(case, place).name, spread_over_its_error(place)) for place in found.places]
+    said = [
+        f"{name} is spread over where it may lie: half length {one.length:.2g} m, half width {one.width:.2g} m."
+        for name, one in spread
+        if name in kept
+    ]
+    return " ".join([first, *said, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
 
 
 def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, float]) -> list[Addition]:
@@ -202,7 +226,7 @@ def _calibrated_with(
 ) -> Baseline | None:
     """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""
     child = with_additions(parent.case, added)
-    theta = {name: values[0] for name, values in found.parameters.last.items() if name in child.parameters}
+    theta = {name: value for name, value in values_found(parent.case, found).items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
     known = z_at(child, {name: np.array([theta[name]]) for name in child.parameters})[0]
