@@ -9,6 +9,8 @@ import numpy as np
 import scipy.stats
 from blind_definitions import Record
 
+from vegglue.arrays import Array
+
 Answer = bool | None | list[bool]
 Met = Callable[[Record], Answer]
 
@@ -27,6 +29,8 @@ LOOKED_AT = {
 }
 # Bins of the stated chances, and the mean distance of what comes true that is wanted at most.
 BINS, DISTANCE = 10, 0.05
+# Draws of what chance makes of that distance: its ends to a tenth of a point.
+DRAWS = 20_000
 
 
 @dataclass(frozen=True)
@@ -170,6 +174,17 @@ def distances(told: Sequence[Told]) -> tuple[float, float] | None:
         return None
     away = [abs(one.mean - one.true / one.count) for one in told]
     return float(np.average(away, weights=[one.count for one in told])), float(np.mean(away))
+
+
+def distances_by_chance(told: Sequence[Told], off: float = 0.0) -> Array:
+    """The first of `distances` (DRAWS,) where true shares lie `off` from what is told, to the side that was seen, or
+    less where less was seen: few names are away from any chance.
+    """
+    count, mean = (np.array(each, dtype=float) for each in zip(*((one.count, one.mean) for one in told), strict=True))
+    seen = np.array([one.true / one.count for one in told])
+    share = np.clip(mean + np.clip(seen - mean, -off, off), 0.0, 1.0)
+    true = np.random.default_rng(1).binomial(count.astype(int), share, (DRAWS, count.size))
+    return np.average(np.abs(mean - true / count), axis=1, weights=count)
 
 
 def first_named(record: Record) -> str:

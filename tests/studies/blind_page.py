@@ -17,6 +17,7 @@ from blind_lines import (
     chances_told,
     counts,
     distances,
+    distances_by_chance,
     instead,
     interval,
     is_met,
@@ -166,14 +167,16 @@ def _distances(told: dict[str, list[Told]]) -> str:
     """Mean distance of the chances from what came true, in points."""
     rows = [
         f"| mean distance over the bins, at most {100 * DISTANCE:.0f} points wanted | weighted by names | unweighted "
-        "| met? |",
-        "|---|---:|---:|---|",
+        f"| weighted, were all chances right | ... were shares {100 * DISTANCE:.0f} points off: up to | met? |",
+        "|---|---:|---:|---:|---:|---|",
     ]
     for truth, (label, _) in TRUTHS.items():
         away = distances(told[truth])
         if away is not None:
-            weighted, plain = (f"{100 * each:.1f} points" for each in away)
-            rows.append(f"| {label} | {weighted} | {plain} | {'yes' if away[0] <= DISTANCE else 'no'} |")
+            right = np.mean(distances_by_chance(told[truth]))
+            most = np.quantile(distances_by_chance(told[truth], DISTANCE), 0.95)
+            cells = (f"{100 * each:.1f} points" for each in (*away, right, most))
+            rows.append(f"| {label} | {' | '.join(cells)} | {'yes' if away[0] <= most else 'no'} |")
     return "\n".join(rows)
 
 

@@ -106,7 +106,9 @@ and nothing else.
 
 {distances}
 
-The distance of few names from their chance is not zero even where all chances are right.
+Few names are some distance from their chance even where all chances are right. So the line is met when the distance is
+no larger than chance makes it, 19 times of 20, where true shares lie as many points off as are wanted at most, to the
+side that was seen. Rivals of one step count as if they were drawn apart, which they are not.
 
 ![Chances told and what came true](blind-chances.svg)
 

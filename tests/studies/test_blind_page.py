@@ -5,7 +5,19 @@ from typing import Any
 
 import blind_definitions as what
 import pytest
-from blind_lines import LINES, Line, chances_told, counts, distances, instead, interval, is_met, shares_that_reach
+from blind_lines import (
+    LINES,
+    Line,
+    Told,
+    chances_told,
+    counts,
+    distances,
+    distances_by_chance,
+    instead,
+    interval,
+    is_met,
+    shares_that_reach,
+)
 from blind_page import wanted_of, write_page
 from blind_text import AFFORDED
 from scipy import stats
@@ -202,6 +214,15 @@ def test_a_line_is_met_when_its_interval_reaches() -> None:
     found = [pier("none-of-these", HERE)] * 2 + [pier("none-of-these", AWAY)]
     assert shares_that_reach(found) == (5, 3, 5), "place and term by their intervals only"
     assert [wanted_of(line) for line in (most, least, never)] == ["at most 7 %", "at least 90 %", "never"]
+
+
+def test_few_names_are_away_from_chances_that_are_right() -> None:
+    """4 names at 50 %: |1/2 - k/4| is 3/16 in the mean; and right chances are told right in the long run."""
+    assert distances_by_chance([Told(0.5, 0.5, 4, 2)]).mean() == pytest.approx(3.0 / 16.0, abs=0.003)
+    assert distances_by_chance([Told(0.5, 0.5, 10**8, 10**7)]).max() < 1e-3
+    # Shares that are seen 40 points off are taken to be 5 off, those seen right to be right.
+    off = distances_by_chance([Told(0.5, 0.5, 10**8, 10**7), Told(0.9, 0.9, 10**8, 9 * 10**7)], 0.05)
+    assert off == pytest.approx(0.025, abs=1e-3)
 
 
 def test_chances_against_what_came_true() -> None:
