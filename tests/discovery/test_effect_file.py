@@ -36,10 +36,12 @@ def water() -> SimpleNamespace:
     """Cells with every quantity that laws see, drawn at random; a tenth of them far from any patch."""
     random = np.random.default_rng(3)
     names = ("depth", "speed", "rate", "viscosity")
-    values = {name: random.uniform(0.05, 1.5, (7, 5, 2)) for name in names} | {"u_y": random.normal(size=(7, 5, 2))}
+    values = {name: random.uniform(0.05, 1.5, (7, 5, 2)) for name in names}
+    values |= {name: random.normal(size=(7, 5, 2)) for name in ("u_y", "u", "v")}
     there = {name: random.integers(0, 2, (7, 5, 1)).astype(float) for name in ("bank", "planted")}
     away = random.uniform(-2.0, 2.0, (7, 5, 1))
     there |= {"share_along": np.linspace(-0.5, 0.5, 7)[:, None, None], "offset": away, "edge": away}
+    there["relative_stems"] = random.uniform(0.5, 2.0, (7, 5, 1))
     there["front"] = np.where(away > 1.6, np.inf, np.abs(away))
     return SimpleNamespace(**values, geometry=SimpleNamespace(**there))
 

@@ -16,7 +16,8 @@ from vegglue.workflow.run_folder import model_in
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = (
     "law_floor_speed_power", "law_bank_shear_step", "law_bank_depth_hump", "law_plants_along_stretch",
-    "law_viscosity_offset_ramp", "law_viscosity_front_fading",
+    "law_viscosity_offset_ramp", "law_viscosity_front_fading", "law_advection_speed_step", "law_advection_along_trend",
+    "law_advection_edge_fading",
 )  # fmt: skip
 
 

@@ -28,10 +28,10 @@ CHANNEL = {
         "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
     },
     "plants": {
-        "stands": {"low": {"phi": 3.0, "canopy_height": 0.4}, "high": {"phi": 2.0, "canopy_height": 1.2}},
+        "stands": {"low": {"phi": 3.75, "canopy_height": 0.4}, "high": {"phi": 1.6, "canopy_height": 1.2}},
         "patches": [
-            {"name": "low", "stand": "low", "x": (6.0, 9.0), "y": (-1.0, 1.0)},
-            {"name": "high", "stand": "high", "x": (13.0, 15.0), "y": (-1.0, 1.0)},
+            {"name": "low", "stand": "low", "x": (6.0, 9.0), "y": (-1.0, 1.0), "stems": 0.8},
+            {"name": "high", "stand": "high", "x": (13.0, 15.0), "y": (-1.0, 1.0), "stems": 1.25},
         ],
     },
     "inflows": {"main": {"side": "west"}},

@@ -12,6 +12,7 @@ from vegglue.effects.library import library
 from vegglue.errors import InputError
 
 IMPORTS = "import numpy as np\nfrom vegglue.effects.definition import Amplitude, Effect, SeenRange\n"
+OF_FLUXES = "from vegglue.effects.exchange import dispersion\n"
 FUNCTION = '''
 
 def {name}(cells, strength):
@@ -46,6 +47,7 @@ def effect_text(laws: Sequence[LawFound], own: Path | None) -> str:
     before = IMPORTS if own is None else own.read_text(encoding="utf-8").rstrip() + "\n\n\n" + IMPORTS
     parts = [_parts(found) for found in laws]
     functions = "".join(FUNCTION.format(**part) for part in parts)
+    before += OF_FLUXES if "dispersion(" in functions else ""
     effects = ", ".join([*(["*EFFECTS"] if own is not None else []), *(EFFECT.format(**part) for part in parts)])
     return f"{before}{functions}\n\nEFFECTS = ({effects},)\n"
 
@@ -54,9 +56,7 @@ def _parts(found: LawFound) -> dict[str, object]:
     """What stands in the templates for a law."""
     law = found.law
     factor = f"np.exp(strength * g{law.term.written})"
-    change = f'{{"rate": cells.rate * {factor}}}'
-    if law.term.stage == "exchange":
-        change = f'{{"viscosity": cells.viscosity * ({factor} - 1)}}'
+    change = law.term.change.format(factor=factor)
     g = _written(law, found.reference)
     if law.times is not None:
         g = f"({_written(law.times, found.first)}) * ({g})"

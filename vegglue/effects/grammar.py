@@ -1,6 +1,9 @@
 """A grammar of laws that no list holds: a term of the equations changes with what is there.
 
-    k -> k exp(a g),   nu -> nu exp(a g),   g a pure number of the size of 1, to first order a factor 1 + a g
+    k -> k exp(a g),   nu -> nu exp(a g),   h U U -> h U U exp(a g)
+
+with g a pure number of the size of 1, to first order a factor 1 + a g. The last is a flux of momentum that the mean
+velocity does not carry, (exp(a g) - 1) h U U, as `dispersion` is with a constant.
 
 A law is a term, a quantity and a form: friction of the banks, with the speed, as a step. exp keeps every term above 0.
 Quantities q are measured by a reference r, the middle of what the data have seen; a form makes g of q and r, 0 or
@@ -17,6 +20,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape, Stage
+from vegglue.effects.exchange import dispersion
 from vegglue.effects.surroundings import Cells
 from vegglue.resistance.physical_constants import GRAVITY
 
@@ -28,7 +32,9 @@ PLAUSIBLE_STRENGTH = 0.5
 
 @dataclass(frozen=True)
 class LawTerm:
-    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code, a factor."""
+    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code, a factor;
+    changed: what the term is with a factor on it, as an effect says it; change: the same as code.
+    """
 
     name: str
     words: str
@@ -37,6 +43,8 @@ class LawTerm:
     symbol: str
     share: Callable[[Cells], Array]
     written: str
+    changed: Callable[[Cells, Array], dict[str, Array]]
+    change: str
 
 
 @dataclass(frozen=True)
@@ -148,31 +156,49 @@ def _reference(name: str, law: Law) -> tuple[Shape, ...]:
 def _by_law(
     law: Law, cells: Cells, strength: Array, reference: Array | float = 1.0, first: Array | float = 1.0
 ) -> dict[str, Array]:
-    factor = np.exp(strength * law.g(cells, reference, first) * law.term.share(cells))
-    if law.term.stage == "exchange":
-        return {"viscosity": cells.viscosity * (factor - 1.0)}
+    return law.term.changed(cells, np.exp(strength * law.g(cells, reference, first) * law.term.share(cells)))
+
+
+def _friction(cells: Cells, factor: Array) -> dict[str, Array]:
     return {"rate": cells.rate * factor}
+
+
+def _mixing(cells: Cells, factor: Array) -> dict[str, Array]:
+    return {"viscosity": cells.viscosity * (factor - 1.0)}
+
+
+def _advection(cells: Cells, factor: Array) -> dict[str, Array]:
+    return dispersion(cells, factor - 1.0)
+
+
+def _everywhere(cells: Cells) -> Array:
+    return np.ones_like(cells.geometry.bank)
 
 
 def _open_floor(cells: Cells) -> Array:
     return (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
 
 
+_WITH_FACTOR = '{{"rate": cells.rate * {factor}}}'
 _FLOOR = LawTerm(
     "floor", "friction of the open floor", "on the floor without plants", "resistance", "k", _open_floor,
-    " * (1 - cells.geometry.bank) * (1 - cells.geometry.planted)",
+    " * (1 - cells.geometry.bank) * (1 - cells.geometry.planted)", _friction, _WITH_FACTOR,
 )  # fmt: skip
 _BANK = LawTerm(
     "bank", "friction of the banks", "on the banks", "resistance", "k", lambda cells: cells.geometry.bank,
-    " * cells.geometry.bank",
+    " * cells.geometry.bank", _friction, _WITH_FACTOR,
 )  # fmt: skip
 _PLANTS = LawTerm(
     "plants", "friction of the plants", "where plants stand", "resistance", "k", lambda cells: cells.geometry.planted,
-    " * cells.geometry.planted",
+    " * cells.geometry.planted", _friction, _WITH_FACTOR,
 )  # fmt: skip
 _VISCOSITY = LawTerm(
-    "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", lambda cells: np.ones_like(cells.geometry.bank),
-    "",
+    "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", _everywhere, "", _mixing,
+    '{{"viscosity": cells.viscosity * ({factor} - 1)}}',
+)  # fmt: skip
+_ADVECTION = LawTerm(
+    "advection", "the momentum that the flow carries", "everywhere", "exchange", "h U U", _everywhere, "", _advection,
+    "dispersion(cells, {factor} - 1)",
 )  # fmt: skip
 
 _DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5)
@@ -201,6 +227,11 @@ _FRONT = LawQuantity(
 _EDGE = LawQuantity(
     "edge", "the distance from the side of a patch", "d", "m", lambda cells: np.abs(cells.geometry.edge),
     "np.abs(cells.geometry.edge)", 0.5,
+)  # fmt: skip
+
+_STEMS = LawQuantity(
+    "stems", "the stems of the patch", "(m/m_0)", "-", lambda cells: cells.geometry.relative_stems,
+    "cells.geometry.relative_stems", 1.0,
 )  # fmt: skip
 
 # Quantiles of what was seen at which references are tried: so many that a reference between two of them changes little.
@@ -238,14 +269,18 @@ _FADING = LawForm(
     "fading", "fades out with {q}", lambda q, r: np.exp(-q / r), "np.exp(-({q}) / {r})", "exp(-{q}/{r})", _EVERYWHERE
 )
 
-_EVERY_TERM = (_FLOOR, _BANK, _PLANTS, _VISCOSITY)
+_COEFFICIENTS = (_FLOOR, _BANK, _PLANTS, _VISCOSITY)
+_EVERY_TERM = (*_COEFFICIENTS, _ADVECTION)
 # Which quantities are to be seen in which terms, and the forms that make sense of them.
 _SENTENCES: tuple[tuple[tuple[LawTerm, ...], tuple[LawQuantity, ...], tuple[LawForm, ...]], ...] = (
-    (_EVERY_TERM, (_DEPTH, _SPEED, _FROUDE, _SHEAR), (_POWER, _RAMP, _STEP, _HUMP)),
+    (_EVERY_TERM, (_DEPTH, _SPEED, _FROUDE), (_POWER, _RAMP, _STEP, _HUMP)),
+    # A flux that grows with the shear mixes backwards somewhere: moving water finds no steady flow with it.
+    (_COEFFICIENTS, (_SHEAR,), (_POWER, _RAMP, _STEP, _HUMP)),
     (_EVERY_TERM, (_ALONG_CHANNEL,), (_TREND, _PART, _STRETCH)),
     (_EVERY_TERM, (_OFFSET,), (_RAMP, _STEP, _HUMP)),
-    ((_PLANTS, _VISCOSITY), (_FRONT,), (_FADING,)),
-    ((_FLOOR, _PLANTS, _VISCOSITY), (_EDGE,), (_FADING,)),
+    ((_PLANTS, _VISCOSITY, _ADVECTION), (_FRONT,), (_FADING,)),
+    ((_FLOOR, _PLANTS, _VISCOSITY, _ADVECTION), (_EDGE,), (_FADING,)),
+    ((_PLANTS,), (_STEMS,), (_POWER,)),
 )
 LAWS: dict[str, Law] = {
     law.name: law
@@ -255,7 +290,7 @@ LAWS: dict[str, Law] = {
 # By what a law is multiplied: the even form of each quantity, which says whether the one changes with the other at all.
 _EVEN = {
     "depth": "ramp", "speed": "ramp", "froude": "ramp", "shear": "ramp", "along": "trend", "offset": "ramp",
-    "front": "fading", "edge": "fading",
+    "front": "fading", "edge": "fading", "stems": "power",
 }  # fmt: skip
 PRODUCTS: dict[str, tuple[Law, ...]] = {
     name: tuple(

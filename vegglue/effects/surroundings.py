@@ -16,6 +16,7 @@ class ChannelGeometry:
     that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: 1 where plants stand
     in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite; edge: distance
     across from the nearest side of a patch, positive outside it and negative inside, infinite in columns without one;
+    relative_stems: of the patch over the mean of all patches, 1 where none stands [-];
     wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite; on a grid
     along a centreline, stretch: length of a cell over dx [-], and turning: curvature of the line along its row [1/m].
     """
@@ -35,6 +36,7 @@ class ChannelGeometry:
     edge: Array
     wake: Array
     patch: Array  # index of the patch, -1 without
+    relative_stems: Array = field(default_factory=lambda: np.ones((1, 1, 1)))  # as if all patches were as dense
     stretch: Array = field(default_factory=lambda: np.ones((1, 1, 1)))  # of a straight grid
     turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))  # empty on a straight grid
 

@@ -29,6 +29,7 @@ MARCHED_DIFFERENCE_STEP = 0.02
 # Small changes of a term in one cell, in its unit: large against what is left of the march when it ends.
 MARCHED_CHANGE: dict[Term, float] = {
     "friction": 0.02, "drag": 1e-3, "bed": 1e-3, "inflow": 1e-4, "viscosity": 1e-3, "mixing": 0.05,
+    "advection": 0.02,
 }  # fmt: skip
 
 

@@ -34,6 +34,7 @@ STATIONS_TOGETHER = 128
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
 SMALL_CHANGE: dict[Term, float] = {
     "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
+    "advection": 1e-3,
 }  # fmt: skip
 
 

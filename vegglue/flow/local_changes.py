@@ -1,4 +1,5 @@
-"""Terms of the equations changed by a field of their own: friction, drag, bed level, water that enters, viscosity.
+"""Terms of the equations changed by a field of their own: friction, drag, bed level, water that enters, viscosity,
+momentum that the flow carries.
 
 What a model has wrong at a place is such a change.
 """
@@ -12,13 +13,14 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.exchange import dispersion
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.flow.problem import Problem, take
 
 # friction: k -> k (1 + a) [-]; drag: k -> k + a [1/m]; bed: z_b -> z_b + a [m]; inflow: a enters [m/s]; viscosity:
-# nu -> nu + a [m2/s]; mixing: nu -> nu (1 + a) [-].
-Term = Literal["friction", "drag", "bed", "inflow", "viscosity", "mixing"]
-TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity", "mixing")
+# nu -> nu + a [m2/s]; mixing: nu -> nu (1 + a) [-]; advection: h U U -> h U U (1 + a) [-].
+Term = Literal["friction", "drag", "bed", "inflow", "viscosity", "mixing", "advection"]
+TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity", "mixing", "advection")
 
 
 def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, change: Array) -> Problem:
@@ -58,12 +60,21 @@ def _field_effect(term: Term, whole: ChannelGeometry, change: Array) -> Effect:
     def mixing(cells: Cells, on: Array) -> Mapping[str, Array]:
         return {"viscosity": on * here(cells) * cells.viscosity}
 
+    def advection(cells: Cells, on: Array) -> Mapping[str, Array]:
+        return dispersion(cells, on * here(cells))
+
     return Effect(
         name=f"field_of_{term}",
-        stage="exchange" if term in ("viscosity", "mixing") else "resistance",
+        stage="exchange" if term in ("viscosity", "mixing", "advection") else "resistance",
         title=f"A field of {term}",
         equation="term + field",
-        act={"friction": friction, "drag": drag, "viscosity": viscosity, "mixing": mixing}[term],
+        act={
+            "friction": friction,
+            "drag": drag,
+            "viscosity": viscosity,
+            "mixing": mixing,
+            "advection": advection,
+        }[term],
         amplitude=Amplitude("on", "-", "0 or 1", 1.0, 0.0, 1.0),
         source="definition",
         checked=True,

@@ -45,7 +45,9 @@ def _sentence(key: str, seen: SeenRange, experiment: str, beyond: float, where: 
 def _values(effect: Effect, seen: SeenRange, cells: Cells) -> Array:
     """The quantity (k,) of the cells under water that the effect changes."""
     shapes = {shape.name: np.array(shape.default) for shape in effect.shapes}
-    (changed,) = effect.act(cells, **{effect.amplitude.name: np.array(effect.amplitude.scale)}, **shapes).values()
+    # Of a flux the part along x says where it acts.
+    strength = {effect.amplitude.name: np.array(effect.amplitude.scale)}
+    changed = next(iter(effect.act(cells, **strength, **shapes).values()))
     off = 0.0 if effect.stage == "exchange" else cells.rate
     q = np.broadcast_to(seen.of(cells), cells.depth.shape)
     return np.asarray(q[(changed != off) & (cells.depth > LEAST_DEPTH) & np.isfinite(q)])

@@ -1,6 +1,6 @@
 """Fingerprints of laws by the answers of predictions to each cell: one product for a law, and no flow.
 
-    d prediction_n / d a = sum_cells  d prediction_n / d ln k  g share,   the same with ln nu
+    d prediction_n / d a = sum_cells  d prediction_n / d ln k  g share,   the same with ln nu and ln h U U
 
 Terms of the grammar are multiplied by exp(a g), and g at the flow of the point says how much in each cell. So a form
 may be tried at many references for nothing.
@@ -19,8 +19,10 @@ from vegglue.engine.interface import Model, Point, by_itself
 from vegglue.flow.local_changes import Term
 from vegglue.screening.laws_in_case import centre_cells
 
-# What a stage changes, relative to what is there.
-RELATIVE_TERM: Mapping[str, Term] = {"resistance": "friction", "exchange": "mixing"}
+# What a law changes, relative to what is there, by the name of its term.
+RELATIVE_TERM: Mapping[str, Term] = {
+    "floor": "friction", "bank": "friction", "plants": "friction", "viscosity": "mixing", "advection": "advection",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class LawTraces:
 
     def of(self, law: Law, settings: Sequence[Mapping[str, float]]) -> Array:
         """d prediction / d strength (station, setting) [m/s or m], at each value of the reference."""
-        answers = self.responses.of[RELATIVE_TERM[law.term.stage]]
+        answers = self.responses.of[RELATIVE_TERM[law.term.name]]
         found = np.zeros((len(answers), len(settings)))
         for rows, cells in self.flows:
             share = law.term.share(cells)
@@ -43,6 +45,6 @@ class LawTraces:
 
 def law_traces(model: Model, point: Point) -> LawTraces:
     """Of a model at a point."""
-    responses = cell_responses(model, by_itself(model, point), tuple(RELATIVE_TERM.values()))
+    responses = cell_responses(model, by_itself(model, point), tuple(dict.fromkeys(RELATIVE_TERM.values())))
     flows = tuple((rows, centre_cells(model, point, experiment)) for experiment, rows in model.rows.items())
     return LawTraces(responses, flows)

@@ -22,6 +22,8 @@ from vegglue.site.channel_geometry import channel_geometry
 
 # Quantiles between which a law counts as seen, and the fewest cells that say what a term sees. Chosen, not measured.
 SEEN, FEWEST_SEEN = (0.05, 0.95), 10
+# Fewest values of a quantity: of the stems of two patches a law says no more than that one of them is denser.
+FEWEST_VALUES = 3
 # Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it can be told
 # from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.
 LEAST_SPREAD = 0.1
@@ -82,7 +84,7 @@ def _in_case(law: Law, water: _Water, first: float | None = None, change: float 
     values = np.concatenate([_values(law, cells) for cells in water.measured])
     if values.size < FEWEST_SEEN:
         values = np.concatenate([_values(law, cells) for cells in water.everywhere])
-    if values.size < FEWEST_SEEN:
+    if values.size < FEWEST_SEEN or np.unique(values).size < FEWEST_VALUES:
         return None
     low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
     if high - low < LEAST_SPREAD * abs(middle):

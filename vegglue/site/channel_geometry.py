@@ -21,7 +21,9 @@ GEOMETRIES_KEPT = 8
 
 def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
     """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
-    return _geometry(in_experiment(site, experiment), patches_present(case, experiment))
+    stems = np.array([patch.stems for patch in case.plants.patches])
+    relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
+    return _geometry(in_experiment(site, experiment), patches_present(case, experiment), relative)
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
@@ -34,7 +36,7 @@ def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
 
 def half_width(site: Site) -> float:
     """Half width of the floor [m], the median of its cross-sections."""
-    return float(np.median(_geometry(site, ()).half_width))
+    return float(np.median(_geometry(site, (), ()).half_width))
 
 
 def cells_across(site: Site) -> float:
@@ -43,7 +45,7 @@ def cells_across(site: Site) -> float:
 
 
 @lru_cache(GEOMETRIES_KEPT)  # every problem of every member asks for the same
-def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
+def _geometry(site: Site, present: tuple[int, ...], relative_stems: tuple[float, ...]) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
     floor = ~beyond(side_slope > STEEPEST_FLOOR, bed)
@@ -67,6 +69,7 @@ def _geometry(site: Site, present: tuple[int, ...]) -> ChannelGeometry:
         edge=edge[..., None],
         wake=wake[..., None],
         patch=patch[..., None],
+        relative_stems=np.array([*relative_stems, 1.0])[patch][..., None],  # the last one where none stands, at -1
         **bent,
     )
 
@@ -86,7 +89,19 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
     """The geometry of some columns and rows."""
     cut = {
         name: getattr(geometry, name)[columns, rows]
-        for name in ("bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch")
+        for name in (
+            "bed",
+            "offset",
+            "half_width",
+            "side_slope",
+            "bank",
+            "planted",
+            "front",
+            "edge",
+            "wake",
+            "patch",
+            "relative_stems",
+        )
     }
     if geometry.turning.size:
         cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
