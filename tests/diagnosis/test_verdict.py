@@ -188,6 +188,13 @@ def test_what_is_of_another_kind_may_be_it_instead() -> None:
     kind, sentence, _ = said(grounds(alone), [a_suspect("a")])
     assert kind == "one-of"
     assert "or else bed (15%)" in sentence
+    assert "likeliest" not in sentence
+
+
+def test_a_vaguer_cause_that_is_likelier_is_said_to_be_so() -> None:
+    alone = step("a", chances=(0.24,), others={"inflow": 0.1, "bed": 0.66})
+    sentence = said(grounds(alone), [a_suspect("a")])[1]
+    assert "or else inflow (10%) or bed (66%): of these bed is the likeliest" in sentence
 
 
 def test_an_implausible_size_is_remarked() -> None:

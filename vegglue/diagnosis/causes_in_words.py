@@ -112,7 +112,16 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     if rest or own < STATED_BELOW:
         words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
     others = [f"{name} ({chance:.0%})" for name, chance in step.others.items()]
-    return words + (f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else "")
+    words += f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else ""
+    return words + _likelier_words(step)
+
+
+def _likelier_words(step: Step) -> str:
+    """What is likelier than all that is listed, though vaguer."""
+    likeliest = max(step.others, key=lambda name: step.others[name], default="")
+    if not likeliest or step.others[likeliest] <= max(step.chances):
+        return ""
+    return f": of these {likeliest} is the likeliest, but as the vaguer answer not likelier enough to be named instead"
 
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
