@@ -88,7 +88,15 @@ def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("hidden", "seed"), [("law_viscosity_offset_step", 2), ("law_floor_along_part", 2), ("law_bank_along_part", 6)]
+    ("hidden", "seed"),
+    [
+        ("law_viscosity_offset_step", 2),
+        ("law_floor_along_part", 2),
+        ("law_bank_along_part", 6),
+        ("law_advection_offset_step", 2),
+        ("law_advection_along_part", 2),
+        ("law_advection_depth_power", 2),
+    ],
 )
 def test_a_hidden_law_is_found(model: Model, hidden: str, seed: int) -> None:
     """Its term and its quantity."""
