@@ -194,7 +194,12 @@ def test_what_is_of_another_kind_may_be_it_instead() -> None:
 def test_a_vaguer_cause_that_is_likelier_is_said_to_be_so() -> None:
     alone = step("a", chances=(0.24,), others={"inflow": 0.1, "bed": 0.66})
     sentence = said(grounds(alone), [a_suspect("a")])[1]
-    assert "or else inflow (10%) or bed (66%): of these bed is the likeliest" in sentence
+    assert "or else inflow (10%) or bed (66%): bed is the likeliest of all" in sentence
+
+
+def test_what_leaves_the_same_trace_is_as_likely_as_all_of_it_together() -> None:
+    alike = Step("a", ("a", "b"), (0.3, 0.25), (("a", "b"),), 200.0, 5.0, 1e-4, {"bed": 0.45})
+    assert "likeliest" not in said(grounds(alike), [a_suspect(name) for name in "ab"])[1]
 
 
 def test_an_implausible_size_is_remarked() -> None:

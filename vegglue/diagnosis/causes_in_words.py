@@ -117,11 +117,12 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
 
 
 def _likelier_words(step: Step) -> str:
-    """What is likelier than all that is listed, though vaguer."""
-    likeliest = max(step.others, key=lambda name: step.others[name], default="")
-    if not likeliest or step.others[likeliest] <= max(step.chances):
+    """What is of another kind and likelier than every group of the listed."""
+    likeliest = max(step.others, key=step.others.__getitem__, default="")
+    listed = max(sum(step.chance[name] for name in group) for group in step.groups)
+    if not likeliest or step.others[likeliest] <= listed:
         return ""
-    return f": of these {likeliest} is the likeliest, but as the vaguer answer not likelier enough to be named instead"
+    return f": {likeliest} is the likeliest of all, but leads by too little to be named instead"
 
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
