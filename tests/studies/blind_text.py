@@ -12,7 +12,9 @@ small channel, was looked at when rules for a place beside a listed effect were 
 place was spread over where it may lie. So these sets are no proof; lines of objects that were not looked at stand by
 themselves below. Then 113 sets of the stranger with something hidden were added. On them it is right less often than on
 those that it was chosen after: of objects that nobody had looked at, a third are told as none of these, a quarter are
-placed.
+placed, and for 8 of 25 a listed effect or a probe is named first, with other causes told beside it, so that it does not
+count as a name alone. These 25 were looked at since, and only words were changed after them: the sentence now says so
+where a place is likelier than what is named, which the records do not have yet.
 
 The fourth edition, of 202 sets, is dropped: on imperfect sites with nothing hidden something was named in 18 of 82.
 Errors of the sides of patches were not told as they act (see `site_error`), which alone made a viscosity stand out by
