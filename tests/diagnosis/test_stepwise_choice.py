@@ -104,3 +104,24 @@ def test_what_cannot_be_judged_is_not_added() -> None:
     made = choice({PARENT: (np.nan, np.nan), A: (np.nan, np.nan)}, A)
     assert made.stages == (PARENT,)
     assert "nothing to hold out" in made.refused["a"]
+
+
+@pytest.mark.parametrize(
+    ("with_b", "spread", "kept"),
+    [
+        ((2.9, 2.9), 1.0, A),  # a little better, and far from surely
+        ((1.0, 1.0), 0.0, B),  # much better, and surely
+        ((3.0, 3.0), 0.0, A),
+    ],
+)
+def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, kept: Names) -> None:
+    """b is vague, and may be it instead of a: with b, a is needed no more."""
+    models = {PARENT: (4.0, 4.0), A: (3.0, 3.0), B: with_b, A + B: with_b}
+
+    def rung_with(names: Names) -> Rung:
+        return a_rung(models[names], dict.fromkeys(names, 9.0), sum(models[names]), spread if "b" in names else 0.0)
+
+    made = chosen([Nominee("a", "a", 0.0), Nominee("b", "b", 0.0, instead_of="a")], rung_with)
+    assert made.stages == (PARENT, kept)
+    (refused,) = made.refused
+    assert refused == ("b" if kept == A else "a")

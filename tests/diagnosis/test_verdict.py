@@ -191,15 +191,28 @@ def test_what_is_of_another_kind_may_be_it_instead() -> None:
     assert "likeliest" not in sentence
 
 
-def test_a_vaguer_cause_that_is_likelier_is_said_to_be_so() -> None:
-    alone = step("a", chances=(0.24,), others={"inflow": 0.1, "bed": 0.66})
-    sentence = said(grounds(alone), [a_suspect("a")])[1]
-    assert "or else inflow (10%) or bed (66%): bed is the likeliest of all" in sentence
+def test_a_place_that_is_likelier_comes_first_and_in_words() -> None:
+    """Of two that may be it the likelier is told first; what is less likely is told as what it does, and where."""
+    bed, inflow = a_location(term="bed", unit="m", x=12.0), a_location(term="inflow", unit="m3/s")
+    places = {"unlisted_bed": bed, "unlisted_inflow": inflow}
+    alone = step("a", chances=(0.24,), others={"unlisted_inflow": 0.1, "unlisted_bed": 0.66}, places=places)
+    kind, sentence, _ = said(grounds(alone), [a_suspect("a")])
+    assert kind == "one-of"
+    assert sentence.startswith("Missing: most likely something in no list (66%): at x = 12.0, y = -0.6 m it acts as if")
+    assert "; or else a of 0.3" in sentence
+    assert (
+        "with a chance of 24% among all that was tried, or else in no list, water enters, 0.4 m3/s at x = 33.0"
+        in sentence
+    )
+    assert "degrees of freedom with a." in sentence
 
 
 def test_what_leaves_the_same_trace_is_as_likely_as_all_of_it_together() -> None:
-    alike = Step("a", ("a", "b"), (0.3, 0.25), (("a", "b"),), 200.0, 5.0, 1e-4, {"bed": 0.45})
-    assert "likeliest" not in said(grounds(alike), [a_suspect(name) for name in "ab"])[1]
+    place = {"bed": a_location(term="bed", unit="m")}
+    alike = Step("a", ("a", "b"), (0.3, 0.25), (("a", "b"),), 200.0, 5.0, 1e-4, {"bed": 0.45}, place)
+    sentence = said(grounds(alike), [a_suspect(name) for name in "ab"])[1]
+    assert "most likely" not in sentence
+    assert "or else in no list, the bed lies 0.40 m higher at x = 33.0, y = -0.6 m (45%)" in sentence
 
 
 def test_an_implausible_size_is_remarked() -> None:

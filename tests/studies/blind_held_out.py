@@ -17,13 +17,21 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.stepwise_choice import Names, Nominee, chosen
+from vegglue.diagnosis.stepwise_choice import Names, chosen
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import start_amplitude
-from vegglue.workflow.extend import Addition, found_additions, in_doubt, values_found
+from vegglue.workflow.extend import (
+    Addition,
+    found_additions,
+    in_doubt,
+    nominees,
+    tried_additions,
+    values_found,
+    values_tried,
+)
 from vegglue.workflow.run_folder import calibrated_anew
 
 Errors = dict[str, Any]
@@ -43,7 +51,7 @@ def held_out(data: DataSet, found: Diagnosis, looked_into: bool) -> Errors:
     errors |= {"parent": None, "kept": None, "kept_names": [], "oracle": None}
     aside = excluded_by(found)
     if added:
-        errors |= _as_kept(data, found, added, aside)
+        errors |= _as_kept(data, found, aside)
     listed = [one for one in data.hidden if one["kind"] == "listed"]
     if added and listed and looked_into:
         truth = [(candidate_named(case, data.model.station, one["name"]), one["shapes"]) for one in listed]
@@ -52,13 +60,14 @@ def held_out(data: DataSet, found: Diagnosis, looked_into: bool) -> Errors:
     return errors
 
 
-def _as_kept(data: DataSet, found: Diagnosis, added: Sequence[Addition], aside: pd.DataFrame) -> Errors:
+def _as_kept(data: DataSet, found: Diagnosis, aside: pd.DataFrame) -> Errors:
     """What `extend --auto` does, by the same calibrations and the same choice, without its files."""
     parent = _calibrated(data, (), found.parameters.first, aside)
     if parent is None:
         return {}
-    named = {candidate.name: (candidate, shapes) for candidate, shapes in added}
-    last = values_found(data.model.case, found)
+    case = data.model.case
+    named = {candidate.name: (candidate, shapes) for candidate, shapes in tried_additions(case, found)}
+    last = values_tried(case, found)
     tried: dict[Names, Baseline | None] = {(): parent}
 
     def rung_with(names: Names) -> Rung | None:
@@ -68,8 +77,7 @@ def _as_kept(data: DataSet, found: Diagnosis, added: Sequence[Addition], aside: 
         return None if base is None else rungs.setdefault(names, rung(base))
 
     rungs: dict[Names, Rung] = {}
-    nominees = [Nominee(one.name, one.parameter, one.amplitude.off) for one, _ in named.values()]
-    names = chosen(nominees, rung_with, in_doubt(found)).stages[-1]
+    names = chosen(nominees(case, found), rung_with, in_doubt(found)).stages[-1]
     base = tried[names]
     errors: Errors = {"parent": _error_of(data, parent), "kept_names": list(names)}
     return errors | ({"kept": _error_of(data, base)} if names and base is not None else {})

@@ -18,7 +18,16 @@ from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.screening.places import EFFECT_AT_PLACE
-from vegglue.workflow.extend import Addition, found_additions, in_doubt, in_words, values_found, write_child
+from vegglue.workflow.extend import (
+    Addition,
+    found_additions,
+    in_doubt,
+    in_words,
+    tried_additions,
+    values_found,
+    values_tried,
+    write_child,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -131,6 +140,22 @@ def test_effects_and_places_are_tried_in_the_order_found(turn: int) -> None:
     found = found_in(case, "none-of-these", order=order, place=True)
     assert [candidate.parameter for candidate, _ in found_additions(case, found)] == list(order)
     assert [candidate.name for candidate, _ in found_additions(case, found)] == names
+
+
+@pytest.mark.parametrize(("chance", "tried"), [(0.76, 2), (0.1, 1)])
+def test_a_place_likelier_than_an_effect_is_tried_after_it(chance: float, tried: int) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    found = found_in(case, "one-of", order=("streamlining_vogel_exponent",))
+    place, name = replace(a_place("bed"), x_error=3.0), "unlisted_bed[x47.29,y-0.29]"
+    step = replace(found.steps[0], chances=(0.24,), others={name: chance}, places={name: place})
+    found = replace(found, steps=(step,))
+    names = [candidate.name for candidate, _ in tried_additions(case, found)]
+    assert names == ["streamlining", name][:tried]
+    assert [candidate.name for candidate, _ in found_additions(case, found)] == ["streamlining"]
+    sizes = set(values_tried(case, found)) - set(values_found(case, found))
+    assert sizes == {"unlisted_bed_x47_29_y_0_29_rise"} if tried == 2 else not sizes
+    words = in_words(case, found, Choice(((), (name,)), {"streamlining": "held-out errors did not fall"}))
+    assert ("is spread over where it may lie" in words) == (tried == 2)
 
 
 @pytest.mark.parametrize(

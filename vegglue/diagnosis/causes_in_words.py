@@ -28,14 +28,6 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 
 
 def _place_words(place: Location) -> str:
-    what = {
-        "drag": "something holds the flow back"
-        if place.amplitude > 0
-        else "something lets the flow pass or pushes it on",
-        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
-        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
-        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
-    }[place.term]
     rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
     against = [
         f"{_odds(odds)} to 1 against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]
@@ -44,7 +36,18 @@ def _place_words(place: Location) -> str:
     unit = f" {place.unit}"
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
     told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
-    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
+    return f"at {at} it acts as if {_what_acts(place)} ({told}{'; ' if against else ''}{''.join(against)})"
+
+
+def _what_acts(place: Location) -> str:
+    return {
+        "drag": "something holds the flow back"
+        if place.amplitude > 0
+        else "something lets the flow pass or pushes it on",
+        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
+        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
+        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
+    }[place.term]
 
 
 def _give_or_take(error: float) -> str:
@@ -98,6 +101,8 @@ def _instrument_words(one: FaultyInstrument) -> str:
 
 
 def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
+    """A place that is likelier than every effect comes first, then the accepted effect, then what it may be instead."""
+    first = step.likelier_place
     by_name = {suspect.name: suspect for suspect in suspects}
     best = by_name[step.accepted]
     low, high = best.amplitude.interval95
@@ -109,20 +114,24 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     own = sum(step.chance[name] for name in alike)
     if same:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
+    others = [_other_words(step, name) for name in step.others if name != first]
     if rest or own < STATED_BELOW:
         words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
-    others = [f"{name} ({chance:.0%})" for name, chance in step.others.items()]
     words += f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else ""
-    return words + _likelier_words(step)
+    return f"{_likelier_words(step, first)}{words}" if first else words
 
 
-def _likelier_words(step: Step) -> str:
-    """What is of another kind and likelier than every group of the listed."""
-    likeliest = max(step.others, key=step.others.__getitem__, default="")
-    listed = max(sum(step.chance[name] for name in group) for group in step.groups)
-    if not likeliest or step.others[likeliest] <= listed:
-        return ""
-    return f": {likeliest} is the likeliest of all, but leads by too little to be named instead"
+def _likelier_words(step: Step, name: str) -> str:
+    return f"most likely something in no list ({step.others[name]:.0%}): {_place_words(step.places[name])}; or else "
+
+
+def _other_words(step: Step, name: str) -> str:
+    """One of another kind with its chance; of something at a place, what it does and where."""
+    chance = f"({step.others[name]:.0%})"
+    if name not in step.places:
+        return f"{name} {chance}"
+    place = step.places[name]
+    return f"in no list, {_what_acts(place)} at x = {place.x:.1f}, y = {place.y:.1f} m {chance}"
 
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:

@@ -39,6 +39,12 @@ def step_found(
     cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
     found, groups = rivals_among(names, chance[listed], cosine)
     base, others = screening.base, _others(contenders, chance, "effect")
+    terms = {one.term for one in screening.fingerprints.places}
+    places = {
+        one.name: location_found(screening, contenders, j, one.what)
+        for j, one in enumerate(contenders)
+        if one.name in others and one.kind in terms and isinstance(one.what, Refit)
+    }
     step = Step(
         accepted=contenders[accepted].name,
         rivals=tuple(found),
@@ -48,6 +54,7 @@ def step_found(
         chi2_after=further.fitted.chi2,
         p_family=p,
         others=others,
+        places=places,
     )
     # What is accepted on trial may lie outside the set of the likeliest.
     return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
@@ -74,12 +81,15 @@ def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
         groups.append((accepted,))
     others = {name: told[name] for name in step.others if name in possible and name not in rivals}
     chances = tuple(told[name] for name in rivals)
-    return replace(step, accepted=accepted, rivals=rivals, chances=chances, groups=tuple(groups), others=others)
+    places = {name: place for name, place in step.places.items() if name in others}
+    return replace(
+        step, accepted=accepted, rivals=rivals, chances=chances, groups=tuple(groups), others=others, places=places
+    )
 
 
-def location_found(screening: Screening, contenders: Sequence[Contender], accepted: int, refit: Refit) -> Location:
+def location_found(screening: Screening, contenders: Sequence[Contender], which: int, refit: Refit) -> Location:
     """One contender, something at a place, as a location."""
-    best = contenders[accepted]
+    best = contenders[which]
     places = next(one for one in screening.fingerprints.places if one.term == best.kind)
     kind = next(one for one in screening.kinds if one.name == best.kind)
     noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]

@@ -18,11 +18,14 @@ WAYS: tuple[By, ...] = ("sections", "experiments")
 
 @dataclass(frozen=True)
 class Nominee:
-    """An effect that was named: its parameter, and the value of it that does nothing."""
+    """An effect that was named: its parameter, and the value of it that does nothing; instead_of: what is known, where
+    this is something vaguer that may be it instead.
+    """
 
     name: str
     parameter: str
     off: float
+    instead_of: str = ""
 
 
 Names = tuple[str, ...]
@@ -40,7 +43,8 @@ class Choice:
 
 def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False) -> Choice:
     """Each is tried in the order named, those that do not help by themselves then together; what the last model does
-    not need is dropped again. clearly: errors must fall by CLEAR standard errors.
+    not need is dropped again, and what is vaguer has to be clearly better than what is known. clearly: errors must fall
+    by CLEAR standard errors.
     """
     order = [one.name for one in named]
 
@@ -54,6 +58,7 @@ def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False)
     kept, refused = _one_by_one(order, better, stages)
     kept = _together(kept, refused, better, stages)
     kept = _needed_of({one.name: one for one in named}, kept, refused, rung_with)
+    kept = _known_of(named, kept, refused, rung_with)
     earlier = [stage for stage in stages if set(stage) < set(kept)]
     return Choice((*earlier, kept), refused)
 
@@ -102,6 +107,26 @@ def _needed_of(named: dict[str, Nominee], kept: Names, refused: dict[str, str], 
         if why := _why_dropped(named[name], rung_with(()), rung_with(fewer), rung_with(kept)):
             refused[name] = why
             return _needed_of(named, fewer, refused, rung_with)
+    return kept
+
+
+def _known_of(named: Sequence[Nominee], kept: Names, refused: dict[str, str], rung_with: RungWith) -> Names:
+    """What is left when what is vaguer makes room for what is known and helps hardly less."""
+    for one in named:
+        known = one.instead_of
+        if one.name not in kept or not known or known in kept:
+            continue
+        fewer = tuple(name for name in kept if name != one.name)
+        both = tuple(each.name for each in named if each.name in {*fewer, known})
+        without, with_known, vaguer = rung_with(fewer), rung_with(both), rung_with(kept)
+        assert without is not None
+        assert vaguer is not None
+        if with_known is None or why_not_kept(without, with_known):
+            continue
+        if not any(gain > CLEAR * error for gain, error in _gains(with_known, vaguer).values()):
+            del refused[known]
+            refused[one.name] = f"with {known}, which is known, held-out errors are not clearly higher"
+            kept = both
     return kept
 
 

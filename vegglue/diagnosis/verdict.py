@@ -120,7 +120,8 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
             return "cannot-tell", f"Something is missing, but these data cannot tell {which}."
         single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
         also = f" {instruments_in_words(found.instruments)}" if found.instruments else ""
-        return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with it.{also}"
+        which = found.steps[-1].accepted if any(step.likelier_place for step in found.steps) else "it"
+        return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with {which}.{also}"
     if found.undecided:
         names = " or ".join(one.name for one in found.undecided[:3])
         return "cannot-tell", f"These data cannot tell: {names} stands out, but none of them surely ({_told(misfit)})."

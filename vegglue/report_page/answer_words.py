@@ -10,12 +10,20 @@ import pandas as pd
 from vegglue.effects.library import library
 from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, short, unit_html
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.report_page.cause_words import OF_KIND, accepted_causes, field_in_words, size_of, what_at, where
+from vegglue.report_page.cause_words import (
+    OF_KIND,
+    accepted_causes,
+    field_in_words,
+    likelier_place_in_words,
+    size_of,
+    what_at,
+    where,
+)
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.posterior_words import UNBELIEVED
 from vegglue.report_page.run import Run
-from vegglue.results.diagnosis import AmplitudeEstimate, Diagnosis
+from vegglue.results.diagnosis import AmplitudeEstimate, Diagnosis, Step
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import OpenQuestion
@@ -81,7 +89,7 @@ def _law_in_words(found: Diagnosis) -> str:
 
 def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
     """Effects by their titles, places by what they do; tense: is or was."""
-    effects = [_effect_in_words(found, step.accepted, len(step.rivals) > 1) for step in found.steps]
+    effects = [f"{likelier_place_in_words(step)}{_effect_in_words(found, step)}" for step in found.steps]
     places = [f"{what_at(one)} of {size_of(one)} at {where(one.x, one.y)}" for one in found.places]
     parts = []
     if effects:
@@ -95,10 +103,12 @@ def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
     return f"{'; and '.join(parts)}."
 
 
-def _effect_in_words(found: Diagnosis, name: str, rivals: bool) -> str:
+def _effect_in_words(found: Diagnosis, step: Step) -> str:
+    name, likelier = step.accepted, step.likelier_place
     suspect = found.suspect(name)
     short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
-    doubt = f"most likely ({percent(found.chances[name])}) " if rivals else ""
+    chance = f"({percent(found.chances[name])}) " if likelier or len(step.rivals) > 1 else ""
+    doubt = f"most likely {chance}" if chance and not likelier else chance
     explained = f", {more}" if more else ""
     size = f", {_amplitude_in_words(suspect.amplitude)}"
     return (

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.figures.places import TERM_SIGNS
-from vegglue.figures.typography import NARROW, count, fixed, interval, short, unit_html
-from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location
+from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
+from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 
 # Quantity and unit of a field, as they are told.
 FIELDS: Mapping[str, tuple[str, str]] = {
@@ -103,6 +103,18 @@ def place_in_words(place: Location) -> str:
         f"{what_at(place)}, {size_of(place)} (95{NARROW}% in {interval(*place.interval95)}), at "
         f"{where(place.x, place.y)}, {fixed(abs(place.score), 1)} standard errors{f', {told}' if told else ''}"
     )
+
+
+def likelier_place_in_words(step: Step) -> str:
+    """'most likely (76 %) a lower bed of 0.3 m at x = 14.3 m, y = 1.3 m, which is in no list, or else ' (HTML); ''
+    where the accepted effect is likelier.
+    """
+    name = step.likelier_place
+    if not name:
+        return ""
+    place = step.places[name]
+    what = f"{what_at(place)} of {size_of(place)} at {where(place.x, place.y)}"
+    return f"most likely ({percent(step.others[name])}) {what}, which is in no list, or else "
 
 
 def instrument_in_words(one: FaultyInstrument) -> str:

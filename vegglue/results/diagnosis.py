@@ -96,7 +96,8 @@ class Step:
 
     rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
     one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
-    negligible. p_family: chance that errors alone sound the alarm as loudly [-], counted, see `evidence.alarm_p`.
+    negligible; places: those of them that are something at a place. p_family: chance that errors alone sound the alarm
+    as loudly [-], counted, see `evidence.alarm_p`.
     """
 
     accepted: str
@@ -107,11 +108,19 @@ class Step:
     chi2_after: float
     p_family: float
     others: dict[str, float] = field(default_factory=dict)
+    places: dict[str, Location] = field(default_factory=dict)
 
     @property
     def chance(self) -> dict[str, float]:
         """Of each rival by its name."""
         return dict(zip(self.rivals, self.chances, strict=True))
+
+    @property
+    def likelier_place(self) -> str:
+        """The place that is likelier than every group of effects that the data cannot tell apart; '' without."""
+        best = max(self.places, key=self.others.__getitem__, default="")
+        groups = [sum(self.chance[name] for name in group) for group in self.groups]
+        return best if best and self.others[best] > max(groups) else ""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis import Diagnosis, Location
 from vegglue.screening.candidates import Candidate, start_amplitude
 from vegglue.workflow.compare import Comparison, keep_ladder
 from vegglue.workflow.diagnose import diagnose
@@ -115,7 +115,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     aside = excluded_by(found)
     watch(Progress(with_compilation(f"calibrating {case.name}")))
     parent = calibrated(case, folder_of(runs, case), aside, watch)
-    named = {candidate.name: (candidate, shapes) for candidate, shapes in found_additions(case, found)}
+    named = {candidate.name: (candidate, shapes) for candidate, shapes in tried_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
     rungs: dict[Names, Rung] = {(): rung(parent)}
 
@@ -127,8 +127,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
                 rungs[names] = rung(base)
         return rungs.get(names)
 
-    nominees = [Nominee(one.name, one.parameter, one.amplitude.off) for one, _ in named.values()]
-    choice = chosen(nominees, rung_with, in_doubt(found))
+    choice = chosen(nominees(case, found), rung_with, in_doubt(found))
     cases, bases = [case], [parent]
     for names in choice.stages[1:]:
         base = tried[names]
@@ -162,6 +161,42 @@ def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
     return sorted(added, key=lambda one: order.get(one[0].parameter, len(order)))
 
 
+def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
+    """What was found, and after each effect the place that is likelier than it: errors at what is held out decide, and
+    where they are the same, what is known.
+    """
+    likelier = _likelier_places(found)
+    tried: list[Addition] = []
+    for one in found_additions(case, found):
+        place = likelier.get(one[0].name)
+        tried += [one, (candidate_at(case, place), place.shapes)] if place else [one]
+    return tried
+
+
+def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
+    """What is tried, as it is chosen from."""
+    known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
+    return [
+        Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""))
+        for one, _ in tried_additions(case, found)
+    ]
+
+
+def _likelier_places(found: Diagnosis) -> dict[str, Location]:
+    """Places that are likelier than an accepted effect, by its name, spread over where they may lie."""
+    return {
+        step.accepted: spread_over_its_error(step.places[step.likelier_place])
+        for step in found.steps
+        if step.likelier_place
+    }
+
+
+def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
+    """`values_found`, and the sizes of the likelier places."""
+    likelier = _likelier_places(found).values()
+    return values_found(case, found) | {candidate_at(case, one).parameter: one.amplitude for one in likelier}
+
+
 def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
     """Parameters of the last model of a diagnosis by name, sizes of places as large as they are spread."""
     values = {name: three[0] for name, three in found.parameters.last.items()}
@@ -183,7 +218,8 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
         why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
         return f"Nothing is added: {LAW_TO_DISCOVER if found.laws is not None else why}."
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
-    spread = [(candidate_at(case, place).name, spread_over_its_error(place)) for place in found.places]
+    places = [*(spread_over_its_error(place) for place in found.places), *_likelier_places(found).values()]
+    spread = [(candidate_at(case, place).name, place) for place in places]
     said = [
         f"{name} is spread over where it may lie: half length {one.length:.2g} m, half width {one.width:.2g} m."
         for name, one in spread
@@ -226,7 +262,7 @@ def _calibrated_with(
 ) -> Baseline | None:
     """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""
     child = with_additions(parent.case, added)
-    theta = {name: value for name, value in values_found(parent.case, found).items() if name in child.parameters}
+    theta = {name: value for name, value in values_tried(parent.case, found).items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
     known = z_at(child, {name: np.array([theta[name]]) for name in child.parameters})[0]
