@@ -12,8 +12,10 @@ from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspec
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.conclusion import chance_of_misfit
 from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.verdict import Grounds, judged
 from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step, Suspect
+from vegglue.screening.instruments import Instrument
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
 # A misfit as it should be, one that errors do not make, and one that is absurd: 3.8 and 6 times the degrees of freedom.
@@ -159,7 +161,19 @@ def test_an_alarm_that_nothing_came_of_is_no_all_clear() -> None:
     contenders = tuple(Contender("effect", name, 1.0, 0, None) for name in ("wind", "elder", "steep_bank", "jet"))
     verdict, sentence, _ = said(grounds(undecided=contenders))
     assert verdict == "cannot-tell"
-    assert "wind or elder or steep_bank stands out" in sentence
+    assert "it may be wind (25%) or elder (25%) or steep_bank (25%), but none of them surely" in sentence
+
+
+def test_what_may_be_it_is_told_in_words() -> None:
+    """Something at a place and an instrument go by what they do and where, with their chances."""
+    spot = Refit(None, {"x": 9.8, "y": 0.5}, None, 5.0, -0.3, (-0.4, -0.2))
+    probe = Instrument("position", (1, 2), 14.2, 1.5)
+    contenders = (
+        Contender("bed", "unlisted_bed[x9.8,y0.5]", 3.0, 0, spot), Contender("position", "position", 2.0, 0, probe)
+    )  # fmt: skip
+    sentence = said(grounds(undecided=contenders))[1]
+    assert "it may be something in no list, as if the bed lies 0.30 m lower at x = 9.8, y = 0.5 m (7" in sentence
+    assert "or a probe that is off in all experiments at x = 14.2, y = 1.5 m (2" in sentence
 
 
 def test_a_misfit_is_not_said_to_hide() -> None:
@@ -201,7 +215,7 @@ def test_a_place_that_is_likelier_comes_first_and_in_words() -> None:
     assert sentence.startswith("Missing: most likely something in no list (66%): at x = 12.0, y = -0.6 m it acts as if")
     assert "; or else a of 0.3" in sentence
     assert (
-        "with a chance of 24% among all that was tried, or else in no list, water enters, 0.4 m3/s at x = 33.0"
+        "with a chance of 24% among all that was tried, or else something in no list, as if water enters, 0.4 m3/s at x"
         in sentence
     )
     assert "degrees of freedom with a." in sentence
@@ -212,7 +226,7 @@ def test_what_leaves_the_same_trace_is_as_likely_as_all_of_it_together() -> None
     alike = Step("a", ("a", "b"), (0.3, 0.25), (("a", "b"),), 200.0, 5.0, 1e-4, {"bed": 0.45}, place)
     sentence = said(grounds(alike), [a_suspect(name) for name in "ab"])[1]
     assert "most likely" not in sentence
-    assert "or else in no list, the bed lies 0.40 m higher at x = 33.0, y = -0.6 m (45%)" in sentence
+    assert "or else something in no list, as if the bed lies 0.40 m higher at x = 33.0, y = -0.6 m (45%)" in sentence
 
 
 def test_an_implausible_size_is_remarked() -> None:

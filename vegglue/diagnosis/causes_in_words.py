@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.findings import Findings
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import (
@@ -14,11 +15,20 @@ from vegglue.results.diagnosis import (
     Step,
     Suspect,
 )
+from vegglue.screening.instruments import Instrument
 
 # Chance of what is named, below which it is stated: above, it would be told as 100 %.
 STATED_BELOW = 0.995
 # Standard error of a place [m] below which its digits say enough.
 TOLD_ERROR = 0.3
+# Contenders that are told where none is surely it.
+UNDECIDED_TOLD = 3
+OFF = {
+    "reading": "one reading that is off",
+    "position": "a probe that is off in all experiments",
+    "probe": "a probe that is off in all sections",
+    "gauge": "a gauge that is off",
+}
 
 
 def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
@@ -36,18 +46,17 @@ def _place_words(place: Location) -> str:
     unit = f" {place.unit}"
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
     told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
-    return f"at {at} it acts as if {_what_acts(place)} ({told}{'; ' if against else ''}{''.join(against)})"
+    what = _what_acts(place.term, place.amplitude)
+    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
 
 
-def _what_acts(place: Location) -> str:
+def _what_acts(term: str, amplitude: float) -> str:
     return {
-        "drag": "something holds the flow back"
-        if place.amplitude > 0
-        else "something lets the flow pass or pushes it on",
-        "bed": f"the bed lies {abs(place.amplitude):.2f} m {'higher' if place.amplitude > 0 else 'lower'}",
-        "inflow": f"water {'enters' if place.amplitude > 0 else 'leaves'}, {abs(place.amplitude):.3g} m3/s",
-        "viscosity": f"the water mixes {'more' if place.amplitude > 0 else 'less'}",
-    }[place.term]
+        "drag": "something holds the flow back" if amplitude > 0 else "something lets the flow pass or pushes it on",
+        "bed": f"the bed lies {abs(amplitude):.2f} m {'higher' if amplitude > 0 else 'lower'}",
+        "inflow": f"water {'enters' if amplitude > 0 else 'leaves'}, {abs(amplitude):.3g} m3/s",
+        "viscosity": f"the water mixes {'more' if amplitude > 0 else 'less'}",
+    }[term]
 
 
 def _give_or_take(error: float) -> str:
@@ -89,7 +98,7 @@ def instruments_in_words(instruments: Sequence[FaultyInstrument]) -> str:
 
 
 def _instrument_words(one: FaultyInstrument) -> str:
-    where = ", ".join(f"{name} = {value:.4g}" for name, value in (("x", one.x), ("y", one.y)) if np.isfinite(value))
+    where = _where(one.x, one.y)
     what = {
         "reading": f"One reading at {where} m is off",
         "position": f"The probe at {where} m is off in all experiments",
@@ -98,6 +107,11 @@ def _instrument_words(one: FaultyInstrument) -> str:
     }[one.kind]
     low, high = one.interval95
     return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}); it was set aside"
+
+
+def _where(x: float, y: float) -> str:
+    """x = 14.3, y = 1.5, without what is NaN."""
+    return ", ".join(f"{name} = {value:.4g}" for name, value in (("x", x), ("y", y)) if np.isfinite(value))
 
 
 def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
@@ -131,7 +145,26 @@ def _other_words(step: Step, name: str) -> str:
     if name not in step.places:
         return f"{name} {chance}"
     place = step.places[name]
-    return f"in no list, {_what_acts(place)} at x = {place.x:.1f}, y = {place.y:.1f} m {chance}"
+    return f"{_briefly(place.term, place.amplitude, place.x, place.y)} {chance}"
+
+
+def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
+    return f"something in no list, as if {_what_acts(term, amplitude)} at x = {x:.1f}, y = {y:.1f} m"
+
+
+def undecided_in_words(contenders: Sequence[Contender]) -> str:
+    """The likeliest contenders with their chances among all of them."""
+    told = zip(contenders[:UNDECIDED_TOLD], chances_of(contenders), strict=False)
+    return " or ".join(f"{_contender_words(one)} ({chance:.0%})" for one, chance in told)
+
+
+def _contender_words(one: Contender) -> str:
+    """The name of an effect, what something unlisted does and where, or which instrument is off."""
+    if isinstance(one.what, Instrument):
+        return f"{OFF[one.what.kind]} at {_where(one.what.x, one.what.y)} m"
+    if one.kind == "effect":
+        return one.name
+    return _briefly(one.kind, one.what.amplitude, one.what.shapes["x"], one.what.shapes["y"])
 
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:

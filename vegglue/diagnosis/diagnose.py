@@ -12,22 +12,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_offset
 from vegglue.diagnosis.competition import (
-    LEAST_ODDS,
     Contender,
-    chances_of,
     contenders_of,
     tempered_chances,
-    tempering,
 )
 from vegglue.diagnosis.conclusion import concluded
+from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as_likely
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found
+from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found, with_odds
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -49,14 +48,6 @@ FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2
 MISPLACED_SHARE = 0.1
 # Effects and places that are accepted at most, and instruments.
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
-# Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
-MOST_FOLLOWED = 3
-# Odds within which another of the same kind is followed: the grid that hypotheses are searched on decides no closer.
-SAME_KIND_ODDS = 3.0
-# Odds by which a place may lead a listed effect that is taken all the same: what is known goes before what is vague.
-# Chosen after open-n, where a push far upstream of all sections led the skewed inflow by 4.7, and a scour hole of the
-# blind study that led one section's probes by 7.
-KNOWN_FIRST_ODDS = 5.0
 
 
 @dataclass(frozen=True)
@@ -116,34 +107,38 @@ def _following(
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
-    come next: of its own kind within SAME_KIND_ODDS, of other kinds within LEAST_ODDS. What is vaguer, a place, has to
-    lead by LEAST_ODDS; where a listed effect is nearly as likely, that is taken, and the place told beside it.
+    come next. What is vaguer, a place, has to lead what is known by LEAST_ODDS; where a listed effect is nearly as
+    likely, that is taken, and the place told beside it. Places do not rival each other: each says "none of these".
     """
-    chance = chances_of(contenders)
-    odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
-    rivals = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
+    rivals = nearly_as_likely(contenders, {one.term for one in screening.fingerprints.places})
     branches = in_threads(_branch, [(screening, contenders, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
         return possible[0][1] if possible else None
     ends = in_threads(_screened, [(one,) for _, one in possible])
     score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
-    best = int(np.argmax(score))
-    following = ends[best]
-    if len(following.found.places) > len(found.places):
-        ahead = (score[best] - score) / tempering(score[best])
-        if np.delete(ahead, best).min() <= np.log(LEAST_ODDS):
-            named = [j for j, one in enumerate(ends) if len(one.found.steps) > len(found.steps)]
-            near = [j for j in named if ahead[j] < np.log(KNOWN_FIRST_ODDS)]
-            if not near:
-                return None
-            following = ends[min(near, key=lambda j: float(ahead[j]))]
-    if len(following.found.steps) > len(found.steps):
-        *earlier, last = following.found.steps
-        names = [contenders[j].name for j, _ in possible]
-        last = followed_further(last, names, tempered_chances(score))
-        following = replace(following, found=replace(following.found, steps=(*earlier, last)))
-    return following
+    best = chosen_contender([_what(one, found) for one in ends], score)
+    return None if best is None else _told_beside(ends[best], [contenders[j] for j, _ in possible], score, found)
+
+
+def _what(one: Following, found: Findings) -> What:
+    """What was found last."""
+    if len(one.found.places) > len(found.places):
+        return "place"
+    return "effect" if len(one.found.steps) > len(found.steps) else "instrument"
+
+
+def _told_beside(following: Following, followed: Sequence[Contender], score: Array, found: Findings) -> Following:
+    """What was taken, with the chances and odds of all that was followed; score (k,): ln evidence of each."""
+    further = following.found
+    if len(further.steps) > len(found.steps):
+        *steps, step = further.steps
+        step = followed_further(step, [one.name for one in followed], tempered_chances(score))
+        further = replace(further, steps=(*steps, step))
+    if len(further.places) > len(found.places):
+        *places, place = further.places
+        further = replace(further, places=(*places, with_odds(place, followed, score.max() - score)))
+    return replace(following, found=further)
 
 
 def _screened(one: Following) -> Following:

@@ -14,6 +14,7 @@ from vegglue.diagnosis.causes_in_words import (
     instruments_in_words,
     law_in_words,
     model_error_in_words,
+    undecided_in_words,
     with_their_chances,
 )
 from vegglue.diagnosis.findings import Findings
@@ -123,8 +124,8 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         which = found.steps[-1].accepted if any(step.likelier_place for step in found.steps) else "it"
         return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with {which}.{also}"
     if found.undecided:
-        names = " or ".join(one.name for one in found.undecided[:3])
-        return "cannot-tell", f"These data cannot tell: {names} stands out, but none of them surely ({_told(misfit)})."
+        names = undecided_in_words(found.undecided)
+        return "cannot-tell", f"These data cannot tell: it may be {names}, but none of them surely ({_told(misfit)})."
     return _without_findings(grounds, suspects)
 
 
