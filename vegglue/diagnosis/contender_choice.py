@@ -1,11 +1,10 @@
 """Which contender is taken: those nearly as likely as the best are followed a step further, and what is vaguer has to
 lead.
 
-Something at a place says "none of what is known", and the listed effects, laws and instruments that it denies are many:
-it has to lead them by LEAST_ODDS. Places do not rival each other, for each says the same.
+Something at a place says "none of what is known", which is vague: it has to lead all else by LEAST_ODDS.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -25,27 +24,22 @@ KNOWN_FIRST_ODDS = 5.0
 What = Literal["effect", "place", "instrument"]
 
 
-def nearly_as_likely(contenders: Sequence[Contender], terms: Collection[str]) -> list[int]:
-    """Contenders of the best one's kind within SAME_KIND_ODDS and of others within LEAST_ODDS, MOST_FOLLOWED at most,
-    the likeliest of what is known among them; terms: kinds of contenders that are something at a place.
-    """
+def nearly_as_likely(contenders: Sequence[Contender]) -> list[int]:
+    """Contenders of the best one's kind within SAME_KIND_ODDS, of others within LEAST_ODDS; MOST_FOLLOWED at most."""
     chance = chances_of(contenders)
     odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
-    near = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]]
-    known, first = [j for j in near if contenders[j].kind not in terms], near[:MOST_FOLLOWED]
-    return first if not known or known[0] in first else [*first[:-1], known[0]]
+    return [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]][:MOST_FOLLOWED]
 
 
 def chosen_contender(what: Sequence[What], evidence: Array) -> int | None:
-    """The likeliest of those followed; where that is a place and something known is within LEAST_ODDS of it, the
-    likeliest listed effect within KNOWN_FIRST_ODDS, None without one.
+    """The likeliest of those followed; where that is a place and leads another by less than LEAST_ODDS, the likeliest
+    listed effect within KNOWN_FIRST_ODDS, None without one.
 
     what, evidence (k,): what each is, and the ln of its evidence [-].
     """
     best = int(np.argmax(evidence))
     ahead = (evidence[best] - evidence) / tempering(evidence[best])
-    near = [j for j, one in enumerate(what) if one != "place" and ahead[j] <= np.log(LEAST_ODDS)]
-    if what[best] != "place" or not near:
+    if what[best] != "place" or np.delete(ahead, best).min() > np.log(LEAST_ODDS):
         return best
-    listed = [j for j in near if what[j] == "effect" and ahead[j] < np.log(KNOWN_FIRST_ODDS)]
+    listed = [j for j, one in enumerate(what) if one == "effect" and ahead[j] < np.log(KNOWN_FIRST_ODDS)]
     return min(listed, key=lambda j: float(ahead[j]), default=None)

@@ -26,7 +26,7 @@ from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as_likely
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found, with_odds
+from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -107,10 +107,9 @@ def _following(
     """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
-    come next. What is vaguer, a place, has to lead what is known by LEAST_ODDS; where a listed effect is nearly as
-    likely, that is taken, and the place told beside it. Places do not rival each other: each says "none of these".
+    come next, see `contender_choice`.
     """
-    rivals = nearly_as_likely(contenders, {one.term for one in screening.fingerprints.places})
+    rivals = nearly_as_likely(contenders)
     branches = in_threads(_branch, [(screening, contenders, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
@@ -129,16 +128,12 @@ def _what(one: Following, found: Findings) -> What:
 
 
 def _told_beside(following: Following, followed: Sequence[Contender], score: Array, found: Findings) -> Following:
-    """What was taken, with the chances and odds of all that was followed; score (k,): ln evidence of each."""
-    further = following.found
-    if len(further.steps) > len(found.steps):
-        *steps, step = further.steps
-        step = followed_further(step, [one.name for one in followed], tempered_chances(score))
-        further = replace(further, steps=(*steps, step))
-    if len(further.places) > len(found.places):
-        *places, place = further.places
-        further = replace(further, places=(*places, with_odds(place, followed, score.max() - score)))
-    return replace(following, found=further)
+    """What was taken, a listed effect with the chances of all that was followed; score (k,): ln evidence of each."""
+    if len(following.found.steps) <= len(found.steps):
+        return following
+    *earlier, last = following.found.steps
+    last = followed_further(last, [one.name for one in followed], tempered_chances(score))
+    return replace(following, found=replace(following.found, steps=(*earlier, last)))
 
 
 def _screened(one: Following) -> Following:

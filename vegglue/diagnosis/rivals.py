@@ -116,16 +116,6 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     )
 
 
-def with_odds(place: Location, followed: Sequence[Contender], ahead: Array) -> Location:
-    """The place once some contenders have been followed further; ahead (k,): ln odds against each of them [-]."""
-    again = {
-        one.name if one.kind == "effect" else one.kind: float(np.exp(min(gained, LARGEST_LOG_ODDS)))
-        for one, gained in zip(followed, ahead, strict=True)
-        if one.kind != place.term
-    }
-    return replace(place, odds=place.odds | again)
-
-
 def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:
     """The best contender, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
     noise = screening.base.noise
