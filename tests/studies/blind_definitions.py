@@ -36,8 +36,20 @@ def truths(record: Record) -> set[str]:
 
 
 def is_true_step(record: Record, step: Thing) -> bool:
-    """One of its rivals is so."""
-    return bool(truths(record) & set(step["rivals"]))
+    """One of its rivals is so, or the place that it tells before them."""
+    first = place_told_first(step)
+    return bool(truths(record) & set(step["rivals"])) or (first is not None and bool(objects_near(record, first)))
+
+
+def place_told_first(step: Thing) -> Thing | None:
+    """A place that is likelier than every group of rivals, by the x and y [m] in its name; None without."""
+    others = {name: chance for name, chance in step["others"].items() if name.startswith("unlisted_")}
+    best = max(others, key=others.__getitem__, default="")
+    chance = dict(zip(step["rivals"], step["chances"], strict=True))
+    if not best or others[best] <= max(sum(chance[name] for name in group) for group in step["groups"]):
+        return None
+    x, y = best.partition("[x")[2].rstrip("]").split(",y")
+    return {"x": float(x), "y": float(y)}
 
 
 def objects_near(record: Record, place: Thing) -> list[Thing]:
@@ -153,6 +165,19 @@ def places_named(record: Record) -> list[Thing]:
 def none_of_these(record: Record) -> bool:
     """The verdict is none of these."""
     return record["verdict"] == "none-of-these"
+
+
+def known_first(record: Record) -> bool:
+    """The verdict begins with a listed effect or an instrument."""
+    steps = record["steps"]
+    begins = place_told_first(steps[0]) is None if steps else bool(record["instruments"])
+    return named(record) and not none_of_these(record) and begins
+
+
+def told_near(record: Record) -> bool:
+    """A place within 1.5 m of an unlisted object was named, or told first of several causes."""
+    first = [place_told_first(step) for step in record["steps"]] if named(record) else []
+    return place_near(record) or any(objects_near(record, place) for place in first if place is not None)
 
 
 def place_near(record: Record) -> bool:

@@ -30,7 +30,8 @@ def listed(name: str = "eddies") -> dict[str, Any]:
 def step(*rivals: str) -> dict[str, Any]:
     """Each rival is a group of its own; the first is accepted."""
     chances = [0.65, 0.2, 0.1, 0.05][: len(rivals)]
-    return {"accepted": rivals[0], "rivals": list(rivals), "chances": chances, "groups": [[name] for name in rivals]}
+    groups = [[name] for name in rivals]
+    return {"accepted": rivals[0], "rivals": list(rivals), "chances": chances, "groups": groups, "others": {}}
 
 
 def record(group: str, verdict: str, *steps: dict[str, Any], **changes: Any) -> dict[str, Any]:
@@ -95,6 +96,24 @@ def test_what_is_named_falsely() -> None:
     assert [what.false_named(off(found)) for found in (READ, MISREAD)] == [False, True]
     assert what.false_named(NAMED | {"instruments": [MISREAD]})
     assert [what.only_false(one) for one in (NAMED, WRONG, BESIDE)] == [False, True, False]
+
+
+def test_a_place_that_is_told_first_counts_as_told() -> None:
+    """Where it is likelier than every group; it makes a step true, and no verdict of none of these."""
+    near, far = "unlisted_bed[x10.5,y-0.25]", "unlisted_bed[x20,y0]"
+
+    def found(name: str, chance: float) -> dict[str, Any]:
+        return pier("one-of", steps=[step("wind") | {"others": {name: chance, "gauge": 0.9}}])
+
+    told = [found(near, 0.7), found(far, 0.7), found(near, 0.6)]
+    assert [what.only_false(one) for one in told] == [False, True, True]
+    assert [what.told_near(one) for one in told] == [True, False, False]
+    assert [what.known_first(one) for one in told] == [False, False, True]
+    assert not any(what.place_near(one) or what.none_of_these(one) for one in told)
+    assert what.told_near(pier("none-of-these", HERE))
+    assert not what.known_first(pier("none-of-these", AWAY))
+    assert what.known_first(pier("instrument", instruments=[MISREAD]))
+    assert not what.known_first(pier("cannot-tell", steps=[step("wind")]))
 
 
 def test_a_field_stands_for_all_that_was_found() -> None:

@@ -123,7 +123,7 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: dict[str, str], ru
         assert vaguer is not None
         if with_known is None or why_not_kept(without, with_known):
             continue
-        if not any(gain > CLEAR * error for gain, error in _gains(with_known, vaguer).values()):
+        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer).values()):
             del refused[known]
             refused[one.name] = f"with {known}, which is known, held-out errors are not clearly higher"
             kept = both
