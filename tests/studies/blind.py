@@ -47,6 +47,7 @@ ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"
 # Records of the study as far as it was made: data sets cost hours.
 KEPT = ROOT / "data" / "blind" / "records.jsonl"
+LENGTHS = KEPT.with_name("lengths.jsonl")
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
@@ -191,7 +192,14 @@ def main() -> None:
                 return
             run(todo, path, {record["key"] for record in kept}, given.jobs)
     records = {record["key"]: record for record in (*kept, *records_in(path))}
-    write_page(list(records.values()), ROOT / "docs", {key: sum(sizes.values()) for key, sizes in SIZES.items()})
+    sizes = {key: sum(of_kind.values()) for key, of_kind in SIZES.items()}
+    write_page(list(records.values()), ROOT / "docs", sizes, lengths_in(LENGTHS))
+
+
+def lengths_in(path: Path) -> dict[str, float]:
+    """What `blind_lengths` found, by the keys of data sets."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return {one["key"]: one["truth"] for one in map(json.loads, lines)}
 
 
 def planned(share: float, only: list[str]) -> list[Trial]:

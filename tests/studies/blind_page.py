@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from blind_definitions import Record
+from blind_definitions import Record, none_of_these
 from blind_figures import TRUTHS, draw_chances, draw_confusion, draw_held_out, draw_shares
 from blind_lines import (
     BINS,
@@ -32,16 +32,23 @@ from vegglue.figures.style import save
 FEW_SETS = 20
 CASES = {"twin": "the small channel", "campaign": "the field campaign"}
 ROWS = 30
+# Of objects, by how long they are in the stranger's flow.
+THIRDS = ("of the shortest third", "of the middle third", "of the longest third")
 
 
-def write_page(records: Sequence[Record], folder: Path, planned: Mapping[tuple[str, str], int]) -> None:
-    """blind.md with its tables, and blind-*.svg beside it; planned: data sets by truth and case."""
+def write_page(
+    records: Sequence[Record], folder: Path, planned: Mapping[tuple[str, str], int], lengths: Mapping[str, float]
+) -> None:
+    """blind.md with its tables, and blind-*.svg beside it; planned: data sets by truth and case; lengths: of hidden
+    objects in the flow of the stranger, by the keys of their sets [standard errors].
+    """
     sets = {truth: made(records, truth) for truth in TRUTHS}
     told = {truth: chances_told(chosen) for truth, chosen in sets.items()}
     lines, alone, reached = shares_that_reach(sets["second"])
     nothing = [one for one in sets["second"] if one["group"].startswith("null")]
     text = PAGE.format(
         lines=lines, alone=alone, reached=reached,
+        lengths=_lengths(sets["second"], lengths),
         sizes=_sizes(records, planned), left_out=_left_out(records), afforded=AFFORDED, main=_main_table(sets),
         chances=_chances(told), distances=_distances(told), instead=_instead(sets["second"]),
         unheard=sum(one["verdict"] == "nothing-missing" for one in nothing), nothing=len(nothing),
@@ -58,6 +65,26 @@ def write_page(records: Sequence[Record], folder: Path, planned: Mapping[tuple[s
         ("confusion", draw_confusion(sets["second"])),
     ):
         save(figure, folder / f"blind-{name}.svg")
+
+
+def _lengths(records: Sequence[Record], lengths: Mapping[str, float]) -> str:
+    """How long objects are in the stranger's own flow, and what is told of each third of them."""
+    objects = sorted((one for one in records if one["key"] in lengths), key=lambda one: lengths[one["key"]])
+    if len(objects) < len(THIRDS):
+        return ""
+    values = [lengths[one["key"]] for one in objects]
+    thirds = np.array_split(np.arange(len(objects)), len(THIRDS))
+    told = [
+        f"{sum(none_of_these(objects[j]) for j in some)} of {some.size} {words} ({values[some[0]]:.1f} to "
+        f"{values[some[-1]]:.1f})"
+        for words, some in zip(THIRDS, thirds, strict=True)
+    ]
+    return (
+        "An object is made as large as makes it six standard errors long in the model's own equations. In the "
+        f"stranger's, whose mixing and friction are others, the same object is {values[0]:.1f} to {values[-1]:.1f} "
+        f"long, {float(np.median(values)):.1f} at the median of {len(values)} in the small channel "
+        f"(`tests/studies/blind_lengths.py`). None of these is told of {', '.join(told)}."
+    )
 
 
 def percent(share: float) -> str:

@@ -138,7 +138,7 @@ def told(trial: Trial) -> dict[str, Any]:
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(trial.noise)
     errors = with_correlation(noise_of(base.model.station), correlation, scale)
-    sizing = with_model_error(with_grid_error(errors, base.difference), columns)
+    sizing = _sizing(base, errors, columns)
     found = [_hidden(base, sizing, name, trial.signal, random) for name in trial.hide]
     flows = [one for one in found if not one["stations"]]
     station = base.model.station
@@ -151,6 +151,21 @@ def told(trial: Trial) -> dict[str, Any]:
         "key": trial.key, "edition": EDITION, "hidden": found, "also_true": dict(also_true), "value": value.tolist(),
         "unseen": truly[len(station) :].tolist(),
     }  # fmt: skip
+
+
+def _sizing(base: TwinBase, errors: Noise, columns: Array) -> Noise:
+    """Errors in which what is hidden is so many standard errors long: of the data, the grid, and the model's own."""
+    return with_model_error(with_grid_error(errors, base.difference), columns)
+
+
+def length_in_truth(trial: Trial, hidden: Mapping[str, Any], seed: int) -> float:
+    """Standard errors by which readings without errors differ with and without what is hidden, both of the second
+    solver on the site of a trial, after calibration has done what it can [-]; for white errors.
+    """
+    base, columns = place_of(trial.case, place_number(trial))
+    sizing = _sizing(base, noise_of(base.model.station), columns)
+    ends = [_truly(trial, base, base.model.station, some, seed)[0] for some in ([hidden], [])]
+    return visible_length(base, sizing, ends[0] - ends[1])
 
 
 def hash_of(text: str) -> int:

@@ -276,7 +276,7 @@ def test_the_page(tmp_path: Path) -> None:
         out | {"left_out": reason}, out | {"left_out": "no steady flow"},
     ]  # fmt: skip
     planned = {("second", "twin"): 9, ("second", "campaign"): 5, ("own", "twin"): 3}
-    write_page(records, tmp_path, planned)
+    write_page(records, tmp_path, planned, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     line = "| Listed effect in the set, ratio 6 | at least 90 % |"
     assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | too few | 100.0 % (1) |" in page
@@ -293,7 +293,16 @@ def test_the_page(tmp_path: Path) -> None:
         assert (tmp_path / f"blind-{name}.svg").stat().st_size > 1000
 
 
+def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
+    objects = [pier("none-of-these" if j > 2 else "cannot-tell") | {"key": f"pier{j}"} for j in range(6)]
+    lengths = {f"pier{j}": 2.0 + j for j in range(6)} | {"of no record": 1.0}
+    write_page(objects, tmp_path, {}, lengths)
+    page = (tmp_path / "blind.md").read_text(encoding="utf-8")
+    assert "2.0 to 7.0 long, 4.5 at the median of 6" in page
+    assert "0 of 2 of the shortest third (2.0 to 3.0), 1 of 2 of the middle third (4.0 to 5.0)" in page
+
+
 def test_a_page_without_records(tmp_path: Path) -> None:
-    write_page([], tmp_path, {})
+    write_page([], tmp_path, {}, {})
     assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert len(list(tmp_path.glob("blind-*.svg"))) == 4
