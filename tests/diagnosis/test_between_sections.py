@@ -10,7 +10,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_model_error
-from vegglue.diagnosis.between_sections import halfway, largest_error_between
+from vegglue.diagnosis.between_sections import acts_elsewhere, halfway, largest_error_between
 from vegglue.engine.interface import Model, Point
 
 pytestmark = pytest.mark.slow
@@ -90,3 +90,29 @@ def test_a_section_that_a_boat_measured_moves_as_one() -> None:
     boat = {"x": [1.9, 2.0, 2.1, 6.1, 6.0, 5.9], "y": [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "section": [*"AAABBB"]}
     station = pd.DataFrame(boat | {"kind": "velocity", "used": True, "experiment": "low"})
     assert halfway(station, 8.0)["x"].tolist() == pytest.approx([3.9, 4.0, 4.1, 7.1, 7.0, 6.9])
+
+
+@pytest.mark.parametrize(("there", "told"), [(0.29, False), (0.31, True), (-0.31, True)])
+def test_what_acts_mostly_where_nobody_measured_is_told(
+    there: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three times as much there as at the stations, of either sign, at one place halfway."""
+    count = len(STATION)
+    before = at_best(CASE_OF_TWINS, STATION, np.zeros(count), np.zeros((count, PARAMETERS)))
+    changed = np.full(count, 0.02)
+    changed[3] = 0.1
+    moved = Point(before.fitted.point.z, before.fitted.point.prediction + changed, before.fitted.point.slope, {})
+    after = replace(before, fitted=replace(before.fitted, point=moved))
+    behind = np.full(count, 0.05)
+    behind[5] = there
+    answers = iter([np.zeros(count), behind])
+
+    def linearised(model: Model, z: Array) -> Point:
+        return Point(z, next(answers), np.zeros((count, PARAMETERS)), {})
+
+    monkeypatch.setattr("vegglue.diagnosis.between_sections.linearise", linearised)
+    why = acts_elsewhere(before, after)
+    assert bool(why) == told
+    if told:
+        assert "changes the velocity by 0.31 m/s around x = " in why
+        assert "by 0.1 m/s at most where it was measured" in why

@@ -17,21 +17,23 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.nominations import (
+    Addition,
+    acting_elsewhere,
+    found_additions,
+    in_doubt,
+    names_of_places,
+    nominees,
+    tried_additions,
+    values_found,
+    values_tried,
+)
 from vegglue.diagnosis.stepwise_choice import Names, chosen
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import start_amplitude
-from vegglue.workflow.extend import (
-    Addition,
-    found_additions,
-    in_doubt,
-    nominees,
-    tried_additions,
-    values_found,
-    values_tried,
-)
 from vegglue.workflow.run_folder import calibrated_anew
 
 Errors = dict[str, Any]
@@ -77,7 +79,10 @@ def _as_kept(data: DataSet, found: Diagnosis, aside: pd.DataFrame) -> Errors:
         return None if base is None else rungs.setdefault(names, rung(base))
 
     rungs: dict[Names, Rung] = {}
-    names = chosen(nominees(case, found), rung_with, in_doubt(found)).stages[-1]
+    alone = {name: tried[name,] for name in names_of_places(case, found) if rung_with((name,)) is not None}
+    elsewhere = acting_elsewhere(parent, alone)
+    possible = [one for one in nominees(case, found) if one.name not in elsewhere]
+    names = chosen(possible, rung_with, in_doubt(found)).stages[-1]
     base = tried[names]
     errors: Errors = {"parent": _error_of(data, parent), "kept_names": list(names)}
     return errors | ({"kept": _error_of(data, base)} if names and base is not None else {})

@@ -12,22 +12,21 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error, with_additions
+from vegglue.diagnosis.nominations import (
+    Addition,
+    found_additions,
+    in_doubt,
+    tried_additions,
+    values_found,
+    values_tried,
+)
 from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.screening.places import EFFECT_AT_PLACE
-from vegglue.workflow.extend import (
-    Addition,
-    found_additions,
-    in_doubt,
-    in_words,
-    tried_additions,
-    values_found,
-    values_tried,
-    write_child,
-)
+from vegglue.workflow.extend import in_words, write_child
 
 ROOT = Path(__file__).parents[2]
 

@@ -13,16 +13,20 @@ from vegglue.case.made_files import write_made
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import (
-    candidate_at,
-    candidate_named,
-    child_tree,
-    spread_over_its_error,
-    with_additions,
-)
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
 from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
+from vegglue.diagnosis.nominations import (
+    Addition,
+    acting_elsewhere,
+    in_doubt,
+    names_of_places,
+    nominees,
+    places_tried,
+    tried_additions,
+    values_tried,
+)
+from vegglue.diagnosis.stepwise_choice import Choice, Names, chosen
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
@@ -30,7 +34,7 @@ from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.diagnosis import Diagnosis, Location
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
 from vegglue.workflow.compare import Comparison, keep_ladder
 from vegglue.workflow.diagnose import diagnose
@@ -51,7 +55,6 @@ NOTHING_TO_ADD = {
     "cannot-tell": "the diagnosis cannot tell what is missing",
 }
 LAW_TO_DISCOVER = "what stands out is a law that is in no list; `vegglue discover` adds one"
-Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,10 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
                 rungs[names] = rung(base)
         return rungs.get(names)
 
-    choice = chosen(nominees(case, found), rung_with, in_doubt(found))
+    alone = {name: tried[name,] for name in names_of_places(case, found) if rung_with((name,)) is not None}
+    elsewhere = acting_elsewhere(parent, alone)
+    choice = chosen([one for one in nominees(case, found) if one.name not in elsewhere], rung_with, in_doubt(found))
+    choice = replace(choice, refused=elsewhere | choice.refused)
     cases, bases = [case], [parent]
     for names in choice.stages[1:]:
         base = tried[names]
@@ -145,72 +151,6 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     )
 
 
-def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """Effects and places of a diagnosis in the order they were found, places spread over where they may lie; none that
-    is at work in the case already.
-    """
-    station = found.predictions.station
-    added: list[Addition] = [
-        (candidate_named(case, station, step.accepted), found.suspect(step.accepted).shapes) for step in found.steps
-    ]
-    spread = [spread_over_its_error(place) for place in found.places]
-    added += [(candidate_at(case, place), place.shapes) for place in spread]
-    # The last model of the diagnosis holds the parameters of what was found in that order.
-    order = {name: position for position, name in enumerate(found.parameters.last)}
-    added = [one for one in added if one[0].key not in case.effects]
-    return sorted(added, key=lambda one: order.get(one[0].parameter, len(order)))
-
-
-def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """What was found, and after each effect the place that is likelier than it: errors at what is held out decide, and
-    where they are the same, what is known.
-    """
-    likelier = _likelier_places(found)
-    tried: list[Addition] = []
-    for one in found_additions(case, found):
-        place = likelier.get(one[0].name)
-        tried += [one, (candidate_at(case, place), place.shapes)] if place else [one]
-    return tried
-
-
-def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
-    """What is tried, as it is chosen from."""
-    known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
-    return [
-        Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""))
-        for one, _ in tried_additions(case, found)
-    ]
-
-
-def _likelier_places(found: Diagnosis) -> dict[str, Location]:
-    """Places that are likelier than an accepted effect, by its name, spread over where they may lie."""
-    return {
-        step.accepted: spread_over_its_error(step.places[step.likelier_place])
-        for step in found.steps
-        if step.likelier_place
-    }
-
-
-def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
-    """`values_found`, and the sizes of the likelier places."""
-    likelier = _likelier_places(found).values()
-    return values_found(case, found) | {candidate_at(case, one).parameter: one.amplitude for one in likelier}
-
-
-def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
-    """Parameters of the last model of a diagnosis by name, sizes of places as large as they are spread."""
-    values = {name: three[0] for name, three in found.parameters.last.items()}
-    for place in found.places:
-        share = spread_over_its_error(place).plausible / place.plausible
-        values[candidate_at(case, place).parameter] *= share
-    return values
-
-
-def in_doubt(found: Diagnosis) -> bool:
-    """Whether what was found may stand in for something else: then held-out errors must fall clearly."""
-    return found.verdict.kind == "cannot-tell" or found.field is not None
-
-
 def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
     """What was added, or why nothing is, and why each of the others is not."""
     kept = choice.stages[-1]
@@ -218,8 +158,7 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
         why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
         return f"Nothing is added: {LAW_TO_DISCOVER if found.laws is not None else why}."
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
-    places = [*(spread_over_its_error(place) for place in found.places), *_likelier_places(found).values()]
-    spread = [(candidate_at(case, place).name, place) for place in places]
+    spread = [(candidate_at(case, place).name, place) for place in places_tried(found)]
     said = [
         f"{name} is spread over where it may lie: half length {one.length:.2g} m, half width {one.width:.2g} m."
         for name, one in spread
