@@ -13,6 +13,8 @@ Thing = dict[str, Any]  # a hidden one, a step, a place or an instrument
 SAID = ("identified", "one-of", "none-of-these", "instrument")
 # A place further off points at something else [m].
 NEAR = 1.5
+# Standard errors of a place below which its digits say enough [m], along and across: half of a spot.
+STATED = (0.5, 0.25)
 FEW = 3
 ORACLE_SHARE, MISSED_SHARE = 1.1, 1.3
 SENSORS = {effect.name for effect in sensor.EFFECTS}
@@ -183,6 +185,21 @@ def told_near(record: Record) -> bool:
 def place_near(record: Record) -> bool:
     """A place was named within 1.5 m of an unlisted object."""
     return any(objects_near(record, place) for place in places_named(record))
+
+
+def place_as_told(record: Record) -> bool | None:
+    """The first place lies within two of its stated standard errors of an unlisted object, along and across; errors
+    below those of STATED count as these. None where no place was named.
+    """
+    hidden = hidden_of(record, "unlisted")
+    if not hidden or not named(record) or record.get("field") or not record["places"]:
+        return None
+    place = record["places"][0]
+    errors = [max(place[f"{axis}_error"], least) for axis, least in zip("xy", STATED, strict=True)]
+    return any(
+        all(abs(place[axis] - one[axis]) <= 2.0 * error for axis, error in zip("xy", errors, strict=True))
+        for one in hidden
+    )
 
 
 def right_term(record: Record) -> bool:

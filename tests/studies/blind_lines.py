@@ -88,6 +88,7 @@ LINES: tuple[Line, ...] = (
     Line("... a place within 1.5 m of it, of all", ("unlisted",), what.place_near, 0.7),
     Line("... and with the right term, of all", ("unlisted",), what.right_term, 0.7),
     Line("... with the right term, of those within 1.5 m", ("unlisted",), what.right_term_if_near),
+    Line("... a place within two of its stated standard errors, of places named", ("unlisted",), what.place_as_told),
     Line("Unlisted object not looked at: none of these", ("unlisted",), not_looked_at(what.none_of_these), 0.85),
     Line("... a place within 1.5 m of it", ("unlisted",), not_looked_at(what.place_near), 0.7),
     Line("... and with the right term", ("unlisted",), not_looked_at(what.right_term), 0.7),

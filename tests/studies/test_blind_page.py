@@ -116,6 +116,17 @@ def test_a_place_that_is_told_first_counts_as_told() -> None:
     assert not what.known_first(pier("cannot-tell", steps=[step("wind")]))
 
 
+def test_a_place_is_where_it_is_told_to_be() -> None:
+    """Within two of its errors along and across, which are half a spot at least."""
+    places = [
+        {"x": 14.9, "y": 0.5, "x_error": 2.5, "y_error": 0.1}, {"x": 15.1, "y": 0.5, "x_error": 2.5, "y_error": 0.1},
+        {"x": 10.9, "y": 0.9, "x_error": 0.1, "y_error": 0.1}, {"x": 10.0, "y": 1.1, "x_error": 9.0, "y_error": 0.1},
+    ]  # fmt: skip
+    assert [what.place_as_told(pier("none-of-these", place)) for place in places] == [True, False, True, False]
+    assert what.place_as_told(pier("none-of-these")) is None
+    assert what.place_as_told(pier("cannot-tell", places[0])) is None
+
+
 def test_a_field_stands_for_all_that_was_found() -> None:
     """It is true of viscosity that is off, or near a hidden object; steps beside it were said to be something else."""
     mixed = {"field": {"term": "viscosity", "x": 3.0, "y": 0.0}}
