@@ -117,8 +117,9 @@ def a_diagnosis(
         a_suspect("turning", test={"score": -1.0, "p_family": 0.7}),
     )  # fmt: skip
     step = Step(
-        "eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0, {"bed": 0.02}
-    )
+        "eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0, {"bed": 0.02},
+        {"bed": a_location(term="bed", unit="m")},
+    )  # fmt: skip
     diagnosis = Diagnosis(
         name="open-x", version="0.1.0", suspects=usual if suspects is None else suspects,
         steps=(step,) if steps is None else steps,

@@ -6,20 +6,30 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_instrument, laws_suspected_of
+from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, a_location, an_instrument, laws_suspected_of
 from posteriors import changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
-from vegglue.report_page.answer_words import headline, ladder_in_words, next_steps, of_which_model, why_not_to_rely
+from vegglue.report_page.answer_words import (
+    causes_of,
+    headline,
+    ladder_in_words,
+    next_steps,
+    of_which_model,
+    why_not_to_rely,
+)
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
+from vegglue.results.diagnosis import Step
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
 
 FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
 LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
 LADDER = Ladder((FIRST, LAST), 0, "Added: eddies.")
+STEP = Step("eddies", ("eddies",), (0.3,), (("eddies",),), 9.0, 5.0, 1e-3, {"p": 0.6}, {"p": a_location()})
+LIKELIER = a_diagnosis(steps=(STEP,), verdict={"kind": "one-of"})
 GAUGE = ProposedMeasurement("a gauge at x = 5 m", 1, 0.5, 0.2, 9.0, True)
 
 
@@ -37,6 +47,7 @@ def plain(words: str) -> str:
     [
         (NOTHING, "Nothing is missing from this model that these data could show."),
         (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.300 m2/s"),
+        (LIKELIER, "(60 %) more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m, which is in no list, or else (30 %)"),
         (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
          "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
@@ -104,6 +115,20 @@ def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
     alone = plain(ladder_in_words(Ladder((FIRST,), 0, "Nothing is added: nothing is missing.")))
     assert alone.startswith("The model misses measurements no")
     assert alone.endswith(" Nothing is added: nothing is missing.")
+
+
+def test_the_ladder_is_of_what_was_added_and_not_of_what_is_left(toy: Run) -> None:
+    """The page of a child that lacks something else: the fall of its errors is told of what its parent lacked."""
+    place, steps = (a_location(),), (replace(FIRST, name="parent"), LAST)
+    parent, child = replace(a_diagnosis(), name="parent", places=()), replace(NOTHING, name="child", places=place)
+    loop = LoopResults(behind=parent, ladder=replace(LADDER, steps=steps))
+    assert causes_of(replace(toy, diagnosis=child, loop=loop)) == "eddies"
+    other = replace(LAST, added=("unlisted_object_x9_5_y_0_9",))
+    assert causes_of(replace(toy, loop=replace(loop, ladder=replace(LADDER, steps=(steps[0], other))))) == ""
+    found = replace(parent, places=place)
+    both = replace(LADDER, steps=(steps[0], replace(LAST, added=("eddies", *other.added))))
+    told = causes_of(replace(toy, diagnosis=found, loop=LoopResults(behind=found, ladder=both)))
+    assert told == "more drag at x = 33.0 m, y = −0.6 m and eddies"
 
 
 def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:

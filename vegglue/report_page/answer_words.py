@@ -2,6 +2,7 @@
 
 import html
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -211,11 +212,18 @@ def _speed(value: float) -> str:
 
 
 def causes_of(run: Run) -> str:
-    """What the diagnosis accepted, in words (text), where the ladder adds all of it and nothing else; '' else."""
-    ladder, found = run.loop.ladder, run.behind
-    if ladder is None or found is None or len(_all_added(ladder)) != len(found.steps) + len(found.places):
+    """What the diagnosis of the ladder's first model accepted, in words (text), where the ladder adds all of it and
+    nothing else; '' else.
+    """
+    ladder = run.loop.ladder
+    known = [one for one in (run.loop.behind, run.diagnosis) if one is not None]
+    found = next((one for one in known if ladder and one.name == ladder.steps[0].name), None)
+    if ladder is None or found is None:
         return ""
-    return accepted_causes(found)
+    effects = [re.sub(r"\W+", "_", step.accepted).strip("_") for step in found.steps]
+    places, added = sorted(one.effect for one in found.places), _all_added(ladder)
+    others = sorted(name.partition("_x")[0] for name in added if name not in effects)
+    return accepted_causes(found) if set(effects) <= set(added) and others == places else ""
 
 
 def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
