@@ -83,7 +83,7 @@ def _lengths(records: Sequence[Record], lengths: Mapping[str, float]) -> str:
         "An object is made as large as makes it six standard errors long in the model's own equations. In the "
         f"stranger's, whose mixing and friction are others, the same object is {values[0]:.1f} to {values[-1]:.1f} "
         f"long, {float(np.median(values)):.1f} at the median of {len(values)} in the small channel "
-        f"(`tests/studies/blind_lengths.py`). None of these is told of {', '.join(told)}."
+        f'(`tests/studies/blind_lengths.py`). "None of these" is told of {", ".join(told)}.'
     )
 
 
