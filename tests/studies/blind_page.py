@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from blind_definitions import Record, none_of_these
+from blind_definitions import Record, error_of, none_of_these
 from blind_figures import TRUTHS, draw_chances, draw_confusion, draw_held_out, draw_shares
 from blind_lines import (
     BINS,
@@ -48,7 +48,7 @@ def write_page(
     nothing = [one for one in sets["second"] if one["group"].startswith("null")]
     text = PAGE.format(
         lines=lines, alone=alone, reached=reached,
-        lengths=_lengths(sets["second"], lengths),
+        lengths=_lengths(sets["second"], lengths), kept=_kept(sets["second"]),
         sizes=_sizes(records, planned), left_out=_left_out(records), afforded=AFFORDED, main=_main_table(sets),
         chances=_chances(told), distances=_distances(told), instead=_instead(sets["second"]),
         unheard=sum(one["verdict"] == "nothing-missing" for one in nothing), nothing=len(nothing),
@@ -84,6 +84,20 @@ def _lengths(records: Sequence[Record], lengths: Mapping[str, float]) -> str:
         f"stranger's, whose mixing and friction are others, the same object is {values[0]:.1f} to {values[-1]:.1f} "
         f"long, {float(np.median(values)):.1f} at the median of {len(values)} in the small channel "
         f'(`tests/studies/blind_lengths.py`). "None of these" is told of {", ".join(told)}.'
+    )
+
+
+def _kept(records: Sequence[Record]) -> str:
+    """By how much held-out errors change with what is kept, at the median, and of those that rise."""
+    known = [(error_of(one, "parent"), error_of(one, "kept")) for one in records]
+    change = np.array([kept / parent - 1.0 for parent, kept in known if parent is not None and kept is not None])
+    rising = change[change >= 0.0]
+    if not rising.size:
+        return ""
+    median, of_rising, most = (percent(float(each)) for each in (np.median(change), np.median(rising), rising.max()))
+    return (
+        f"At the median of the {change.size} errors change by {median}; of the {rising.size} that rise, by {of_rising}, "
+        f"and by {most} at most."
     )
 
 

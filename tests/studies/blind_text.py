@@ -100,6 +100,7 @@ is what `vegglue extend --auto` keeps of what was found, by the same calibration
 sections and experiments left out in turn have to fall. Its parent is the model calibrated without it. *All that was
 named* is added without asking, which no command does. An instrument of one section, or a gauge, is perfect at the
 sections that were not measured, both in the truth and in the model; what changes every probe alike acts there in both.
+{kept}
 
 ![Shares and their intervals, both truths](blind-shares.svg)
 

@@ -313,6 +313,17 @@ def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
     assert "0 of 2 of the shortest third (2.0 to 3.0), 1 of 2 of the middle third (4.0 to 5.0)" in page
 
 
+def test_how_far_errors_change_is_told(tmp_path: Path) -> None:
+    def kept(errors: float) -> dict[str, Any]:
+        return NAMED | {"held_out": {"noise": 1.0, "before": 1.0, "after": 1.0, "parent": 1.0, "kept": errors}}
+
+    write_page([kept(0.5), kept(0.8), kept(1.1)], tmp_path, {}, {})
+    page = (tmp_path / "blind.md").read_text(encoding="utf-8")
+    assert (
+        "At the median of the 3 errors change by -20.0 %; of the 1 that rise, by 10.0 %, and by 10.0 % at most." in page
+    )
+
+
 def test_a_page_without_records(tmp_path: Path) -> None:
     write_page([], tmp_path, {}, {})
     assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
