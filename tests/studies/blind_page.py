@@ -96,8 +96,8 @@ def _kept(records: Sequence[Record]) -> str:
         return ""
     median, of_rising, most = (percent(float(each)) for each in (np.median(change), np.median(rising), rising.max()))
     return (
-        f"At the median of the {change.size} errors change by {median}; of the {rising.size} that rise, by {of_rising}, "
-        f"and by {most} at most."
+        f"At the median of the {change.size} errors change by {median}; of the {rising.size} that rise, by "
+        f"{of_rising}, and by {most} at most."
     )
 
 
