@@ -27,7 +27,9 @@ MOST_LINES, MOST_LETTERS = 12, 600
 def a_rung(name: str, validation: float = np.nan) -> Rung:
     """Three parameters; held-out errors of 0.03 and 0.04 m/s at its two velocities."""
     rmse = dict.fromkeys(KINDS, np.nan) | {"velocity": 0.021, "level": 0.002}
-    held_out = HeldOut(np.array([0.03, 0.04]), np.full(2, np.nan), np.array([True, True]), ("June A", "June B"))
+    held_out = HeldOut(
+        np.array([0.03, 0.04]), np.full(2, np.nan), np.array([True, True]), (("June", "A"), ("June", "B"))
+    )
     values = dict.fromkeys(("n_b", "phi", "k_s"), (1.0, 0.9, 1.1))
     return Rung(
         name, "", (), values, InSample(rmse, 8.0, 2, 0.01), held_out, PredictiveScores(1.0, 0.5, 0.95), {}, validation

@@ -1,14 +1,16 @@
 """Which effects a model keeps, told by made-up errors at what was held out."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung
-from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
+from vegglue.diagnosis.comparison import By, HeldOut, InSample, PredictiveScores, Rung
+from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen
 
 STATIONS = 12
+EXPERIMENTS = ("low", "high")
 PARENT: Names = ()
 A, B, C = ("a",), ("b",), ("c",)
 # Held-out errors by sections and by experiments [m/s], each the same at all stations.
@@ -23,7 +25,8 @@ def a_rung(errors: Errors, amplitudes: Mapping[str, float], seen: float, spread:
         values={name: (value, value - 1.96, value + 1.96) for name, value in amplitudes.items()},
         in_sample=InSample({}, seen, STATIONS, 0.01),
         held_out=HeldOut(
-            errors[0] + uneven, errors[1] + uneven, np.ones(STATIONS, bool), tuple(f"low {i}" for i in range(STATIONS))
+            errors[0] + uneven, errors[1] + uneven, np.ones(STATIONS, bool),
+            tuple((EXPERIMENTS[i % 2], f"D{i // 2}") for i in range(STATIONS)),
         ),
         predictive=PredictiveScores(np.nan, np.nan, np.nan), homogeneity={}, validation=np.nan,
     )  # fmt: skip
@@ -125,3 +128,22 @@ def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, 
     assert made.stages == (PARENT, kept)
     (refused,) = made.refused
     assert refused == ("b" if kept == A else "a")
+
+
+@pytest.mark.parametrize(("by", "group"), [("experiments", "high"), ("sections", "D0")])
+def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
+    """There it is not known, and errors rise; where it is, they fall."""
+    parent, child = (a_rung((3.0, 3.0), {}, 6.0), a_rung((2.9, 2.9), {"a": 9.0}, 1.0))
+    there = np.array([group in pair for pair in child.held_out.clusters])
+    errors = {name: np.where(there, 9.0, 2.0) if name == by else getattr(child.held_out, name) for name in WAYS}
+    child = replace(child, held_out=replace(child.held_out, **errors))
+    models = {PARENT: parent, A: child}
+
+    def kept(one: Nominee) -> tuple[Names, ...]:
+        return chosen([one], lambda names: models[names]).stages
+
+    assert kept(Nominee("a", "a", 0.0)) == (PARENT,)
+    assert kept(Nominee("a", "a", 0.0, only_in={by: group})) == (PARENT, A)
+    assert kept(Nominee("a", "a", 0.0, only_in={by: "another"})) == (PARENT,)
+    rose = chosen([Nominee("a", "a", 0.0)], lambda names: models[names]).refused["a"]
+    assert rose.startswith(f"errors of held-out {by} rose from 3.0000 to ")

@@ -232,7 +232,7 @@ def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
 
 def a_rung(name: str, error: float, **changes: object) -> Rung:
     pattern = np.array([1.0, -1.0, 1.0, -1.0]) * error
-    clusters = ("low D0", "low D3", "high D0", "high D3")
+    clusters = (("low", "D0"), ("low", "D3"), ("high", "D0"), ("high", "D3"))
     rung = Rung(
         name=name, title=name, effects=(), values={"n_b": (0.03, 0.02, 0.04), "k_s": (0.5, 0.01, 3.0)},
         in_sample=InSample({"velocity": 0.8 * error, "level": 0.001}, chi2=4.0, stations=4, noise_floor=0.01),

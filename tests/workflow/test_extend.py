@@ -16,6 +16,7 @@ from vegglue.diagnosis.nominations import (
     Addition,
     found_additions,
     in_doubt,
+    nominees,
     tried_additions,
     values_found,
     values_tried,
@@ -174,6 +175,18 @@ def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
     assert said in words
     assert words.startswith("Nothing is added: ")
     assert words.count(".") == 1
+
+
+def test_what_acts_in_one_experiment_or_section_says_so() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    for name, only_in in (("discharge_error[high]", {"experiments": "high"}), ("probe_gain[B]", {"sections": "B"})):
+        found = found_in(case, "identified", order=("",))
+        step = replace(found.steps[0], accepted=name, rivals=(name,), chances=(1.0,), groups=((name,),))
+        found = replace(found, steps=(step,), suspects=(a_suspect(name),))
+        (one,) = nominees(case, found)
+        assert one.only_in == only_in
+    (one,) = nominees(case, found_in(case, "identified", order=("streamlining_vogel_exponent",)))
+    assert one.only_in == {}
 
 
 def test_a_law_that_stands_out_is_left_to_discover() -> None:

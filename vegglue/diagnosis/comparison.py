@@ -5,7 +5,7 @@ Held out: each section, or each experiment, is left out in turn and the model ca
     dz = (J' C^-1 J + 1)^-1 (J' C^-1 r - z)   over the rows kept,   error r - J dz of those left out.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -48,7 +48,7 @@ class HeldOut:
     sections: Array
     experiments: Array
     velocity: np.ndarray
-    clusters: tuple[str, ...]
+    clusters: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     velocity = (used["kind"] == STREAMWISE).to_numpy()
     section, spread = _held_out(base, used["section"].astype(str).to_numpy())
     experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
-    clusters = tuple(f"{e} {s}" for e, s in zip(used["experiment"], used["section"], strict=True))
+    clusters = tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True))
     return Rung(
         name=model.case.name,
         title=model.case.title,
@@ -101,9 +101,9 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     )
 
 
-def held_out_rmse(rung: Rung, by: By = "sections") -> float:
-    """Root mean square held-out error of velocities [m/s]."""
-    error = _of_velocities(rung, by)
+def held_out_rmse(rung: Rung, by: By = "sections", untold: Collection[str] = ()) -> float:
+    """Root mean square held-out error of velocities [m/s]; untold: sections or experiments that do not count."""
+    error = _of_velocities(rung, by, untold)
     return root_mean_square(error[np.isfinite(error)])
 
 
@@ -138,16 +138,17 @@ def rung_json(rung: Rung) -> dict[str, Any]:
     return _known_numbers(tree)
 
 
-def improvement(before: Rung, after: Rung, by: By = "sections") -> tuple[float, float]:
+def improvement(before: Rung, after: Rung, by: By = "sections", untold: Collection[str] = ()) -> tuple[float, float]:
     """Mean of e_before^2 - e_after^2 over held-out velocities, and its standard error by clusters (experiment and
-    section), both in (m/s)^2.
+    section), both in (m/s)^2; untold: sections or experiments that do not count.
     """
-    gain = _of_velocities(before, by) ** 2 - _of_velocities(after, by) ** 2
-    names = np.array(after.held_out.clusters)[after.held_out.velocity]
+    gain = _of_velocities(before, by, untold) ** 2 - _of_velocities(after, by, untold) ** 2
     known = np.isfinite(gain)
     if not known.any():
         return float("nan"), float("nan")
-    means = np.array([gain[known & (names == name)].mean() for name in dict.fromkeys(names[known])])
+    numbers = {pair: number for number, pair in enumerate(dict.fromkeys(after.held_out.clusters))}
+    cluster = np.array([numbers[pair] for pair in after.held_out.clusters])[after.held_out.velocity]
+    means = np.array([gain[known & (cluster == number)].mean() for number in np.unique(cluster[known])])
     error = means.std(ddof=1) / np.sqrt(means.size) if means.size > 1 else float("nan")
     return float(gain[known].mean()), float(error)
 
@@ -176,10 +177,12 @@ def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _of_velocities(rung: Rung, by: By) -> Array:
+def _of_velocities(rung: Rung, by: By, untold: Collection[str]) -> Array:
+    """Held-out errors of velocities (v,), NaN where they do not count."""
     held_out = rung.held_out
     error = held_out.sections if by == "sections" else held_out.experiments
-    return error[held_out.velocity]
+    group = [section if by == "sections" else experiment for experiment, section in held_out.clusters]
+    return np.where([one in untold for one in group], np.nan, error)[held_out.velocity]
 
 
 def _in_sample(noise: Noise, left: Array, kind: np.ndarray) -> InSample:

@@ -6,6 +6,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.case.schema import Case
 from vegglue.diagnosis.between_sections import acts_elsewhere
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
+from vegglue.diagnosis.comparison import By
 from vegglue.diagnosis.stepwise_choice import Nominee
 from vegglue.results.diagnosis import Diagnosis, Location
 from vegglue.screening.candidates import Candidate
@@ -57,9 +58,15 @@ def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
     """What is tried, as it is chosen from."""
     known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
     return [
-        Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""))
+        Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""), _only_in(one))
         for one, _ in tried_additions(case, found)
     ]
+
+
+def _only_in(one: Candidate) -> dict[By, str]:
+    """The one experiment or section in which an effect acts, if it acts in one only."""
+    groups: dict[By, tuple[str, ...]] = {"experiments": one.experiments, "sections": one.sections}
+    return {by: names[0] for by, names in groups.items() if len(names) == 1}
 
 
 def places_tried(found: Diagnosis) -> list[Location]:

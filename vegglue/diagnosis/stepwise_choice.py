@@ -1,10 +1,11 @@
 """Which of the effects that a diagnosis names a model keeps, by errors at what was held out.
 
-Those are the only judges: measurements for validation are never asked.
+Those are the only judges: measurements for validation are never asked. An effect of one experiment, or of one section,
+is not known where that is left out: errors there do not judge it.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,16 +20,19 @@ WAYS: tuple[By, ...] = ("sections", "experiments")
 @dataclass(frozen=True)
 class Nominee:
     """An effect that was named: its parameter, and the value of it that does nothing; instead_of: what is known, where
-    this is something vaguer that may be it instead.
+    this is something vaguer that may be it instead; only_in: the one experiment or section in which it acts.
     """
 
     name: str
     parameter: str
     off: float
     instead_of: str = ""
+    only_in: Mapping[By, str] = field(default_factory=dict)
 
 
 Names = tuple[str, ...]
+# Sections and experiments that do not judge.
+Untold = Mapping[By, set[str]]
 # The model with some of the nominees, in the order they were named; None where it finds no flow.
 RungWith = Callable[[Names], Rung | None]
 
@@ -52,7 +56,7 @@ def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False)
         both = tuple(name for name in order if name in {*kept, *more})
         before = rung_with(kept)
         assert before is not None
-        return both, why_not_kept(before, rung_with(both), clearly)
+        return both, why_not_kept(before, rung_with(both), clearly, _untold([one for one in named if one.name in more]))
 
     stages: list[Names] = [()]
     kept, refused = _one_by_one(order, better, stages)
@@ -121,9 +125,10 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: dict[str, str], ru
         without, with_known, vaguer = rung_with(fewer), rung_with(both), rung_with(kept)
         assert without is not None
         assert vaguer is not None
-        if with_known is None or why_not_kept(without, with_known):
+        untold = _untold([each for each in named if each.name in (known, one.name)])
+        if with_known is None or why_not_kept(without, with_known, False, untold):
             continue
-        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer).values()):
+        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer, untold).values()):
             del refused[known]
             refused[one.name] = f"with {known}, which is known, held-out errors are not clearly higher"
             kept = both
@@ -134,11 +139,12 @@ def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: 
     """Why a model does not need an effect, '' when it does, or when it would be worse than its parent without."""
     if parent is None or without is None or last is None:
         return ""
-    if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without).values()):
+    untold = _untold([one])
+    if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without, untold).values()):
         return ""
     if is_off(one, last):
         return "its amplitude is compatible with none"
-    gains = _gains(without, last)
+    gains = _gains(without, last, untold)
     return "" if any(gain > 0.0 for gain, _ in gains.values()) else "held-out errors are no higher without it"
 
 
@@ -148,18 +154,19 @@ def is_off(one: Nominee, rung: Rung) -> bool:
     return abs(middle - one.off) <= NEEDED * (high - low) / 3.92
 
 
-def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False) -> str:
+def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold: Untold | None = None) -> str:
     """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
-    and rise by neither, and the misfit with all that was seen falls.
+    and rise by neither, but for those that do not judge, and the misfit with all that was seen falls.
     """
+    untold = untold or {}
     if after is None:
         return "the model finds no steady flow with it"
-    gains = _gains(before, after)
+    gains = _gains(before, after, untold)
     if not gains:
         return "there is nothing to hold out: one section in one experiment"
     for by, (gain, error) in gains.items():
         if gain < 0.0:
-            was, now = held_out_rmse(before, by), held_out_rmse(after, by)
+            was, now = (held_out_rmse(one, by, untold.get(by, ())) for one in (before, after))
             return f"errors of held-out {by} rose from {was:.4f} to {now:.4f} m/s"
         if clearly and not gain > CLEAR * error:
             return (
@@ -171,7 +178,12 @@ def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False) -> str
     return "" if after.in_sample.chi2 < before.in_sample.chi2 else "the misfit with what was seen rose"
 
 
-def _gains(before: Rung, after: Rung) -> dict[By, tuple[float, float]]:
+def _untold(tried: Sequence[Nominee]) -> Untold:
+    """Experiments and sections without which something that is tried is not known."""
+    return {by: {one.only_in[by] for one in tried if by in one.only_in} for by in WAYS}
+
+
+def _gains(before: Rung, after: Rung, untold: Untold) -> dict[By, tuple[float, float]]:
     """Fall of the held-out squares and its standard error, where anything can be held out."""
-    gains = {by: improvement(before, after, by) for by in WAYS}
+    gains = {by: improvement(before, after, by, untold.get(by, ())) for by in WAYS}
     return {by: one for by, one in gains.items() if np.isfinite(one[0])}
