@@ -133,7 +133,7 @@ def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, 
 @pytest.mark.parametrize(("by", "group"), [("experiments", "high"), ("sections", "D0")])
 def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
     """There it is not known, and errors rise; where it is, they fall."""
-    parent, child = (a_rung((3.0, 3.0), {}, 6.0), a_rung((2.9, 2.9), {"a": 9.0}, 1.0))
+    parent, child = (a_rung((3.0, 3.0), {}, 6.0), a_rung((3.0, 3.0), {"a": 9.0}, 1.0))
     there = np.array([group in pair for pair in child.held_out.clusters])
     errors = {name: np.where(there, 9.0, 2.0) if name == by else getattr(child.held_out, name) for name in WAYS}
     child = replace(child, held_out=replace(child.held_out, **errors))
@@ -147,3 +147,21 @@ def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
     assert kept(Nominee("a", "a", 0.0, only_in={by: "another"})) == (PARENT,)
     rose = chosen([Nominee("a", "a", 0.0)], lambda names: models[names]).refused["a"]
     assert rose.startswith(f"errors of held-out {by} rose from 3.0000 to ")
+
+
+@pytest.mark.parametrize(
+    ("sections", "uneven", "kept"),
+    [
+        (1.0, 1.5, (PARENT, A)),  # clearly less by sections, more by experiments, but not clearly
+        (1.0, 0.05, (PARENT,)),  # clearly less and clearly more
+        (2.95, 1.5, (PARENT,)),  # less, but not clearly
+    ],
+)
+def test_a_clear_fall_one_way_outweighs_a_rise_that_is_not(
+    sections: float, uneven: float, kept: tuple[Names, ...]
+) -> None:
+    spread = np.resize([1.0, -1.0], STATIONS)
+    child = a_rung((sections, 3.0), {"a": 9.0}, 1.0)
+    errors = {"sections": sections + 0.1 * spread, "experiments": np.hypot(3.1 + uneven * spread, 0.0)}
+    models = {PARENT: a_rung((3.0, 3.0), {}, 6.0), A: replace(child, held_out=replace(child.held_out, **errors))}
+    assert chosen([Nominee("a", "a", 0.0)], lambda names: models[names]).stages == kept
