@@ -290,6 +290,21 @@ def test_a_law_is_none_of_the_known_effects() -> None:
     assert said(grounds(laws=LIKELY, undecided=UNSURE))[0] == "none-of-these"
 
 
+def test_an_instrument_that_is_clearly_off_goes_before_a_law_that_may_be() -> None:
+    """Not before one that is likelier than all else, and not where the instrument is off by little."""
+    clear, faint = (
+        an_instrument(offset=0.1, interval95=(0.08, 0.12)),
+        an_instrument(offset=0.1, interval95=(0.04, 0.16)),
+    )
+    unlikely = laws_suspected_of("a", chance=0.2)
+    kind, sentence, _ = said(grounds(laws=unlikely, instruments=(clear,)))
+    assert kind == "instrument"
+    assert sentence.startswith("One reading at x = 36, y = 1 m is off by 0.1 m/s")
+    assert "cannot tell whether anything else is missing: a law of" in sentence
+    assert said(grounds(laws=unlikely, instruments=(clear, faint)))[0] == "cannot-tell"
+    assert said(grounds(laws=LIKELY, instruments=(clear,)))[0] == "none-of-these"
+
+
 def test_where_laws_stand_out_nothing_missing_is_never_said() -> None:
     """Not where they are less likely than all else together either, nor where a parameter lies far off its prior."""
     for told in (grounds(laws=laws_suspected_of("a", chance=0.2)), grounds(laws=LIKELY, strained=("k_s", 4.5))):

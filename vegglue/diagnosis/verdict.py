@@ -106,7 +106,7 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
     named = causes_in_words(found, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)
     if grounds.laws is not None and (nothing or (not doubt and law_goes_first(grounds.laws, found))):
-        return _with_a_law(grounds.laws, misfit, doubt)
+        return _with_a_law(grounds.laws, grounds, doubt)
     if grounds.field is not None:
         words = field_sentence(grounds.field) + (f", rather than {named}" if named else "")
         return "none-of-these", f"None of the known effects: {words} ({_told(misfit)} without it)."
@@ -129,13 +129,19 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
     return _without_findings(grounds, suspects)
 
 
-def _with_a_law(laws: LawsSuspected, misfit: Misfit, doubt: str) -> tuple[VerdictKind, str]:
-    """A law where no known effect explains the misfit."""
-    law = f"{law_in_words(laws)} ({_told(misfit)} without it)"
+def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[VerdictKind, str]:
+    """A law where no known effect explains the misfit; an instrument that is clearly off goes before one that is not
+    likelier than all else.
+    """
+    law = f"{law_in_words(laws)} ({_told(grounds.misfit)} without it)"
     if doubt:
         return "cannot-tell", f"These data cannot tell: {doubt}. To first order {law}. {TO_DISCOVER}"
     if is_likelier(laws):
         return "none-of-these", f"None of the known effects: {law}. {TO_DISCOVER}"
+    instruments = grounds.findings.instruments
+    if instruments and all(_is_clear(one) for one in instruments):
+        off = instruments_in_words(instruments)
+        return "instrument", f"{off} These data cannot tell whether anything else is missing: {law}. {TO_DISCOVER}"
     return "cannot-tell", f"These data cannot tell whether anything is missing: {law}. {TO_DISCOVER}"
 
 
