@@ -152,12 +152,12 @@ def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
 @pytest.mark.parametrize(
     ("sections", "uneven", "kept"),
     [
-        (1.0, 1.5, (PARENT, A)),  # clearly less by sections, more by experiments, but not clearly
-        (1.0, 0.05, (PARENT,)),  # clearly less and clearly more
-        (2.95, 1.5, (PARENT,)),  # less, but not clearly
+        (1.0, 1.5, (PARENT, A)),  # much less by sections, more by experiments, but not clearly
+        (1.0, 0.05, (PARENT,)),  # much less and clearly more
+        (2.95, 1.5, (PARENT,)),  # less, but by less than it is more
     ],
 )
-def test_a_clear_fall_one_way_outweighs_a_rise_that_is_not(
+def test_a_larger_fall_one_way_outweighs_a_rise_that_is_not_clear(
     sections: float, uneven: float, kept: tuple[Names, ...]
 ) -> None:
     spread = np.resize([1.0, -1.0], STATIONS)

@@ -156,8 +156,8 @@ def is_off(one: Nominee, rung: Rung) -> bool:
 
 def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold: Untold | None = None) -> str:
     """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
-    and rise by neither, but for those that do not judge, and the misfit with all that was seen falls. Where they fall
-    clearly one way, they may rise the other, but not clearly.
+    and rise by neither, but for those that do not judge, and the misfit with all that was seen falls. They may rise one
+    way where that is not clear, and less than they fall the other.
     """
     untold = untold or {}
     if after is None:
@@ -165,9 +165,9 @@ def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold
     gains = _gains(before, after, untold)
     if not gains:
         return "there is nothing to hold out: one section in one experiment"
-    falls_clearly = any(gain > CLEAR * error for gain, error in gains.values())
+    together = sum(gain for gain, _ in gains.values())
     for by, (gain, error) in gains.items():
-        if gain < 0.0 and not (falls_clearly and gain >= -CLEAR * error):
+        if gain < 0.0 and not (together > 0.0 and gain >= -CLEAR * error):
             was, now = (held_out_rmse(one, by, untold.get(by, ())) for one in (before, after))
             return f"errors of held-out {by} rose from {was:.4f} to {now:.4f} m/s"
         if clearly and not gain > CLEAR * error:
