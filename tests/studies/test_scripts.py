@@ -12,7 +12,20 @@ STUDIES = Path(__file__).parent
 
 
 @pytest.mark.parametrize(
-    "name", ["bench", "blind", "confluence", "drawn_sites", "fuzz", "laws", "law_alarms", "scale", "loop", "startup"]
+    "name",
+    [
+        "bench",
+        "blind",
+        "blind_lengths",
+        "confluence",
+        "drawn_sites",
+        "fuzz",
+        "laws",
+        "law_alarms",
+        "scale",
+        "loop",
+        "startup",
+    ],
 )
 def test_a_script_is_read_by_itself(name: str) -> None:
     whole = f"import runpy, sys; sys.path[0] = {str(STUDIES)!r}; runpy.run_path({str(STUDIES / name)!r} + '.py')"

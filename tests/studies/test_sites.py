@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import sites
+from drawn_sites import KINDS, make_site
 from second_solver import Flow
 from site_reach import FINE, SETTINGS, Truth, centres, reach_of
 from sites import make_set, truth_of
@@ -100,3 +101,22 @@ def test_a_setting_nobody_knows_is_refused(tmp_path):
     with pytest.raises(ValueError, match="expected some of"):
         make_set(tmp_path, 1, "none", {"wind": 1.0})
     assert "chi" in SETTINGS
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_seed_draws_can_be_hidden(kind):
+    for seed in range(20):
+        drawn = KINDS[kind](np.random.default_rng([seed, 3]))
+        assert drawn.keys() <= SETTINGS.keys()
+        assert drawn == KINDS[kind](np.random.default_rng([seed, 3]))
+        json.dumps(drawn)
+
+
+def test_kinds_follow_each_other_and_every_other_site_has_imperfections(tmp_path):
+    for seed in (26, 27):
+        make_site(tmp_path, seed)
+    plain, real = (
+        json.loads((tmp_path / f"site-{seed}" / "answer.json").read_text(encoding="utf-8")) for seed in (26, 27)
+    )
+    assert [plain["hidden"], real["hidden"]] == list(KINDS)[:2]
+    assert ["small imperfections" in answer for answer in (plain, real)] == [False, True]
