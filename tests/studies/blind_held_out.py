@@ -15,20 +15,16 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
-from vegglue.diagnosis.comparison import Rung, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.nominations import (
     Addition,
-    acting_elsewhere,
+    choice_among,
     found_additions,
-    in_doubt,
-    names_of_places,
-    nominees,
     tried_additions,
     values_found,
     values_tried,
 )
-from vegglue.diagnosis.stepwise_choice import Names, chosen
+from vegglue.diagnosis.stepwise_choice import Names
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
@@ -72,17 +68,12 @@ def _as_kept(data: DataSet, found: Diagnosis, aside: pd.DataFrame) -> Errors:
     last = values_tried(case, found)
     tried: dict[Names, Baseline | None] = {(): parent}
 
-    def rung_with(names: Names) -> Rung | None:
+    def base_with(names: Names) -> Baseline | None:
         if names not in tried:
             tried[names] = _calibrated(data, [named[name] for name in names], last, aside)
-        base = tried[names]
-        return None if base is None else rungs.setdefault(names, rung(base))
+        return tried[names]
 
-    rungs: dict[Names, Rung] = {}
-    alone = {name: tried[name,] for name in names_of_places(case, found) if rung_with((name,)) is not None}
-    elsewhere = acting_elsewhere(parent, alone)
-    possible = [one for one in nominees(case, found) if one.name not in elsewhere]
-    names = chosen(possible, rung_with, in_doubt(found)).stages[-1]
+    names = choice_among(case, found, base_with).stages[-1]
     base = tried[names]
     errors: Errors = {"parent": _error_of(data, parent), "kept_names": list(names)}
     return errors | ({"kept": _error_of(data, base)} if names and base is not None else {})

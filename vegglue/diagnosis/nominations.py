@@ -1,13 +1,14 @@
 """What `extend --auto` tries of a diagnosis: effects and places that were found, and places that are likelier."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.case.schema import Case
 from vegglue.diagnosis.between_sections import acts_elsewhere
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
-from vegglue.diagnosis.comparison import By
-from vegglue.diagnosis.stepwise_choice import Nominee
+from vegglue.diagnosis.comparison import By, Rung, rung
+from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.results.diagnosis import Diagnosis, Location
 from vegglue.screening.candidates import Candidate
 
@@ -42,15 +43,34 @@ def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
     return tried
 
 
-def names_of_places(case: Case, found: Diagnosis) -> list[str]:
-    """Of the places among what is tried."""
-    places = {candidate_at(case, place).name for place in places_tried(found)}
-    return [one.name for one, _ in tried_additions(case, found) if one.name in places]
+def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Baseline | None]) -> Choice:
+    """Which of what is tried a model keeps, see `stepwise_choice`; no place that acts mostly where nobody measured.
+
+    base_with: the calibrated model with some of what is tried, by name; None where it finds no flow.
+    """
+    rungs: dict[Names, Rung | None] = {}
+
+    def rung_with(names: Names) -> Rung | None:
+        if names not in rungs:
+            base = base_with(names)
+            rungs[names] = None if base is None else rung(base)
+        return rungs[names]
+
+    tried = nominees(case, found)
+    elsewhere = _acting_elsewhere(case, found, [one.name for one in tried], base_with)
+    choice = chosen([one for one in tried if one.name not in elsewhere], rung_with, in_doubt(found))
+    return replace(choice, refused=elsewhere | choice.refused)
 
 
-def acting_elsewhere(parent: Baseline, alone: Mapping[str, Baseline | None]) -> dict[str, str]:
-    """Why a place is not added, by its name, for it acts mostly where nobody measured; alone: models with one each."""
-    told = {name: acts_elsewhere(parent, base) for name, base in alone.items() if base is not None}
+def _acting_elsewhere(
+    case: Case, found: Diagnosis, tried: Sequence[str], base_with: Callable[[Names], Baseline | None]
+) -> dict[str, str]:
+    """Why a place is not added, by its name, for it acts mostly where nobody measured."""
+    parent, places = base_with(()), {candidate_at(case, place).name for place in places_tried(found)}
+    alone = {name: base_with((name,)) for name in tried if name in places}
+    told = {
+        name: acts_elsewhere(parent, base) for name, base in alone.items() if parent is not None and base is not None
+    }
     return {name: why for name, why in told.items() if why}
 
 
@@ -70,6 +90,7 @@ def _only_in(one: Candidate) -> dict[By, str]:
 
 
 def places_tried(found: Diagnosis) -> list[Location]:
+    """Places that were found and those that are likelier than an effect, spread over where they may lie."""
     return [*(spread_over_its_error(place) for place in found.places), *_likelier_places(found).values()]
 
 

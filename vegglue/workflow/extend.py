@@ -14,19 +14,10 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
-from vegglue.diagnosis.comparison import Rung, rung
+from vegglue.diagnosis.comparison import rung
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.nominations import (
-    Addition,
-    acting_elsewhere,
-    in_doubt,
-    names_of_places,
-    nominees,
-    places_tried,
-    tried_additions,
-    values_tried,
-)
-from vegglue.diagnosis.stepwise_choice import Choice, Names, chosen
+from vegglue.diagnosis.nominations import Addition, choice_among, places_tried, tried_additions, values_tried
+from vegglue.diagnosis.stepwise_choice import Choice, Names
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
@@ -120,20 +111,14 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     parent = calibrated(case, folder_of(runs, case), aside, watch)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in tried_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
-    rungs: dict[Names, Rung] = {(): rung(parent)}
 
-    def rung_with(names: Names) -> Rung | None:
+    def base_with(names: Names) -> Baseline | None:
         if names not in tried:
             watch(Progress(f"trying {' and '.join(names)}"))
-            base = tried[names] = _calibrated_with(parent.model, [named[name] for name in names], found, aside)
-            if base is not None:
-                rungs[names] = rung(base)
-        return rungs.get(names)
+            tried[names] = _calibrated_with(parent.model, [named[name] for name in names], found, aside)
+        return tried[names]
 
-    alone = {name: tried[name,] for name in names_of_places(case, found) if rung_with((name,)) is not None}
-    elsewhere = acting_elsewhere(parent, alone)
-    choice = chosen([one for one in nominees(case, found) if one.name not in elsewhere], rung_with, in_doubt(found))
-    choice = replace(choice, refused=elsewhere | choice.refused)
+    choice = choice_among(case, found, base_with)
     cases, bases = [case], [parent]
     for names in choice.stages[1:]:
         base = tried[names]
