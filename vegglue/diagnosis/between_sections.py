@@ -27,7 +27,7 @@ from vegglue.measurements.sections import section_places
 # is known to half a per cent of the share.
 SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
 # Largest change halfway between the sections over that at the stations, from which something at a place is no longer
-# added. Chosen after one of 37 objects of the blind study, where it was 6.0 and errors there grew 2.7 times; of others
+# added. Chosen after one of 68 objects of the blind study, where it was 6.0 and errors there grew 2.7 times; of others
 # it was 0.1 to 2.2.
 MOSTLY_ELSEWHERE = 3.0
 
