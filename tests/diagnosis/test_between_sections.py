@@ -107,10 +107,10 @@ def test_what_acts_mostly_where_nobody_measured_is_told(
     behind[5] = there
     answers = iter([np.zeros(count), behind])
 
-    def linearised(model: Model, z: Array) -> Point:
-        return Point(z, next(answers), np.zeros((count, PARAMETERS)), {})
+    def predicted(model: Model, points: list[Point], z: Array) -> Array:
+        return next(answers)[None]
 
-    monkeypatch.setattr("vegglue.diagnosis.between_sections.linearise", linearised)
+    monkeypatch.setattr("vegglue.diagnosis.between_sections.predict", predicted)
     why = acts_elsewhere(before, after)
     assert bool(why) == told
     if told:

@@ -19,7 +19,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.diagnosis.field_scan import free_of_prior
-from vegglue.engine.interface import linearise
+from vegglue.engine.interface import linearise, predict
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.sections import section_places
 
@@ -55,10 +55,10 @@ def acts_elsewhere(before: Baseline, after: Baseline) -> str:
     station = before.model.station
     velocity = station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()
     there = halfway(station, before.model.case.grid.x[1])
-    points = [linearise(replace(one.model, station=there), one.fitted.point.z) for one in (before, after)]
-    if not velocity.any() or points[0] is None or points[1] is None:
+    was, now = (_read_at(there, one) for one in (before, after))
+    changed = np.abs(now - was)
+    if not velocity.any() or not np.isfinite(changed).all():
         return ""
-    changed = np.abs(points[1].prediction - points[0].prediction)
     most = int(np.argmax(changed))
     at_stations = float(np.abs(after.fitted.point.prediction - before.fitted.point.prediction)[velocity].max())
     if changed[most] < MOSTLY_ELSEWHERE * at_stations:
@@ -68,6 +68,12 @@ def acts_elsewhere(before: Baseline, after: Baseline) -> str:
         f"{changed[most]:.2g} m/s around x = {there['x'].iloc[most]:.1f} m, by {at_stations:.2g} m/s at most where it "
         "was measured"
     )
+
+
+def _read_at(station: pd.DataFrame, base: Baseline) -> Array:
+    """What the flow of a calibrated model shows at other stations (n,), NaN where it is not found again."""
+    point = base.fitted.point
+    return np.asarray(predict(replace(base.model, station=station), [point], point.z[None])[0])
 
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:

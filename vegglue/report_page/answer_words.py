@@ -2,7 +2,6 @@
 
 import html
 import math
-import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -29,6 +28,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import OpenQuestion
 from vegglue.results.posterior import Posterior
+from vegglue.screening.candidates import key_of
 from vegglue.solver.status import FAILED, members_with
 
 # Ways of judging a model, the most telling first: field of a step, and the measurements it is about.
@@ -221,7 +221,7 @@ def causes_of(run: Run) -> str:
     found = next((one for one in known if ladder and one.name == ladder.steps[0].name), None)
     if ladder is None or found is None:
         return ""
-    effects = [re.sub(r"\W+", "_", step.accepted).strip("_") for step in found.steps]
+    effects = [key_of(step.accepted) for step in found.steps]
     places, added = sorted(one.effect for one in found.places), _all_added(ladder)
     others = sorted(name.partition("_x")[0] for name in added if name not in effects)
     return accepted_causes(found) if set(effects) <= set(added) and others == places else ""

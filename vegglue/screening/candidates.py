@@ -22,6 +22,11 @@ MOST_SETTINGS = 12
 NOT_SEARCHED = {"search", "law"}
 
 
+def key_of(name: str) -> str:
+    """discharge_error_high: the name of a candidate as a word, for a config."""
+    return re.sub(r"\W", "_", name.removesuffix("]"))
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect and where it would act; empty tuples mean everywhere.
@@ -47,11 +52,7 @@ class Candidate:
     @property
     def key(self) -> str:
         """The same as a word, for a config, where a parameter is named after it."""
-        return re.sub(
-            r"\W",
-            "_",
-            "_".join([self.effect.name, *self.experiments, *self.sections, *self.devices, *filter(None, [self.at])]),
-        )
+        return key_of(self.name)
 
     @property
     def amplitude(self) -> Amplitude:
