@@ -1,48 +1,17 @@
 """From what was found to a verdict in words: when it names, when it only remarks, and when it cannot tell."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
-from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspected_of
+from diagnoses import a_field, a_location, a_suspect, an_instrument
+from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.conclusion import chance_of_misfit
-from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.refits import Refit
-from vegglue.diagnosis.verdict import Grounds, judged
-from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step, Suspect
+from vegglue.results.diagnosis import EstimatedErrors, ModelErrorUsed, Step
 from vegglue.screening.instruments import Instrument
-
-AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
-# A misfit as it should be, one that errors do not make, and one that is absurd: 3.8 and 6 times the degrees of freedom.
-FITS, MISSES, ABSURD = (
-    Misfit(chi2, chi2, freedom, chance_of_misfit(chi2, freedom), pd.DataFrame())
-    for chi2, freedom in ((5.0, 5), (76.0, 20), (120.0, 20))
-)
-NONE = a_suspect("wind", test={"score": 0.4})
-
-
-def step(*rivals: str, **fields: Any) -> Step:
-    chances = tuple(0.96 / len(rivals) for _ in rivals)
-    return replace(Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4), **fields)
-
-
-def grounds(*steps: Step, **parts: Any) -> Grounds:
-    """Of a diagnosis that found these steps; parts: fields of the grounds, or of what was found, to be changed."""
-    of_findings = {name: parts.pop(name) for name in ("places", "instruments", "undecided", "absurd") if name in parts}
-    usual = Grounds(AS_STATED, FITS, Findings(steps, **of_findings), None, None, (), float("nan"), False, ("n_b", 1.0))
-    return replace(usual, **parts)
-
-
-def said(found: Grounds, suspects: Sequence[Suspect] = (NONE,)) -> tuple[str, str, str]:
-    verdict = judged(found, suspects)
-    places = found.findings.places
-    assert (verdict.location, verdict.not_excluded) == (places[0] if places else None, found.not_excluded)
-    return verdict.kind, verdict.sentence, " ".join(verdict.remarks)
 
 
 def test_nothing_is_missing_only_where_it_would_be_seen() -> None:
@@ -234,94 +203,6 @@ def test_an_implausible_size_is_remarked() -> None:
     huge = a_suspect("a", amplitude={"value": -0.34, "scale": 0.1})
     assert "plausible" not in said(grounds(step("a")), [usual])[2]
     assert "3.4 times what is plausible" in said(grounds(step("a")), [huge])[2]
-
-
-def test_a_place_wins_over_steps_and_all_are_told() -> None:
-    found = grounds(step("a"), places=(a_location(), a_location(term="bed", unit="m", x=12.0)), misfit=MISSES)
-    verdict, sentence, _ = said(found, [a_suspect("a")])
-    assert verdict == "none-of-these"
-    first, second, third = sentence.split("; and ")
-    assert "at x = 33.0, y = -0.6 m it acts as if something holds the flow back (0.4 1/m, 0.3 to 0.5; 4 to 1" in first
-    assert "at x = 12.0, y = -0.6 m it acts as if the bed lies 0.40 m higher" in second
-    assert third.startswith("a of 0.3")
-
-
-@pytest.mark.parametrize(
-    ("term", "more", "less"),
-    [
-        ("drag", "holds the flow back", "lets the flow pass or pushes it on"),
-        ("bed", "0.40 m higher", "0.40 m lower"),
-        ("inflow", "water enters, 0.4 m3/s", "water leaves, 0.4 m3/s"),
-        ("viscosity", "mixes more", "mixes less"),
-    ],
-)
-def test_a_place_is_told_by_its_term_and_its_sign(term: str, more: str, less: str) -> None:
-    assert more in said(grounds(places=(a_location(term=term),)))[1]
-    assert less in said(grounds(places=(a_location(term=term, amplitude=-0.4),)))[1]
-
-
-def test_odds_are_told_against_the_closest_other_term() -> None:
-    odds = {"wind": 2.0, "bed": 400.0, "viscosity": 7000.0}
-    assert "400 to 1 against bed" in said(grounds(places=(a_location(odds=odds),)))[1]
-    assert "over 1,000 to 1 against bed" in said(grounds(places=(a_location(odds={"bed": 7000.0}),)))[1]
-    assert "against" not in said(grounds(places=(a_location(odds={"wind": 2.0}),)))[1]
-
-
-def test_a_field_is_none_of_the_known_effects() -> None:
-    verdict, sentence, _ = said(grounds(step("a"), field=a_field()), [a_suspect("a")])
-    assert verdict == "none-of-these"
-    assert "some 15 m along and 3 m across, most surely around x = 31.0, y = 0.5 m (+60%), rather than a of" in sentence
-    bed = a_field(term="bed", value=-0.12)
-    assert "the bed level that differs" in said(grounds(misfit=MISSES, field=bed))[1]
-    assert "(-0.12 m)" in said(grounds(misfit=MISSES, field=bed))[1]
-
-
-# What competed last and led to nothing.
-UNSURE = (Contender("effect", "wind", 3.0, 0, None),)  # type: ignore[arg-type]
-LIKELY = laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp")
-
-
-def test_a_law_is_none_of_the_known_effects() -> None:
-    kind, sentence, remarks = said(grounds(laws=LIKELY, misfit=MISSES))
-    assert kind == "none-of-these"
-    assert "a law of the speed in friction of the banks would explain it, with a chance of 75% among all" in sentence
-    assert "`vegglue discover`" in sentence
-    assert "still larger than the errors allow" not in remarks, "it is that without the law"
-    assert said(grounds(laws=LIKELY, undecided=UNSURE))[0] == "none-of-these"
-
-
-def test_an_instrument_that_is_clearly_off_goes_before_a_law_that_may_be() -> None:
-    """Not before one that is likelier than all else, and not where the instrument is off by little."""
-    clear, faint = (
-        an_instrument(offset=0.1, interval95=(0.08, 0.12)),
-        an_instrument(offset=0.1, interval95=(0.04, 0.16)),
-    )
-    unlikely = laws_suspected_of("a", chance=0.2)
-    kind, sentence, _ = said(grounds(laws=unlikely, instruments=(clear,)))
-    assert kind == "instrument"
-    assert sentence.startswith("One reading at x = 36, y = 1 m is off by 0.1 m/s")
-    assert "cannot tell whether anything else is missing: a law of" in sentence
-    assert said(grounds(laws=unlikely, instruments=(clear, faint)))[0] == "cannot-tell"
-    assert said(grounds(laws=LIKELY, instruments=(clear,)))[0] == "none-of-these"
-
-
-def test_where_laws_stand_out_nothing_missing_is_never_said() -> None:
-    """Not where they are less likely than all else together either, nor where a parameter lies far off its prior."""
-    for told in (grounds(laws=laws_suspected_of("a", chance=0.2)), grounds(laws=LIKELY, strained=("k_s", 4.5))):
-        kind, sentence, _ = said(told)
-        assert kind == "cannot-tell"
-        assert "a law of the speed" in sentence
-        assert "`vegglue discover`" in sentence
-
-
-def test_a_law_beside_what_was_found_is_a_remark() -> None:
-    for beside in ({"places": (a_location(),)}, {"undecided": UNSURE, "strained": ("k_s", 4.5)}):
-        _, sentence, remarks = said(grounds(laws=LIKELY, **beside))
-        assert "a law of" not in sentence
-        assert "To first order a law of the speed in friction of the banks" in remarks
-    kind, _, remarks = said(grounds(step("a"), laws=LIKELY), [a_suspect("a")])
-    assert kind == "identified"
-    assert "rather than a. `vegglue discover`" in remarks
 
 
 AT_ITS_END = {"value": 1.0, "support": (-1.0, 1.0), "scale": 0.5}
