@@ -1,15 +1,16 @@
 """A field is so free that it has to beat all else clearly, and a place is measured by what it competed with."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from vegglue.diagnosis import diagnose
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.conclusion import field_goes_first
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.findings import Charge, Findings
 from vegglue.progress import silent
+from vegglue.results.diagnosis import Step
 
 
 @pytest.mark.parametrize(("log_factor", "gained", "first"), [
@@ -40,3 +41,29 @@ def test_the_error_of_its_shape_takes_nothing_from_what_a_place_explained(
     following = diagnose._branch(screening, [Contender(kind, "a", 10.0, 0, what)], 0, Findings(), silent)
     assert following is not None
     assert following.found.gained(0.0, 5.0) == pytest.approx(gained)
+
+
+def test_an_instrument_that_explains_less_than_nothing_is_not_set_aside() -> None:
+    one = Contender("reading", "reading", -0.1, 0, SimpleNamespace())
+    screening: Any = SimpleNamespace(base=None)
+    assert diagnose._without_instrument(screening, one, cast("Any", one.what), Findings(), silent) is None
+
+
+def step_of(name: str) -> Step:
+    return Step(name, (name,), (1.0,), ((name,),), 200.0, 5.0, 1e-4)
+
+
+def test_an_effect_explains_what_those_did_that_it_makes_unneeded() -> None:
+    charges = (Charge("wind", 40.0, -6.0), Charge("reading", 0.0, -3.0), Charge("elder", 9.0, -5.0))
+    found = Findings(steps=(step_of("wind"), step_of("elder")), charges=charges)
+    assert (found.explained, found.log_prior) == (49.0, -14.0)
+    more = diagnose._with_step(found, step_of("undergrowth"), ["wind"], 11.0, -7.0)
+    assert [one.accepted for one in more.steps] == ["elder", "undergrowth"]
+    assert (more.explained, more.log_prior) == (60.0, -15.0)
+
+
+def test_a_rival_keeps_the_charge_of_the_effect_that_it_replaces() -> None:
+    found = Findings(steps=(step_of("wind"),), charges=(Charge("wind", 40.0, -6.0), Charge("gauge", 0.0, -1.0)))
+    again = diagnose._with_steps(found, (step_of("elder"),))
+    assert [one.name for one in again.charges] == ["elder", "gauge"]
+    assert diagnose._with_step(again, step_of("undergrowth"), ["elder"], 1.0, -7.0).log_prior == -8.0

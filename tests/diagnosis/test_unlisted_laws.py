@@ -12,7 +12,7 @@ from diagnoses import a_location, laws_suspected_of
 from vegglue.case.config import load_case
 from vegglue.diagnosis import unlisted_laws
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.findings import Charge, Findings
 from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_suspected
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import LawsSuspected
@@ -74,8 +74,8 @@ def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
     step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
-    assert suspected(monkeypatch, Findings(steps=(step,), log_prior=8.0)) is None
-    assert suspected(monkeypatch, Findings(steps=(step,), log_prior=1.0)) is not None
+    assert suspected(monkeypatch, Findings(steps=(step,), charges=(Charge("any", 0.0, 8.0),))) is None
+    assert suspected(monkeypatch, Findings(steps=(step,), charges=(Charge("any", 0.0, 1.0),))) is not None
 
 
 def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +83,7 @@ def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.
     monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
     chances = []
     for gained in (1.0, 30.0):
-        laws = suspected(monkeypatch, Findings(places=(a_location(),), log_prior=gained))
+        laws = suspected(monkeypatch, Findings(places=(a_location(),), charges=(Charge("any", 0.0, gained),)))
         assert laws is not None
         chances.append(laws.chance)
     assert chances[0] > 0.9 > 0.1 > chances[1]

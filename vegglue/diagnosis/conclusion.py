@@ -53,7 +53,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     laws = laws_suspected(first, last, found)
     if found.places and not found.instruments and clearly_a_law(laws):
-        last, found = first, replace(found, steps=(), places=(), explained=0.0, log_prior=0.0, of_shape=0.0)
+        last, found = first, replace(found, steps=(), places=(), charges=(), of_shape=0.0)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit = _misfit(first, last, found)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)

@@ -24,7 +24,7 @@ from vegglue.diagnosis.competition import (
 )
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as_likely
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.findings import Charge, Findings
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
 from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found
 from vegglue.diagnosis.rivals_again import with_rivals_again
@@ -35,7 +35,7 @@ from vegglue.engine.interface import Model
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import in_threads
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.diagnosis import Diagnosis, Step, Suspect
 from vegglue.screening.candidates import candidate_in_case
 from vegglue.screening.evidence import alarm_p
 from vegglue.screening.instruments import Instrument
@@ -52,8 +52,11 @@ MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 
 @dataclass(frozen=True)
 class Following:
-    """What is found with one contender more, the model that follows, and its screening where it is at hand."""
+    """What is found with one contender more, what that is, the model that follows, and its screening where it is at
+    hand.
+    """
 
+    what: What
     found: Findings
     base: Baseline
     screening: Screening | None = None
@@ -82,11 +85,10 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         if following is None:
             found = replace(found, undecided=tuple(contenders))
             break
-        more, base = following.found.accepted > found.accepted, following.base
-        found = following.found
-        if more:
+        found, base = following.found, following.base
+        if following.what != "instrument":
             base, steps = with_rivals_again(base, found.steps, suspects, watch)
-            found = replace(found, steps=steps)
+            found = _with_steps(found, steps)
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
         watch(Progress("looking for what is missing with it"))
@@ -116,20 +118,13 @@ def _following(
         return possible[0][1] if possible else None
     ends = in_threads(_screened, [(one,) for _, one in possible])
     score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
-    best = chosen_contender([_what(one, found) for one in ends], score)
-    return None if best is None else _told_beside(ends[best], [contenders[j] for j, _ in possible], score, found)
+    best = chosen_contender([one.what for one in ends], score)
+    return None if best is None else _told_beside(ends[best], [contenders[j] for j, _ in possible], score)
 
 
-def _what(one: Following, found: Findings) -> What:
-    """What was found last."""
-    if len(one.found.places) > len(found.places):
-        return "place"
-    return "effect" if len(one.found.steps) > len(found.steps) else "instrument"
-
-
-def _told_beside(following: Following, followed: Sequence[Contender], score: Array, found: Findings) -> Following:
+def _told_beside(following: Following, followed: Sequence[Contender], score: Array) -> Following:
     """What was taken, a listed effect with the chances of all that was followed; score (k,): ln evidence of each."""
-    if len(following.found.steps) <= len(found.steps):
+    if following.what != "effect":
         return following
     *earlier, last = following.found.steps
     last = followed_further(last, [one.name for one in followed], tempered_chances(score))
@@ -165,8 +160,12 @@ def _branch(
 
 def _without_instrument(
     screening: Screening, best: Contender, instrument: Instrument, found: Findings, watch: Watch
-) -> Following:
-    """One instrument set aside, and the model calibrated without what its readings share."""
+) -> Following | None:
+    """One instrument set aside, and the model calibrated without what its readings share; None when it explains less
+    than nothing does.
+    """
+    if best.log_evidence < 0.0:
+        return None
     watch(Progress(f"setting aside a {best.kind} that is off"))
     base, readings = screening.base, instrument.readings
     noise = with_offset(base.noise, np.array(readings))
@@ -174,8 +173,9 @@ def _without_instrument(
     faulty = (*found.instruments, instrument_found(screening, best, instrument))
     following = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
     # An offset is all but free in the covariance: its prior is charged here, as it was in the competition.
-    charge = best.log_evidence - (log_evidence(following) - log_evidence(base))
-    return Following(replace(found, instruments=faulty, flagged=flagged, log_prior=found.log_prior + charge), following)
+    charge = Charge(best.name, 0.0, best.log_evidence - (log_evidence(following) - log_evidence(base)))
+    found = replace(found, instruments=faulty, flagged=flagged, charges=(*found.charges, charge))
+    return Following("instrument", found, following)
 
 
 def _with_accepted(
@@ -192,21 +192,34 @@ def _with_accepted(
     if further is None:
         return None
     before = chi2(screening.base.noise, screening.base.fitted.point)
-    found = replace(
-        found,
-        explained=found.explained + before - further.fitted.chi2,
-        log_prior=found.log_prior + one.log_evidence - refit.log_factor,
-    )
+    log_prior = one.log_evidence - refit.log_factor
     if one.kind != "effect":
+        charge = Charge(one.name, before - further.fitted.chi2, log_prior)
         lost = _without_error_of_shape(screening.base, further) - log_evidence(further)
         places = (*found.places, location_found(screening, contenders, j, refit))
-        return Following(replace(found, places=places, of_shape=found.of_shape + lost), further)
+        found = replace(found, places=places, charges=(*found.charges, charge), of_shape=found.of_shape + lost)
+        return Following("place", found, further)
     step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None
     further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
+    return Following("effect", _with_step(found, step, unneeded, before - further.fitted.chi2, log_prior), further)
+
+
+def _with_steps(found: Findings, steps: tuple[Step, ...]) -> Findings:
+    """The same steps with other rivals in the model, which keep the charges of those that they replace."""
+    now = {before.accepted: after.accepted for before, after in zip(found.steps, steps, strict=True)}
+    charges = tuple(replace(one, name=now.get(one.name, one.name)) for one in found.charges)
+    return replace(found, steps=steps, charges=charges)
+
+
+def _with_step(found: Findings, step: Step, unneeded: Sequence[str], explained: float, log_prior: float) -> Findings:
+    """A listed effect more, which explains besides what those explained that it makes unneeded."""
     kept = tuple(one for one in found.steps if one.accepted not in unneeded)
-    return Following(replace(found, steps=(*kept, step)), further)
+    charges = [one for one in found.charges if one.name not in unneeded]
+    earlier = sum(one.explained for one in found.charges if one.name in unneeded)
+    charge = Charge(step.accepted, explained + earlier, log_prior)
+    return replace(found, steps=(*kept, step), charges=(*charges, charge))
 
 
 def _without_error_of_shape(before: Baseline, further: Baseline) -> float:

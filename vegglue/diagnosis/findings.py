@@ -7,20 +7,27 @@ from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 
 
 @dataclass(frozen=True)
+class Charge:
+    """What one finding brought and cost: the fall of chi2 with it, and the ln of its chance before the data."""
+
+    name: str
+    explained: float
+    log_prior: float
+
+
+@dataclass(frozen=True)
 class Findings:
-    """flagged: readings set aside, indices among the used stations. explained: fall of chi2 by effects and places;
-    log_prior: ln of the chance of all of them before the data. of_shape: ln evidence of places as they competed, less
-    that in the model, whose covariance holds the error of their shape. p: of the last alarm, and the rate below which
-    it is sounded. undecided: what competed last and led to nothing, most evidence first. absurd: values that no flow of
-    the case can have, in sentences.
+    """charges: of all that is held. flagged: readings set aside, indices among the used stations. of_shape: ln evidence
+    of places as they competed, less that in the model, whose covariance holds the error of their shape. p: of the last
+    alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing, most evidence
+    first. absurd: values that no flow of the case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
     places: tuple[Location, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
+    charges: tuple[Charge, ...] = ()
     flagged: tuple[int, ...] = ()
-    explained: float = 0.0
-    log_prior: float = 0.0
     of_shape: float = 0.0
     p: float = 1.0
     rate: float = 0.0
@@ -30,6 +37,16 @@ class Findings:
     @property
     def alarmed(self) -> bool:
         return self.p < self.rate
+
+    @property
+    def explained(self) -> float:
+        """Fall of chi2 by effects and places."""
+        return sum(one.explained for one in self.charges)
+
+    @property
+    def log_prior(self) -> float:
+        """ln of the chance of all that was found before the data."""
+        return sum(one.log_prior for one in self.charges)
 
     def gained(self, before: float, after: float) -> float:
         """ln evidence of all that was found together, as it competed, from those of the first and the last model."""

@@ -23,8 +23,8 @@ ENTER = 2
 # A step this long [m, m/s] leaves the range where the linearisation means anything: chosen, not measured, about a
 # fourth of the depth and of the speed of the channels in `configs`.
 LONGEST_CORRECTION = 0.25
-# Numbers that the processor computes at once [-]. On 200 x 38 cells a step of 7 lanes takes 12.5 ms, one of 8 takes 9.1;
-# of 23 and 24 18.9 and 15.7; of 3 and 4 7.8 and 8.7 (DECISIONS).
+# Numbers that the processor computes at once [-]. On 200 x 38 cells a step of 7 lanes takes 12.5 ms, one of 8 takes
+# 9.1; of 23 and 24 18.9 and 15.7; of 3 and 4 7.8 and 8.7.
 SIDE_BY_SIDE = 8
 # A correction that shrank by more than this [-] in the last step is taken to shrink as much in the one that is made. Of
 # 2, 4 and 8 the second leaves the largest error at the stations a fifth of the tolerance (DECISIONS).
