@@ -46,6 +46,19 @@ def test_neighbours_are_correlated_only_within_their_section() -> None:
     assert covariance[STATIONS - 1, STATIONS] == 0.0
 
 
+def test_stations_along_the_channel_are_as_far_apart_as_they_are() -> None:
+    along = stations()[:5].assign(x=2.0 * np.arange(5), y=0.0)
+    correlations = covariance_of(with_correlation(noise_of(along), 0.4, 1.0)) / 0.01**2
+    assert correlations[0] == pytest.approx(0.4 ** np.arange(5))
+
+
+def test_a_boat_that_does_not_keep_its_line_measures_across_all_the_same() -> None:
+    wavy = stations()[:5].assign(x=[0.0, 0.2, 0.0, 0.2, 0.0])
+    assert covariance_of(with_correlation(noise_of(wavy), 0.4, 1.0)) == pytest.approx(
+        covariance_of(with_correlation(noise_of(stations()[:5]), 0.4, 1.0))
+    )
+
+
 def test_components_at_one_place_are_neighbours_of_their_own_kind_alone() -> None:
     both = pd.concat([stations(), stations().assign(kind="velocity_across")], ignore_index=True)
     others = stations().assign(kind="discharge")

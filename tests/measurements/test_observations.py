@@ -177,6 +177,19 @@ def test_one_section_of_an_experiment_is_read_once():
         read_observations(twice)
 
 
+def test_a_station_stands_in_one_file(tmp_path):
+    case = with_file(tmp_path, "experiment,section,x,y,u\nD3a,S1,1,2,0.3\n", "velocity")
+    (tmp_path / "again.csv").write_text("experiment,x,y,u\nD3a,1,2,0.3\nD3a,1,3,0.3\n", encoding="utf-8")
+
+    def both(section):
+        again = case.observations[0].model_copy(update={"file": tmp_path / "again.csv", "section": section})
+        return case.model_copy(update={"observations": (*case.observations, again)})
+
+    with pytest.raises(InputError, match=r"got velocity at x = 301, y = 2 m of section 'S1' .* in two files"):
+        read_observations(both("S1"))
+    assert list(read_observations(both("S2")).table["section"]) == ["S1", "S2", "S2"]
+
+
 def test_velocities_are_read_as_they_are(tmp_path):
     text = "experiment,section,x,y,u,u_se\nD3a,S1,36.0,-1.4,0.1732,0.012\nD3a,S1,36.0,-1.1,0.2591,0\n"
     observations = read_observations(with_file(tmp_path, text, "velocity"))

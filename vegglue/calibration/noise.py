@@ -3,7 +3,8 @@
     cov = s^2 D R D + E + M + O O',   R_ij = rho^(d_ij / d),   E_ij = (c + (1 - c) 1_ij) g_i g_j
 
 D are the standard errors of the measurements and s their scale. rho is the correlation of neighbours in a section, d
-their usual spacing and d_ij the distance between stations i and j. R_ij is 0 between sections, experiments and kinds.
+their usual spacing and d_ij the distance between stations i and j, across the channel where they were measured together
+across it. R_ij is 0 between sections, experiments and kinds.
 g is the error of discretisation and c its correlation between two stations. M is the model's own error, see
 `model_error`. A column of O is an instrument found to be off: what all its readings share counts for nothing.
 """
@@ -19,6 +20,7 @@ import scipy.special
 from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of, unstated_errors
+from vegglue.measurements.sections import section_places
 from vegglue.parallel import in_threads
 
 # Error of the grid over the difference of predictions to a grid of twice the cell size [-]: 1/(2^p - 1) for an order p
@@ -250,9 +252,11 @@ def _separation(used: pd.DataFrame) -> Array:
     np.fill_diagonal(separation, 0.0)
     correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
     keys = used[["experiment", "section", "kind"]].astype(str).agg("\n".join, axis=1).to_numpy()
+    x, y = section_places(used).to_numpy(float), used["y"].to_numpy(float)
     for key in np.unique(keys[correlated]):
         here = np.flatnonzero(keys == key)
-        y = used["y"].to_numpy(float)[here]
-        spacing = np.median(np.diff(np.sort(y))) if here.size > 1 else 1.0
-        separation[np.ix_(here, here)] = np.abs(y[:, None] - y[None]) / max(spacing, 1e-9)
+        line = here[np.lexsort((y[here], x[here]))]
+        spacing = np.median(np.hypot(np.diff(x[line]), np.diff(y[line]))) if here.size > 1 else 1.0
+        distance = np.hypot(x[here, None] - x[here], y[here, None] - y[here])
+        separation[np.ix_(here, here)] = distance / max(spacing, 1e-9)
     return separation

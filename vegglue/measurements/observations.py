@@ -97,6 +97,7 @@ def read_observations(case: Case) -> Observations:
             "those that lie close together, or leave some out."
         )
     table = _within_the_grid(case, _joined(stations))
+    _refuse_measured_twice(case, table)
     _refuse_unknown_limits(case, table)
     return Observations(
         table=table,
@@ -117,6 +118,19 @@ def _within_the_grid(case: Case, table: pd.DataFrame) -> pd.DataFrame:
     inside = table["x"].between(west, east) & (table["y"].between(south, north) | ~at_point)
     lost = table["used"].astype(bool) & ~inside
     return table.assign(used=table["used"].astype(bool) & inside, reason=table["reason"].mask(lost, OUTSIDE))
+
+
+def _refuse_measured_twice(case: Case, table: pd.DataFrame) -> None:
+    """Errors: InputError for a station of one section that two files hold, whose errors would count as one error."""
+    correlated = np.array([kind_of(str(name)).correlated for name in table["kind"]], dtype=bool)
+    twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated
+    if twice.any():
+        one = table.loc[twice.idxmax()]
+        raise InputError(
+            f"{shown_path(case.source)}: `observations` expected each station once, got {kind_of(one['kind']).words} "
+            f"at x = {one['x']:g}, y = {one['y']:g} m of section {one['section']!r} of experiment {one['experiment']} "
+            "in two files: take one of the two out, or give it a section of its own."
+        )
 
 
 def _refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
