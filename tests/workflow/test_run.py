@@ -110,6 +110,8 @@ def test_a_law_that_stands_out_is_searched(kind: str, places: int, monkeypatch: 
 
 def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     assert gone("none-of-these", 0, 0.03, monkeypatch) == (["twin"], ["law"])
+    nothing_held_out = float("nan")
+    assert gone("none-of-these", 0, nothing_held_out, monkeypatch) == (["twin"], ["law"])
 
 
 @pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("nothing-missing", 0), ("cannot-tell", 0)])

@@ -95,7 +95,7 @@ def _with_a_law(
     both, cases = Comparison((alone.rungs[0], with_law), alone.left_out), [case, law.child]
     draw_ladder_of(both, law.child, runs)
     show(law.child, both)
-    if held_out_rmse(with_law) >= held_out_rmse(alone.rungs[0]):
+    if not held_out_rmse(with_law) < held_out_rmse(alone.rungs[0]):  # nor where nothing could be held out: NaN
         return case
     keep_ladder(both, cases, [case_hash(one) for one in cases], runs)
     return law.child
