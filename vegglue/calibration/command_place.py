@@ -48,8 +48,10 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> Com
     for places in range(1, MOST_PLACES + 1):
         if _is_near(base, z):
             return CommandPlace(here, z, True, places, correction.rough)
+        if places == MOST_PLACES:
+            break
         lower = _lower(runs, model, here, base, z, _named(watch, f"on the way to place {places + 1}"))
-        if lower is None or places == MOST_PLACES:
+        if lower is None:
             break
         z, correction = lower, correction_at(runs, model, lower, _named(watch, f"place {places + 1}"))
         here = _model_at(runs, model, correction, watch)
