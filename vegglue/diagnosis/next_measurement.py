@@ -28,8 +28,8 @@ from vegglue.site.gridded_site import build_site
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
-# Verticals are planned this far apart, in half widths of the floor; sections this share of the reach.
-VERTICAL_SPACING, SECTIONS = 0.25, 12
+# Places along the reach where a section is thought of.
+SECTIONS = 12
 # Other discharges, relative to the lowest and to the highest one at hand, with the outlet level that goes with them
 # (h ~ Q^0.6). A quarter brings plants to the surface, where what depends on speed or depth leaves other traces.
 LOWER, HIGHER = (0.25, 0.5), (1.4,)
@@ -128,29 +128,38 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
 
 
 def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:
-    """Name, experiment, x, y, kind and hours of every measurement worth a thought."""
+    """Name, experiment, x, y, kind and hours of every measurement worth a thought; sections as those that were
+    measured, none where no velocity was.
+    """
     usual, y = next(reversed(model.case.experiments)), _verticals(velocity)
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
-    taken = [float(x) for x in velocity["x"].unique()]
-    hours = HOURS["section"] + y.size * HOURS["vertical"]
-    new = [float(x) for x in places if min(abs(x - there) for there in taken) > 0.3 * (places[1] - places[0])]
-    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, hours) for x in new]
+    taken, spacing = [float(x) for x in velocity["x"].unique()], places[1] - places[0]
+    new = [float(x) for x in places if taken and min(abs(x - there) for there in taken) > 0.3 * spacing]
+    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, _hours(y)) for x in new]
+    middle = np.array([_middle(y if y.size else np.array(model.case.grid.y))])
     ideas += [
-        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), np.array([_middle(y)]), WATER_LEVEL, HOURS["gauge"])
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, HOURS["gauge"])
         for x in places[::2]
     ]
     others = [name for name in case.experiments if name not in model.case.experiments]
     for x in taken:
         at, here = f"the section at x = {x:g} m", np.sort(velocity[velocity["x"] == x]["y"].unique().astype(float))
-        ideas.append((f"{at} again ({usual})", usual, x, here, STREAMWISE, hours))
-        more = hours + HOURS["discharge"]
+        ideas.append((f"{at} again ({usual})", usual, x, here, STREAMWISE, _hours(here)))
+        more = _hours(here) + HOURS["discharge"]
         ideas += [(f"{at} {experiment}", experiment, x, here, STREAMWISE, more) for experiment in others]
     return ideas
 
 
+def _hours(y: Array) -> float:
+    """Hours of a section with verticals at y [m]."""
+    return HOURS["section"] + y.size * HOURS["vertical"]
+
+
 def _verticals(velocity: pd.DataFrame) -> Array:
-    """Where verticals stand in the section that has most of them [m]."""
+    """Where verticals stand in the section that has most of them [m], nowhere without velocities."""
+    if velocity.empty:
+        return np.zeros(0)
     counts = velocity.groupby("x")["y"].nunique()
     return np.sort(velocity[velocity["x"] == counts.idxmax()]["y"].unique().astype(float))
 
@@ -183,8 +192,9 @@ def _with_other_discharges(case: Case, lower: Sequence[float]) -> Case:
         depth = float(one.level) - floor
         level = floor + depth * factor**LEVEL_POWER
         discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
-        more[f"at {factor * totals[name]:.2f} m3/s"] = one.model_copy(update={"discharge": discharge, "level": level})
-    return case.model_copy(update={"experiments": {**case.experiments, **more}})
+        more[f"at {factor * totals[name]:.3g} m3/s"] = one.model_copy(update={"discharge": discharge, "level": level})
+    unseen = {name: one for name, one in more.items() if name not in case.experiments}
+    return case.model_copy(update={"experiments": {**case.experiments, **unseen}})
 
 
 def _plain(one: Experiment) -> bool:

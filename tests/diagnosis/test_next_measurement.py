@@ -1,0 +1,45 @@
+"""What could be measured next: where, for how many hours, and at which discharge."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vegglue.case.config import load_case
+from vegglue.diagnosis.next_measurement import HOURS, _with_other_discharges, planned
+from vegglue.engine.interface import Model
+from vegglue.workflow.run_folder import model_in
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return model_in(load_case(Path(__file__).parents[2] / "configs" / "twin.yaml"))
+
+
+def test_a_section_again_costs_its_own_verticals(model: Model) -> None:
+    station = model.station
+    of_one = station["section"] == "A"
+    few = station[~of_one | (station["y"].abs() < 0.5)].reset_index(drop=True)
+    _, plans = planned(replace(model, station=few), model.case)
+    again = {plan.name.split("(")[0]: plan for plan in plans if "again" in plan.name}
+    assert len(again) == few.loc[few["section"] != "", "section"].nunique()
+    for plan in again.values():
+        assert plan.hours == pytest.approx(HOURS["section"] + len(plan.stations) * HOURS["vertical"])
+    assert len({plan.hours for plan in again.values()}) > 1
+
+
+def test_where_levels_alone_were_measured_gauges_are_thought_of(model: Model) -> None:
+    levels = model.station[model.station["kind"] == "level"].reset_index(drop=True)
+    _, plans = planned(replace(model, station=levels), model.case)
+    assert plans
+    assert {kind for plan in plans for kind in plan.stations["kind"]} == {"level"}
+
+
+def test_small_discharges_have_names_of_their_own(model: Model) -> None:
+    small = {
+        name: one.model_copy(update={"discharge": dict.fromkeys(one.discharge, 0.004)})
+        for name, one in list(model.case.experiments.items())[:1]
+    }
+    case = model.case.model_copy(update={"experiments": small})
+    further = [name for name in _with_other_discharges(case, (0.25, 0.5)).experiments if name not in small]
+    assert further == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
