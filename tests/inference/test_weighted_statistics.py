@@ -94,6 +94,7 @@ def test_tail_shape_is_that_of_a_pareto_distribution() -> None:
     weights = np.random.default_rng(5).pareto(1 / 0.6, 100_000)
     assert pareto_shape(weights) == pytest.approx(0.6, abs=0.12)
     assert math.isnan(pareto_shape(np.ones(100)))
+    assert math.isnan(pareto_shape(np.ones(1)))
 
 
 @pytest.mark.slow  # arviz takes a second to import

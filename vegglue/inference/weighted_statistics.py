@@ -118,7 +118,7 @@ def pareto_shape(weights: Array) -> float:
     """
     ordered = np.sort(weights / np.max(weights))
     tail = _tail(len(ordered))
-    excess = ordered[-tail:] - ordered[-tail - 1]
+    excess = ordered[-tail:] - ordered[max(len(ordered) - tail - 1, 0)]
     excess = excess[excess > 0]
     return _generalised_pareto(excess)[0] if len(excess) >= 5 else float("nan")
 
@@ -132,7 +132,7 @@ def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
     weights = np.exp(log_weights - np.max(log_weights))
     order = np.argsort(weights, kind="stable")
     tail = order[-_tail(len(weights)) :]
-    cut = weights[order[-len(tail) - 1]]
+    cut = weights[order[max(len(weights) - len(tail) - 1, 0)]]
     excess = weights[tail] - cut
     if np.sum(excess > 0) < 5:
         return weights / weights.sum(), float("inf" if effective_size(weights) < 5 else "nan")
