@@ -4,7 +4,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
@@ -82,8 +81,10 @@ def test_only_velocities_that_are_used_count(base: Baseline, monkeypatch: pytest
     assert np.isnan(ratio(base, monkeypatch, far, used=False))
 
 
-def test_without_a_flow_there_nothing_can_be_said(base: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
-    station: pd.DataFrame = stations_of(CASE_OF_TWINS, ("A",), 3).assign(value=0.4)
+def test_no_flow_for_what_was_not_seen_is_no_agreement(base: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vegglue.diagnosis.unseen.linearise", lambda *_: None)
+    station = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
     unseen = SimpleNamespace(case=CASE_OF_TWINS, site=base.model.site, station=station, engine=NEWTON)
-    assert np.isnan(unseen_ratio(base, unseen))
+    assert unseen_ratio(base, unseen) == np.inf
+    none = SimpleNamespace(case=CASE_OF_TWINS, site=base.model.site, station=station.assign(used=False), engine=NEWTON)
+    assert np.isnan(unseen_ratio(base, none))

@@ -38,6 +38,7 @@ UNEARNED = {
     ),
     "less model error": ({"model_error": NEEDS_MORE}, {"model_error": replace(NEEDS_MORE, needed=0.25)}, "15%"),
     "unseen": ({"unseen": 1.5}, {"unseen": 1.2}, "1.5 times what is expected"),
+    "no flow there": ({"unseen": np.inf}, {"unseen": 1.0}, "no steady flow in experiments that were not calibrated"),
     "unseen beside others": ({"unseen": 1.5}, {"unseen": float("nan")}, "not calibrated to"),
 }
 

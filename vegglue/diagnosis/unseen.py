@@ -17,13 +17,17 @@ from vegglue.measurements.kinds import STREAMWISE
 
 
 def unseen_ratio(base: Baseline, unseen: Model) -> float:
-    """The ratio [-], NaN where nothing can be said; unseen: the model at stations it has not seen."""
+    """The ratio [-], NaN without velocities that were not seen, infinite where the model finds no flow for them;
+    unseen: the model at stations it has not seen.
+    """
     there = Model(_case_there(base, unseen), unseen.site, unseen.station, unseen.engine)
     point = linearise(there, base.fitted.point.z)
     station = there.station
     rows = (station["used"] & (station["kind"] == STREAMWISE)).to_numpy(bool)
-    if point is None or not rows.any():
+    if not rows.any():
         return float("nan")
+    if point is None:
+        return float("inf")
     seen = base.model.station["kind"].to_numpy()[base.noise.rows] == STREAMWISE
     floor = float(np.mean(base.noise.data_error[seen] ** 2)) if seen.any() else 0.0
     stated = station["standard_error"].to_numpy(float)[rows] ** 2

@@ -246,10 +246,13 @@ def _unearned(grounds: Grounds) -> str:
     if grounds.neighbours:
         return "readings side by side had to be set aside, which one bad probe does not explain"
     if used is not None and used.needed > 1.0 and used.log_ratio > NEEDS_MORE:
+        of_friction = f": {used.needed * used.friction:.0%} in friction where {used.friction:.0%} is allowed"
         return (
-            f"the model needs an error of its own of {used.needed * used.friction:.0%} in friction where "
-            f"{used.friction:.0%} is allowed"
+            f"the model needs {used.needed:.1f} times the errors of its own, and of its site, that are allowed"
+            f"{of_friction if used.friction else ''}"
         )
+    if grounds.unseen == np.inf:
+        return "the model finds no steady flow in experiments that were not calibrated to"
     if grounds.unseen > UNSEEN_RATIO:
         return f"measurements that were not calibrated to are missed by {grounds.unseen:.1f} times what is expected"
     return ""
