@@ -51,6 +51,8 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
             + (f" or sections ({', '.join(places['section'])})" if effect.stage == "sensor" else "")
             + f", got {', '.join(where)}; correct them."
         )
+    if kind == "patch" and len(where) > 1:
+        raise InputError(f"--add: `{name}`: expected one patch, got {len(where)}; add them one after the other.")
     candidate = _acting_in(case, effect, kind, where)
     if candidate.key in case.effects:
         raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
@@ -66,7 +68,7 @@ def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, .
 
 def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
     """Something unlisted at `x47.3,y-0.5`, of the default size."""
-    found = [re.fullmatch(rf"{axis}(-?[\d.]+)", part) for axis, part in zip("xy", where, strict=False)]
+    found = [re.fullmatch(rf"{axis}(-?\d+(?:\.\d*)?|-?\.\d+)", part) for axis, part in zip("xy", where, strict=False)]
     if len(where) != 2 or None in found:
         raise InputError(
             f"--add: `{effect.name}[{','.join(where)}]`: expected a place such as [x47.3,y-0.5]; correct it."
