@@ -47,11 +47,11 @@ ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"
 # Records of the study as far as it was made: data sets cost hours.
 KEPT = ROOT / "data" / "blind" / "records.jsonl"
-LENGTHS = KEPT.with_name("lengths.jsonl")
+LENGTHS, PLACE_LIMITS = KEPT.with_name("lengths.jsonl"), KEPT.with_name("place_limits.jsonl")
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
-        "null-perfect": 100, "null-site": 100, "listed6": 110, "listed3": 90, "unlisted": 124, "instrument": 20,
+        "null-perfect": 100, "null-site": 100, "listed6": 160, "listed3": 150, "unlisted": 184, "instrument": 20,
         "pair": 10, "probe": 10,
     },
     ("second", "campaign"): {
@@ -62,6 +62,8 @@ SIZES: dict[tuple[str, str], dict[str, int]] = {
         "null-perfect": 20, "listed6": 18, "listed3": 9, "unlisted": 5, "instrument": 4, "pair": 2, "probe": 2,
     },
 }  # fmt: skip
+# From this number on, what is hidden is as long as stated in the flow of the stranger and not of the model.
+FIRST_SIZED_IN_TRUTH = {("second", "twin"): {"listed6": 110, "listed3": 90, "unlisted": 124}}
 RATIO = {"listed3": 3.0}
 USUAL_RATIO = 6.0
 # Every so many data sets with a listed effect, the model with the true effect is calibrated too.
@@ -87,8 +89,10 @@ def _trial(truth: str, case: str, group: str, number: int) -> Trial:
     null = group.startswith("null")
     noise = NULL_NOISE[number % len(NULL_NOISE)] if null else "white"
     imperfect = truth == "second" and group != "null-perfect"
-    hide = _hide(case, group, number)
-    return Trial(truth, case, group, number, hide, 0.0 if null else RATIO.get(group, USUAL_RATIO), noise, imperfect)
+    hide, signal = _hide(case, group, number), 0.0 if null else RATIO.get(group, USUAL_RATIO)
+    first = FIRST_SIZED_IN_TRUTH.get((truth, case), {}).get(group, number + 1)
+    sized = "truth" if number >= first else "model"
+    return Trial(truth, case, group, number, hide, signal, noise, imperfect, sized)
 
 
 def _hide(case: str, group: str, number: int) -> tuple[str, ...]:
@@ -133,7 +137,7 @@ def truth_of(trial: Trial, folder: Path) -> dict[str, Any]:
     path = folder / f"{trial.key}.json"
     if path.exists():
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if kept["edition"] == EDITION:
+        if kept["edition"] == EDITION and kept.get("hide", list(trial.hide)) == list(trial.hide):
             return kept
     try:
         made = told(trial)
@@ -193,13 +197,19 @@ def main() -> None:
             run(todo, path, {record["key"] for record in kept}, given.jobs)
     records = {record["key"]: record for record in (*kept, *records_in(path))}
     sizes = {key: sum(of_kind.values()) for key, of_kind in SIZES.items()}
-    write_page(list(records.values()), ROOT / "docs", sizes, lengths_in(LENGTHS))
+    write_page(
+        list(records.values()),
+        ROOT / "docs",
+        sizes,
+        values_by_key(LENGTHS, "truth"),
+        values_by_key(PLACE_LIMITS, "near"),
+    )
 
 
-def lengths_in(path: Path) -> dict[str, float]:
-    """What `blind_lengths` found, by the keys of data sets."""
+def values_by_key(path: Path, name: str) -> dict[str, float]:
+    """One value of each data set that `blind_lengths` or `place_limits` looked into, by its key."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {one["key"]: one["truth"] for one in map(json.loads, lines)}
+    return {one["key"]: one[name] for one in map(json.loads, lines)}
 
 
 def planned(share: float, only: list[str]) -> list[Trial]:

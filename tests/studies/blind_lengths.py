@@ -13,7 +13,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from blind import LENGTHS, RUNS, Trial, lengths_in, planned_trials, truth_of
+from blind import LENGTHS, RUNS, Trial, planned_trials, truth_of, values_by_key
 from blind_sets import EDITION, hash_of, length_in_truth
 
 from vegglue.parallel import as_finished, at_most
@@ -37,8 +37,10 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=-1)
     parser.add_argument("--runs", type=Path, default=RUNS)
     given = parser.parse_args()
-    done = lengths_in(LENGTHS)
-    todo = [one for one in planned_trials() if one.key.startswith(KIND) and one.key not in done]
+    done = values_by_key(LENGTHS, "truth")
+    todo = [
+        one for one in planned_trials() if one.key.startswith(KIND) and one.sized == "model" and one.key not in done
+    ]
     with LENGTHS.open("a", encoding="utf-8") as file:
         for found in as_finished(length_of, ((trial, given.runs) for trial in todo), given.jobs):
             if found is not None:

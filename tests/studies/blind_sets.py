@@ -23,7 +23,16 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import MODEL_ERROR, VISCOSITY, VISCOSITY_FACTOR, viscosity_prior
-from vegglue.twins.hidden_effect import BAD, TwinBase, candidate_of, case_hiding, chosen_effect, visible_length
+from vegglue.twins.hidden_effect import (
+    BAD,
+    LARGEST_SIZE,
+    TwinBase,
+    VisibilityError,
+    candidate_of,
+    case_hiding,
+    chosen_effect,
+    visible_length,
+)
 from vegglue.twins.sealed_answer import UNLISTED, Hidden
 from vegglue.twins.twin import errors_named, finer, true_place
 from vegglue.workflow.run_folder import model_in
@@ -33,6 +42,8 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 PLACES = 8
 # Errors of the site as whoever measured there would state them, see `blind_truth` for those that it has.
 SITE_ERROR = {"edges": 0.05, "probes": 0.02, "discharge": 0.01, "stems": 0.12}
+# Steps and exactness [-] of finding a size in the flow of the second solver, whose steps cost 8 to 90 s each.
+SIZING_STEPS, SIZED_IN_TRUTH = 5, 0.05
 # Every fifth set without a hidden effect has understated errors, two of five correlated ones.
 NULL_NOISE = ("white", "ar1:0.5", "white", "ar1:0.5", "understated:1.5")
 OBJECTS = {"pier": "drag", "fallen_tree": "drag", "sink": "drag", "jet": "drag", "scour_hole": "bed"}
@@ -49,7 +60,9 @@ EDITION = "fifth edition: "
 
 @dataclass(frozen=True)
 class Trial:
-    """One data set. truth: second or own; hide: names; noise: kind of errors; imperfect: whether the site is."""
+    """One data set. truth: second or own; hide: names; signal: length of what is hidden [standard errors]; noise: kind
+    of errors; imperfect: whether the site is; sized: in whose flow it is as long, that of the model or of the truth.
+    """
 
     truth: str
     case: str
@@ -59,6 +72,7 @@ class Trial:
     signal: float
     noise: str
     imperfect: bool
+    sized: str = "model"
 
     @property
     def key(self) -> str:
@@ -138,22 +152,24 @@ def told(trial: Trial) -> dict[str, Any]:
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(trial.noise)
     errors = with_correlation(noise_of(base.model.station), correlation, scale)
-    sizing = _sizing(base, errors, columns)
+    sizing = sizing_errors(base, errors, columns)
     found = [_hidden(base, sizing, name, trial.signal, random) for name in trial.hide]
-    flows = [one for one in found if not one["stations"]]
     station = base.model.station
+    if trial.sized == "truth":
+        found = [_as_long_in_truth(trial, base, sizing, one, seed) for one in found]
+    flows = [one for one in found if not one["stations"]]
     truly, also_true = _truly(trial, base, _everywhere(base.model), flows, seed)
     value = truly[: len(station)].copy()
     value[errors.rows] += errors.lower @ random.standard_normal(errors.rows.size)
     for one in found:
         value[one["stations"]] += one["amplitude"]
     return {
-        "key": trial.key, "edition": EDITION, "hidden": found, "also_true": dict(also_true), "value": value.tolist(),
-        "unseen": truly[len(station) :].tolist(),
+        "key": trial.key, "edition": EDITION, "hide": list(trial.hide), "hidden": found, "also_true": dict(also_true),
+        "value": value.tolist(), "unseen": truly[len(station) :].tolist(),
     }  # fmt: skip
 
 
-def _sizing(base: TwinBase, errors: Noise, columns: Array) -> Noise:
+def sizing_errors(base: TwinBase, errors: Noise, columns: Array) -> Noise:
     """Errors in which what is hidden is so many standard errors long: of the data, the grid, and the model's own."""
     return with_model_error(with_grid_error(errors, base.difference), columns)
 
@@ -163,9 +179,31 @@ def length_in_truth(trial: Trial, hidden: Mapping[str, Any], seed: int) -> float
     solver on the site of a trial, after calibration has done what it can [-]; for white errors.
     """
     base, columns = place_of(trial.case, place_number(trial))
-    sizing = _sizing(base, noise_of(base.model.station), columns)
+    sizing = sizing_errors(base, noise_of(base.model.station), columns)
     ends = [_truly(trial, base, base.model.station, some, seed)[0] for some in ([hidden], [])]
     return visible_length(base, sizing, ends[0] - ends[1])
+
+
+def _as_long_in_truth(trial: Trial, base: TwinBase, sizing: Noise, hidden: dict[str, Any], seed: int) -> dict[str, Any]:
+    """What is hidden, at the amplitude that makes it as long in the flow of the second solver as was asked.
+
+    Errors: VisibilityError where that would be larger than is plausible.
+    """
+    amplitude, station = candidate_of(base.model, hidden["name"]).effect.amplitude, base.model.station
+    without, _ = _truly(trial, base, station, [], seed)
+    one = hidden
+    for _ in range(SIZING_STEPS):
+        length = visible_length(base, sizing, _truly(trial, base, station, [one], seed)[0] - without)
+        one = one | {"signal": length}
+        if abs(length / trial.signal - 1.0) < SIZED_IN_TRUTH:
+            return one
+        grown = (trial.signal / max(length, 1e-300)) ** (1.0 / amplitude.power)
+        size = (one["amplitude"] - amplitude.off) * min(grown, 3.0)
+        value = amplitude.off + size
+        if not amplitude.low <= value <= amplitude.high or abs(size) > LARGEST_SIZE * amplitude.scale:
+            break
+        one = one | {"amplitude": value}
+    raise VisibilityError(f"{hidden['name']}: at no plausible size is it {trial.signal:g} long in the second solver")
 
 
 def hash_of(text: str) -> int:

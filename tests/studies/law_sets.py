@@ -114,16 +114,18 @@ class LawTruth:
 
 def law_truth(trial: LawTrial, folder: Path) -> LawTruth:
     """The truth of a trial, from the folder where it is kept there, else made and put there."""
-    path = folder / f"{trial.key.replace('/', '_')}.json"
+    path, what = folder / f"{trial.key.replace('/', '_')}.json", {"edition": LAW_EDITION, "hide": trial.hide}
     if path.exists():
-        return LawTruth(**json.loads(path.read_text(encoding="utf-8")))
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if {name: kept.pop(name, None) for name in what} == what:
+            return LawTruth(**kept)
     folder.mkdir(parents=True, exist_ok=True)
     began = time.process_time()
     try:
         made = replace(_made(trial), seconds=time.process_time() - began)
     except (VisibilityError, InputError, RuntimeError) as error:
         made = LawTruth(None, [], [], {}, time.process_time() - began, str(error))
-    path.write_text(json.dumps(asdict(made)), encoding="utf-8")
+    path.write_text(json.dumps(what | asdict(made)), encoding="utf-8")
     return made
 
 

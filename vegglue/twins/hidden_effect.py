@@ -88,7 +88,7 @@ def candidate_of(model: Model, name: str) -> Candidate:
 def case_hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
     """The case with the effect at work at its true size; one that stands in no list is read from its own file."""
     working = effect_entry(candidate, hidden.amplitude, hidden.shapes)
-    return _knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
+    return case_knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
 
 
 def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
@@ -107,7 +107,7 @@ def size_given(text: str, size: str) -> float | None:
         raise InputError(f"--hide: expected EFFECT or EFFECT=NUMBER, got {text!r}; e.g. --hide wind=8.") from None
 
 
-def _knowing(case: Case, hidden: Hidden) -> Case:
+def case_knowing(case: Case, hidden: Hidden) -> Case:
     """The case with the file of the unlisted objects, if what is hidden is one of them."""
     return case if hidden.listed else case.model_copy(update={"effect_file": Path(unlisted_objects.__file__)})
 
@@ -162,7 +162,7 @@ def _sized(
 def _first_size(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float) -> float:
     """(snr / |S_perp|)^(1/power), to first order."""
     amplitude = candidate.effect.amplitude
-    case = _knowing(base.model.case, hidden)
+    case = case_knowing(base.model.case, hidden)
     changed = cause_of(case, candidate, hidden.shapes)
     trace = responses(replace(base.model, case=case), base.here, [changed])
     return amplitude.size(snr / max(visible_length(base, errors, trace[:, 0]), 1e-300))
