@@ -26,12 +26,6 @@ def effect_of(case: Case, name: str) -> Effect:
     return library(case.effect_file)[case.effects[name].effect or name]
 
 
-def amplitude_of(case: Case, name: str) -> str | None:
-    """Name of the parameter that is the amplitude of an entry of `effects`; None when the amplitude is a number."""
-    value = case.effects[name].values.get(effect_of(case, name).amplitude.name)
-    return value if isinstance(value, str) else None
-
-
 def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> tuple[ActiveEffect, ...]:
     """Effects that act in one experiment, in the order of the library, with values (members,) of their parameters."""
     order = list(library(case.effect_file))

@@ -150,15 +150,15 @@ def chances_of(contenders: Sequence[Contender]) -> Array:
     return tempered_chances(np.array([one.log_evidence for one in contenders]))
 
 
-def tempered_chances(evidence: Array) -> Array:
-    """p_j of E_j (k,) [-]."""
-    weight = np.exp((evidence - evidence.max()) / tempering(evidence))
+def tempered_chances(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
+    """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
+    weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
     return np.asarray(weight / weight.sum())
 
 
-def tempering(evidence: Array) -> Array:
-    """w = 1 + FINGERPRINT_ERROR^2 2 E, at least 1."""
-    return np.asarray(1.0 + FINGERPRINT_ERROR**2 * 2.0 * np.maximum(evidence, 0.0))
+def tempering(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
+    """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
+    return np.asarray(1.0 + trace_error**2 * 2.0 * np.maximum(evidence, 0.0))
 
 
 def _within_reach(evidence: float, best: float) -> bool:

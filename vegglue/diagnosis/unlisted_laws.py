@@ -22,7 +22,7 @@ LAW_ALARMS, LAWS_HELD = 0.01, 0.95
 
 def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSuspected | None:
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
-    errors alone leave as much, or listed effects explain the misfit nearly as well.
+    errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
     """
     if found.absurd or last.base.model.case.engine is not None:  # `discover` refuses a command
         return None
@@ -71,13 +71,12 @@ def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
 def _law(screening: LawScreening, law: int, chance: float) -> LawSuspected:
     one = screening.laws[law]
     reference = screening.settings[screening.best_column(law)].get("reference")
-    unit = "" if one.law.quantity.unit == "-" else f" {one.law.quantity.unit}"
     return LawSuspected(
         name=one.law.name,
         term=one.law.term.words,
         quantity=one.law.quantity.words,
         title=one.law.title,
-        equation=one.law.equation("" if reference is None else f"{reference:g}{unit}"),
+        equation=one.law.equation(reference),
         reference=reference,
         scale=one.candidate.amplitude.scale,
         strength=screening.gain(law),

@@ -19,20 +19,6 @@ def chance_told(chance: float) -> str:
     return "over 99 %" if chance > 0.99 else f"{100 * chance:.0f} %"
 
 
-def signed(reference: float) -> str:
-    """A reference as it stands in a formula: in brackets below 0."""
-    return f"({reference:g})" if reference < 0.0 else f"{reference:g}"
-
-
-def unit_of(law: Law) -> str:
-    """Of the quantity of a law, with a space before it; nothing for a pure number."""
-    return "" if law.quantity.unit == "-" else f" {law.quantity.unit}"
-
-
-def _with_unit(reference: float | None, law: Law) -> str:
-    return "" if reference is None else f"{signed(reference)}{unit_of(law)}"
-
-
 @dataclass(frozen=True)
 class LawFound:
     """A law with its reference r, its strength a and the 95 % interval of it [-].
@@ -64,13 +50,12 @@ class LawFound:
     @property
     def unit(self) -> str:
         """Of its quantity, with a space before it; nothing for a pure number."""
-        return unit_of(self.law)
+        return self.law.quantity.unit_behind
 
     @property
     def equation(self) -> str:
         """With the references in it, the strength as a letter."""
-        of_first = "" if self.law.times is None else _with_unit(self.first, self.law.times)
-        return self.law.equation(_with_unit(self.reference, self.law), of_first)
+        return self.law.equation(self.reference, self.first)
 
     @property
     def factor(self) -> float:

@@ -6,8 +6,8 @@ A case names one such file: where it has one of its own, the law is written belo
 from collections.abc import Sequence
 from pathlib import Path
 
-from vegglue.discovery.discovered import LawFound, signed
-from vegglue.effects.grammar import Law
+from vegglue.discovery.discovered import LawFound
+from vegglue.effects.grammar import Law, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 

@@ -61,6 +61,16 @@ class LawQuantity:
     written: str
     usual: float
 
+    @property
+    def unit_behind(self) -> str:
+        """The unit with a space before it; nothing for a pure number."""
+        return "" if self.unit == "-" else f" {self.unit}"
+
+
+def signed(reference: float) -> str:
+    """A reference as it stands in a formula: in brackets below 0."""
+    return f"({reference:g})" if reference < 0.0 else f"{reference:g}"
+
 
 @dataclass(frozen=True)
 class LawForm:
@@ -106,16 +116,17 @@ class Law:
             return f"What {self.times.quantity.words} does to {self.term.words} {words}"
         return f"{self.term.words[0].upper()}{self.term.words[1:]} {words}"
 
-    def equation(self, reference: str = "r", first: str = "r_1") -> str:
+    def equation(self, reference: float | None = None, first: float | None = None) -> str:
         """In one line; reference: the value of r, where it is known; first: the same of the law that it multiplies."""
-        a, g = ("a", self.g_in_words(reference))
+        a, g = ("a", self.g_in_words(reference, "r"))
         if self.times is not None:
-            a, g = ("c", f"({self.times.g_in_words(first)}) ({g})")
+            a, g = ("c", f"({self.times.g_in_words(first, 'r_1')}) ({g})")
         return f"{self.term.symbol} -> {self.term.symbol} exp({a} g) {self.term.where}, g = {g}"
 
-    def g_in_words(self, reference: str) -> str:
-        """Its own g, without that of the law that it multiplies."""
-        return self.form.equation.format(q=self.quantity.symbol, r=reference)
+    def g_in_words(self, reference: float | None, letter: str) -> str:
+        """Its own g, without that of the law that it multiplies; letter: of a reference that is not known."""
+        r = letter if reference is None else f"{signed(reference)}{self.quantity.unit_behind}"
+        return self.form.equation.format(q=self.quantity.symbol, r=r)
 
     def g(self, cells: Cells, reference: Array | float = 1.0, first: Array | float = 1.0) -> Array:
         """g (nx, ny, m) [-]."""

@@ -55,7 +55,7 @@ class AmplitudeEstimate:
 class ScoreTest:
     """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
 
-    p_family: counted among bootstrap draws, never below one over their number; see `score_test.family_p`.
+    p_family: counted among bootstrap draws, never below one over their number; see `screening/family_wise_p`.
     """
 
     score: float
@@ -125,7 +125,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was concluded. location: of drag that no listed effect explains, None without; not_excluded: groups
+    """What was concluded. location: of something that no listed effect explains, None without; not_excluded: groups
     of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
     """
 

@@ -29,7 +29,7 @@ class HypothesisKind:
     """Hypotheses of one kind, whitened and projected.
 
     log_prior (c,): ln of the chance of each column before the data; size (c,): a = s |S_perp| [-]; scores T (c,);
-    possible (c,): whether the sign of the score is one that its amplitude can have.
+    one_sided (c,): whether its amplitude has one sign, so that a score below 0 counts as 0.
     """
 
     name: str
