@@ -37,10 +37,15 @@ THIRDS = ("of the shortest third", "of the middle third", "of the longest third"
 
 
 def write_page(
-    records: Sequence[Record], folder: Path, planned: Mapping[tuple[str, str], int], lengths: Mapping[str, float]
+    records: Sequence[Record],
+    folder: Path,
+    planned: Mapping[tuple[str, str], int],
+    lengths: Mapping[str, float],
+    limits: Mapping[str, float],
 ) -> None:
-    """blind.md with its tables, and blind-*.svg beside it; planned: data sets by truth and case; lengths: of hidden
-    objects in the flow of the stranger, by the keys of their sets [standard errors].
+    """blind.md with its tables, and blind-*.svg beside it; planned: data sets by truth and case. By the keys of sets
+    with an object: lengths, how long it is in the flow of the stranger [standard errors]; limits, how often its place
+    could be told in a model that is right but for it [-].
     """
     sets = {truth: made(records, truth) for truth in TRUTHS}
     told = {truth: chances_told(chosen) for truth, chosen in sets.items()}
@@ -48,7 +53,8 @@ def write_page(
     nothing = [one for one in sets["second"] if one["group"].startswith("null")]
     text = PAGE.format(
         lines=lines, alone=alone, reached=reached,
-        lengths=_lengths(sets["second"], lengths), kept=_kept(sets["second"]),
+        lengths=_lengths(sets["second"], lengths), limits=_limits(limits), kept=_kept(sets["second"]),
+        sized=_case_table([one for one in sets["second"] if one.get("sized") == "truth"]),
         sizes=_sizes(records, planned), left_out=_left_out(records), afforded=AFFORDED, main=_main_table(sets),
         chances=_chances(told), distances=_distances(told), instead=_instead(sets["second"]),
         unheard=sum(one["verdict"] == "nothing-missing" for one in nothing), nothing=len(nothing),
@@ -84,6 +90,19 @@ def _lengths(records: Sequence[Record], lengths: Mapping[str, float]) -> str:
         f"stranger's, whose mixing and friction are others, the same object is {values[0]:.1f} to {values[-1]:.1f} "
         f"long, {float(np.median(values)):.1f} at the median of {len(values)} in the small channel "
         f'(`tests/studies/blind_lengths.py`). "None of these" is told of {", ".join(told)}.'
+    )
+
+
+def _limits(limits: Mapping[str, float]) -> str:
+    """How often places could be told at most."""
+    if not limits:
+        return ""
+    share = percent(float(np.mean(list(limits.values()))))
+    return (
+        f"Were the model right but for the object, and its kind and width known, the likeliest place would lie within "
+        f"1.5 m of the true one in {share} of draws of the errors, over {len(limits)} objects six standard errors long "
+        "(`tests/studies/place_limits.py`). The rest is lost to another mixing and friction, and to all else that may "
+        "be missing."
     )
 
 

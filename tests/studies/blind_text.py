@@ -76,7 +76,9 @@ in 100 m, with seven patches (`configs/campaign.yaml`). Cells of the stranger ar
 
 Not afforded: {afforded}
 
-{lengths}
+{lengths} Sets made since are sized in the stranger's own flow, see [below](#as-long-in-the-strangers-own-flow).
+
+{limits}
 
 ## What came out
 
@@ -131,6 +133,13 @@ Listed effects at ratio 6, the stranger's truth: what was named first where that
 {instead}
 
 ![Which effect was named first for each hidden one](blind-confusion.svg)
+
+## As long in the stranger's own flow
+
+Sets of the small channel in which what is hidden is as long as stated in the flow of the stranger, to 5 %, and not in
+that of the model. They are among the sets above, too.
+
+{sized}
 
 ## The field campaign alone
 
