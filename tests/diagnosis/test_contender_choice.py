@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from vegglue.diagnosis.competition import Contender
-from vegglue.diagnosis.contender_choice import KNOWN_FIRST_ODDS, MOST_FOLLOWED, What, chosen_contender, nearly_as_likely
+from vegglue.diagnosis.contender_choice import (
+    KNOWN_FIRST_ODDS,
+    MOST_FOLLOWED,
+    SAME_KIND_ODDS,
+    What,
+    chosen_contender,
+    nearly_as_likely,
+)
 
 
 def followed(**evidence: float) -> list[str]:
@@ -19,6 +26,8 @@ def test_what_is_nearly_as_likely_is_followed() -> None:
 
 def test_no_more_are_followed_than_are_worth_it() -> None:
     assert len(followed(drag=1.0, bed=0.9, inflow=0.8, viscosity=0.7)) == MOST_FOLLOWED
+    known = followed(drag=1.0, bed=0.9, inflow=0.8, viscosity=0.7, gauge=0.6, effect=0.5)
+    assert known == ["drag", "bed", "gauge"], "what is known is among them"
 
 
 @pytest.mark.parametrize(
@@ -29,7 +38,10 @@ def test_no_more_are_followed_than_are_worth_it() -> None:
         (("place", "effect"), (1.0, 0.9 * KNOWN_FIRST_ODDS), 1),  # and by too little
         (("place", "effect"), (1.0, 8.0), None),
         (("place", "instrument"), (1.0, 3.0), None),
-        (("place", "place"), (1.0, 1.1), None),
+        (("place", "place"), (1.0, 0.9 * SAME_KIND_ODDS), None),
+        (("place", "place"), (1.0, 1.1 * SAME_KIND_ODDS), 0),  # both say the same: none of what is known
+        (("place", "place", "effect"), (1.0, 4.0, 12.0), 0),
+        (("place", "place", "instrument"), (1.0, 4.0, 9.0), None),
         (("place", "place", "effect"), (1.0, 1.1, 2.0), 2),
         (("instrument", "place"), (1.0, 2.0), 0),
     ],
