@@ -11,7 +11,8 @@ from vegglue.case.config import load_case
 from vegglue.case.schema import Experiment
 from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
 from vegglue.discovery.effect_file import effect_name, effect_text
-from vegglue.effects.grammar import LAWS, PRODUCTS, Law
+from vegglue.effects.grammar import LAWS, PRODUCTS
+from vegglue.effects.law import Law
 from vegglue.errors import InputError
 from vegglue.workflow import discover as verb
 from vegglue.workflow.check import check_effects, doubts_of

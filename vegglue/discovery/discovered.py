@@ -7,7 +7,7 @@ import numpy as np
 
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit
-from vegglue.effects.grammar import Law
+from vegglue.effects.law import Law
 from vegglue.in_short import in_short
 from vegglue.screening.laws_in_case import VALUES_SEEN
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vegglue.discovery.discovered import LawFound
-from vegglue.effects.grammar import Law, signed
+from vegglue.effects.law import Law, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 

@@ -19,7 +19,8 @@ from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.discovery.chances import chances_in_set
 from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
 from vegglue.discovery.product import product_beside
-from vegglue.effects.grammar import SAME_AS, Law
+from vegglue.effects.grammar import SAME_AS
+from vegglue.effects.law import Law
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.progress import Progress, Watch, silent

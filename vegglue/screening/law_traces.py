@@ -13,7 +13,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.effects.grammar import Law
+from vegglue.effects.law import Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, by_itself
 from vegglue.flow.local_changes import Term

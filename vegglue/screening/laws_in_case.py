@@ -12,7 +12,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Effect, Shape
-from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, PRODUCTS, SAME_AS, Law
+from vegglue.effects.grammar import LAWS, PRODUCTS, SAME_AS
+from vegglue.effects.law import PLAUSIBLE_STRENGTH, Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.measurements.kinds import velocity_rows

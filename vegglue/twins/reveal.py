@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegglue.effects.grammar import LAWS, Law
+from vegglue.effects.grammar import LAWS
+from vegglue.effects.law import Law
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.twins.sealed_answer import BAD_PROBE, Answer, Hidden
 
