@@ -24,7 +24,7 @@ from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import HypothesisKind, prior_shrinkage
+from vegglue.screening.evidence import HypothesisKind
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
@@ -218,8 +218,8 @@ def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
     kind = next(kind for kind in screening.kinds if kind.name == places.term)
     shapes = places.shapes(spot)
     candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[places.term]], shapes, places.plausible)
-    gain = kind.scores[spot] * places.plausible / max(kind.size[spot], 1e-300) * prior_shrinkage(kind.size[spot])
-    starts = (start_with(case, candidate, shapes, search.point.z, share * float(gain)) for share in START_SHARES)
+    gain = float(kind.gain[spot])
+    starts = (start_with(case, candidate, shapes, search.point.z, share * gain) for share in START_SHARES)
     return RefitTrial(candidate, shapes, tuple(starts))
 
 

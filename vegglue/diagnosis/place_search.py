@@ -17,7 +17,7 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.screening import score_test
 from vegglue.screening.candidates import place_candidate, with_effect
-from vegglue.screening.evidence import HypothesisKind, log_factors, prior_shrinkage
+from vegglue.screening.evidence import HypothesisKind, expected_gain, log_factors
 from vegglue.screening.places import Places, places_around
 
 # Distance of the places that are looked at around a refitted one, over that of the spots of the screening [-]. Chosen,
@@ -94,7 +94,7 @@ def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
     projected = score_test.project(slope, residual, point.z[:-1], traces)
     size = projected.length * places.plausible
     score = score_test.scores(projected, np.zeros(size.size, dtype=bool))
-    gain = score / np.maximum(projected.length, 1e-300) * prior_shrinkage(size)
+    gain = expected_gain(score, projected.length, size)
     first_order = log_factors(score, size)
     return Window(around.x, around.y, first_order - first_order[own] + refit.log_factor, gain)
 

@@ -15,7 +15,6 @@ from vegglue.discovery.chances import chances_in_set
 from vegglue.discovery.discovered import LawFound, ProductFound
 from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import with_effect
-from vegglue.screening.evidence import prior_shrinkage
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.law_screening import LARGEST_GAIN
 from vegglue.screening.laws_in_case import LawInCase
@@ -67,8 +66,7 @@ def _best_columns(screening: ProductScreening) -> list[int]:
 def _trial(screening: ProductScreening, column: int) -> RefitTrial:
     """A product from the best place and the size of its score."""
     one, shapes, search = _of(screening, column).candidate, screening.settings[column], screening.full.search
-    length = max(float(screening.kind.projected.length[column]), 1e-300)
-    gain = float(screening.kind.scores[column] / length * prior_shrinkage(screening.kind.size[column]))
+    gain = float(screening.kind.gain[column])
     most = LARGEST_GAIN * one.amplitude.scale
     start = start_with(search.model.case, one, shapes, search.point.z, float(np.clip(gain, -most, most)))
     return RefitTrial(one, shapes, (start,))

@@ -45,6 +45,11 @@ class HypothesisKind:
         return log_factors(self.scores, self.size) + self.log_prior
 
     @property
+    def gain(self) -> Array:
+        """(amplitude - off)^power of each column to first order (c,)."""
+        return expected_gain(self.scores, self.projected.length, self.size)
+
+    @property
     def total(self) -> float:
         """ln of the sum over all columns."""
         return float(logsumexp(self.log_evidence))
@@ -68,6 +73,11 @@ def kind_of_hypotheses(
 def log_factors(scores: Array, size: Array) -> Array:
     """ln B (..., c) of scores (..., c) and sizes a (c,)."""
     return np.asarray(0.5 * scores**2 * prior_shrinkage(size) - 0.5 * np.log1p(size**2))
+
+
+def expected_gain(scores: Array, length: Array, size: Array) -> Array:
+    """T / |S_perp| a^2 / (1 + a^2) (c,): the mean of an amplitude to first order, given score, length and size a."""
+    return np.asarray(scores / np.maximum(length, 1e-300) * prior_shrinkage(size))
 
 
 def prior_shrinkage(size: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.screening import score_test
 from vegglue.screening.candidates import cause_of
-from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses, prior_shrinkage
+from vegglue.screening.evidence import HypothesisKind, alarm_p, kind_of_hypotheses
 from vegglue.screening.family_wise_p import family_of
 from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
 from vegglue.screening.law_traces import law_traces
@@ -71,9 +71,7 @@ class LawScreening:
     def gain(self, law: int) -> float:
         """Its strength to first order, not beyond LARGEST_GAIN plausible ones [-]."""
         column, scale = self.best_column(law), self.laws[law].candidate.amplitude.scale
-        length = max(float(self.kind.projected.length[column]), 1e-300)
-        gain = float(self.kind.scores[column] / length * prior_shrinkage(self.kind.size[column]))
-        return float(np.clip(gain, -LARGEST_GAIN * scale, LARGEST_GAIN * scale))
+        return float(np.clip(self.kind.gain[column], -LARGEST_GAIN * scale, LARGEST_GAIN * scale))
 
     @property
     def of_listed(self) -> int:

@@ -13,7 +13,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.fit import objective
 from vegglue.engine.interface import Point, linearise, responses
 from vegglue.screening import score_test
-from vegglue.screening.evidence import log_factors, prior_shrinkage
+from vegglue.screening.evidence import expected_gain, log_factors
 from vegglue.screening.residual_screening import Screening
 
 # Where the second place lies, over the best one on the scale of z [-]. Chosen, not measured.
@@ -43,5 +43,4 @@ def second_look(screening: Screening) -> SecondLook | None:
     size = projected.length * np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     nothing = float(projected.residual @ projected.residual)
     log_factor = 0.5 * (objective(noise, search.point) - nothing) + log_factors(score, size)
-    gain = score / np.maximum(projected.length, 1e-300) * prior_shrinkage(size)
-    return SecondLook(point, log_factor, gain)
+    return SecondLook(point, log_factor, expected_gain(score, projected.length, size))
