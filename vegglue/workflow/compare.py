@@ -11,8 +11,10 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import excluded_by, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
+from vegglue.errors import InputError
 from vegglue.in_short import in_short, so_many
 from vegglue.measurements.kinds import STREAMWISE
+from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ladder import Ladder, LadderStep
@@ -40,9 +42,10 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
     comparison.json in the folder of each.
 
-    Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when a model finds
-    no flow, or a station has no standard error.
+    Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when models have
+    other measurements or one name, when one finds no flow, or a station has no standard error.
     """
+    _refuse_other_measurements(cases)
     hashes, aside = [case_hash(case) for case in cases], left_out(cases, runs)
     rungs = []
     with at_most(jobs):
@@ -53,6 +56,23 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     draw_ladder_of(found, cases[-1], runs)
     keep_ladder(found, cases, hashes, runs)
     return found
+
+
+def _refuse_other_measurements(cases: Sequence[Case]) -> None:
+    """Errors are compared station by station, and kept in a folder for each name."""
+    first, *others = cases
+    for number, case in enumerate(others, 1):
+        if case.name in {one.name for one in cases[:number]}:
+            raise InputError(f"compare: expected models of different names, got {case.name} twice; name one otherwise.")
+        if not _measured(case).equals(_measured(first)):
+            raise InputError(
+                f"compare: expected {case.name} and {first.name} to be fitted to the same measurements, got others; "
+                "name the same files in both. A reading that is off is left out of all models once it is diagnosed."
+            )
+
+
+def _measured(case: Case) -> pd.DataFrame:
+    return read_observations(case).table[["experiment", "kind", "section", "x", "y", "value"]]
 
 
 def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = silent) -> Rung:
