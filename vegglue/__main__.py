@@ -11,7 +11,7 @@ def enter() -> None:
 
         main()
     except KeyboardInterrupt:
-        print("Stopped; what was solved is kept, run the same command again to go on.", file=sys.stderr)
+        print("Stopped; solved members and finished steps are kept: run the same command again.", file=sys.stderr)
         sys.exit(130)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on Python only takes down what it has put up

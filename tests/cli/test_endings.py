@@ -56,7 +56,7 @@ def raises(error: BaseException) -> Callable[[], None]:
             "A link leads back to itself (Symlink loop from '/x')",
         ),
         (MemoryError(), 3, "The memory is full; what was finished is kept: run it again with fewer --jobs"),
-        (SystemExit(130), 130, "Stopped; what was solved is kept"),
+        (SystemExit(130), 130, "Stopped; solved members and finished steps are kept"),
         (SystemExit(2), 2, ""),
     ],
     ids=["mistake", "storage", "system", "unnamed", "link", "memory", "stopped", "usage"],
@@ -86,7 +86,9 @@ def test_ctrl_c_while_libraries_load_is_one_sentence(
     finally:
         signal.signal(signal.SIGINT, before)
     assert ended.value.code == 130
-    assert capsys.readouterr().err == "Stopped; what was solved is kept, run the same command again to go on.\n"
+    assert (
+        capsys.readouterr().err == "Stopped; solved members and finished steps are kept: run the same command again.\n"
+    )
 
 
 def test_runs_that_are_a_file_are_told(tmp_path: Path, say: Say) -> None:

@@ -283,3 +283,8 @@ def test_the_model_error_that_is_allowed_is_remarked() -> None:
 def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:
     hidden = a_suspect("wind", detectability={"testable": False, "cosine": -0.9})
     assert "wind (looks like a change of k_s)" in said(grounds(), [hidden])[2]
+
+
+def test_what_was_found_is_not_called_untestable() -> None:
+    hidden = [a_suspect(name, detectability={"testable": False}) for name in ("wind", "elder")]
+    assert "neither present nor absent: elder." in said(grounds(step("wind")), hidden)[2]

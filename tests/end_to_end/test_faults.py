@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         _, error = process.communicate(timeout=60)
     assert process.returncode == 130, error
-    assert "Stopped; what was solved is kept, run the same command again to go on." in error
+    assert "Stopped; solved members and finished steps are kept: run the same command again." in error
     assert "Traceback" not in error
     assert stored(tmp_path / PART)[0].size >= CHUNK
 

@@ -116,7 +116,7 @@ def test_ctrl_c_ends_what_is_under_way(tmp_path: Path) -> None:
     os.kill(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert "Stopped; what was solved is kept" in said
+    assert "Stopped; solved members and finished steps are kept" in said
     for line in lines_of(marks):
         with pytest.raises(ProcessLookupError):
             os.kill(int(line.split()[0]), 0)

@@ -33,7 +33,7 @@ def ending_well(command: Callable[[], object]) -> None:
         _end(f"A link leads back to itself ({error}); give another path.", MISTAKE)
     except SystemExit as ended:
         if ended.code == STOPPED:  # typer has made this of Ctrl-C
-            _end("Stopped; what was solved is kept, run the same command again to go on.", STOPPED)
+            _end("Stopped; solved members and finished steps are kept: run the same command again.", STOPPED)
         _flush()
         raise
     _flush()

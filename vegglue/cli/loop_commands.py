@@ -10,7 +10,7 @@ import vegglue
 from vegglue.cli.doubts import opened_case, opened_cases
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import FLAG, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
-from vegglue.cli.output import print_object
+from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
 
@@ -53,7 +53,7 @@ def import_command(
         f"{len(case.parameters)} parameters with wide priors."
     )
     if not quiet:
-        print(f"Next: vegglue check {target}, then vegglue run {target}")
+        print(f"Next: {command_line('check', target)}, then {command_line('run', target)}")
 
 
 def diagnose_command(
@@ -71,8 +71,8 @@ def diagnose_command(
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
     if not (quiet or as_object):
-        adds = found.steps or found.places
-        print(f"Next: vegglue extend {config} --auto" if adds else f"Next: vegglue next {config}")
+        following = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
+        print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
 
 
 def discover_command(
@@ -131,7 +131,8 @@ def extend_command(
         return
     print(f"{target}: {child.name}.")
     if not quiet:
-        print(f"Next: vegglue run {target}, or vegglue compare {config} {target}")
+        commands = (("run", target), ("compare", config, target))
+        print(f"Next: {', or '.join(command_line(*one, runs=runs, trust=trust) for one in commands)}")
 
 
 def compare_command(

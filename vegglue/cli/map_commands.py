@@ -8,7 +8,7 @@ import typer
 import vegglue
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import FLAG, Config, Json, Quiet, Runs, Trust
-from vegglue.cli.output import print_object
+from vegglue.cli.output import command_line, print_object
 from vegglue.errors import shown_path
 
 FORMS: tuple[Literal["csv", "geotiff", "netcdf"], ...] = ("csv", "geotiff", "netcdf")
@@ -37,7 +37,7 @@ def new_command(
         return
     print(f"{config}: a reach of {length:g} m with computed measurements beside it; put your own in their place.")
     if not quiet:
-        print(f"Next: vegglue check {config}, then vegglue run {config}")
+        print(f"Next: {command_line('check', config)}, then {command_line('run', config)}")
 
 
 def export_command(

@@ -2,19 +2,29 @@
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
+# Where results lie unless told.
+RUNS = Path("runs")
 # Letters of a line in a file or a pipe, where nothing has to be left out.
 WIDEST = 1000
 # Spaces between two columns of a table.
 COLUMN_GAP = 2
+
+
+def command_line(verb: str, *arguments: object, runs: Path = RUNS, trust: bool = False) -> str:
+    """A command that can be copied, with the options that the one before was given."""
+    options = [*(["--runs", str(runs)] if runs != RUNS else []), *(["--trust"] if trust else [])]
+    return shlex.join(["vegglue", verb, *map(str, arguments), *options])
 
 
 @cache

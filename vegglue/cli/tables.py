@@ -83,9 +83,9 @@ def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
     return [kind for kind in others if any(np.isfinite(one.in_sample.rmse[kind.name]) for one in rungs)]
 
 
-def show_questions(found: Sequence[Question]) -> None:
-    """For each question the four best measurements, or why none would do."""
+def show_questions(name: str, found: Sequence[Question]) -> None:
+    """For each question about a model the four best measurements, or why none would do."""
     if not found:
-        console().print("Nothing is left to be told apart; no further measurement is proposed.")
+        console().print(f"{name}: nothing is left to be told apart; no further measurement is proposed.")
     for question in found:
         console().print(repr(question))

@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.options import Force, Json, Quiet, Runs
-from vegglue.cli.output import print_object
+from vegglue.cli.output import command_line, print_object
 from vegglue.errors import shown_path
 
 
@@ -37,7 +37,7 @@ def twin_command(
         return
     print(f"{target}: {measurements} measurements.")
     if not quiet:
-        print(f"Next: vegglue diagnose {target}, then vegglue reveal {to}")
+        print(f"Next: {command_line('diagnose', target)}, then {command_line('reveal', to)}")
 
 
 def reveal_command(

@@ -41,7 +41,7 @@ def show(case: Case, runs: Path, result: Any) -> None:
             show_ladder(result)
             print(f"Drawn in {folder / 'ladder.png'}")
         case list():
-            show_questions(result)
+            show_questions(case.name, result)
         case Ensemble():
             print(f"{folder / 'ensemble.h5'}: {_solved(result)}")
         case Posterior():

@@ -270,8 +270,8 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> li
     if errors.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
     remarks += [words for one in grounds.findings.instruments if (words := _told_of(one)) not in sentence]
-    likely = {name for group in grounds.not_excluded for name in group}
-    hidden = [one for one in suspects if not one.detectability.testable and one.name not in likely]
+    told = {name for group in grounds.not_excluded for name in group} | {*_accepted(grounds.findings)}
+    hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
     if hidden:
         names = ", ".join(_untestable(suspect) for suspect in hidden)
         remarks.append(f"Untestable with these data, neither present nor absent: {names}.")

@@ -166,7 +166,7 @@ def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     families = [group for group in alike_groups(names, cosine) if len(group) > 1]
     finding = "No two of the strongest suspects leave the same trace"
     if families:
-        finding = f"These data cannot tell apart {'; nor '.join(_in_a_row(group) for group in families)}"
+        finding = f"To first order these leave the same trace: {'; '.join(_in_a_row(group) for group in families)}"
     caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(finding)}."
     yield published_picture(
         run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {finding}."
