@@ -73,8 +73,14 @@ def test_products_have_the_references_of_both_laws(model: Model) -> None:
     assert products["along"].candidate.amplitude.scale == pytest.approx(0.5 / (high - low), rel=0.05)
 
 
-@pytest.mark.parametrize(("p", "words"), [(0.4, "errors alone leave as much in 40 % of cases"), (0.001, "is missing")])
-def test_silence_says_whether_something_is_missing(p: float, words: str) -> None:
+@pytest.mark.parametrize(
+    ("p", "words"),
+    [
+        (0.4, "as much in 40 % of cases, 65 laws tried"),
+        (0.001, "as much in 0.1 % of cases, but no law or known effect"),
+    ],
+)
+def test_silence_says_how_often_errors_leave_as_much(p: float, words: str) -> None:
     assert words in Discovery(p, 65, (), {}).sentence
 
 

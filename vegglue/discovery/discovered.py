@@ -141,7 +141,8 @@ class Discovery:
             name, chance = max(self.others.items(), key=lambda pair: pair[1])
             return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
         if self.p <= FALSE_ALARMS:
-            return "No law is found: something is missing, but no law or known effect explains enough of it."
+            rarely = f"errors alone leave as much in {100 * max(self.p, 0.001):.1g} % of cases"
+            return f"No law is found: {rarely}, but no law or known effect explains enough of it."
         return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
 
     def __repr__(self) -> str:
