@@ -20,6 +20,8 @@ from vegglue.in_short import so_many
 MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
+# Words of a heading that say across; V alone says none, and may be the velocity.
+ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -184,11 +186,19 @@ def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
         known = role_of(heading)
         if known is not None and known[0] not in found and place not in found.values():
             found[known[0]] = place
+    if "v" not in words.columns and _is_the_speed(found, table.headings):
+        found["u"] = found.pop("v")
     # One error for a velocity, not for a component of it, is that of both.
     across = next((role for role in ("v", "north_velocity") if role in found), None)
     if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
         found["v_se"] = found["u_se"]
     return found
+
+
+def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
+    """Whether a column V stands for the velocity: there is no other, and its name says no direction."""
+    alone = not any(ROLES[role].quantity == "velocity" for role in found if role not in ("v", "u_se", "u_std"))
+    return "v" in found and alone and not ACROSS & set(words_of(headings[found["v"]]).split())
 
 
 def _of_one(heading: str) -> bool:
