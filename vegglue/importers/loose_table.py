@@ -53,7 +53,7 @@ def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
     Errors: InputError when the file cannot be read or holds no table of numbers with two columns or more.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        return _table(path, _sheet(path, sheet), "workbook", decimal_comma=False)
+        return _table(path, _sheet(path, sheet), "workbook", "")
     lines, comments = _without_comments(readable_text(path))
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
@@ -63,7 +63,7 @@ def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
         "decimal comma" if comma else "",
         so_many(comments, "comment line") if comments else "",
     ]
-    return _table(path, fields, ", ".join(word for word in words if word), comma)
+    return _table(path, fields, ", ".join(word for word in words if word), separator, comma)
 
 
 def readable_text(path: Path) -> str:
@@ -97,7 +97,7 @@ def _separator(lines: Sequence[str]) -> str:
     """That which cuts most lines into equally many fields, two or more."""
     found, best = " ", 0.0
     for separator in SEPARATORS:
-        counts = Counter(len(_fields(line, separator)) for line in lines[-LOOKED_AT:])
+        counts = Counter(len(_filled(_fields(line, separator))) for line in lines[-LOOKED_AT:])
         fields, lines_with = counts.most_common(1)[0] if counts else (0, 0)
         share = lines_with / sum(counts.values()) if fields > 1 else 0.0
         if share > best + 0.2:
@@ -108,10 +108,13 @@ def _separator(lines: Sequence[str]) -> str:
 def _fields(line: str, separator: str) -> list[str]:
     if separator == " ":
         return line.split()
-    fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    while len(fields) > 1 and not fields[-1].strip():
-        fields.pop()  # lines may end in separators
-    return [field.strip() for field in fields]
+    return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+
+
+def _filled(fields: list[str]) -> list[str]:
+    """The fields without empty ones behind them: lines may end in separators."""
+    last = next((place for place in range(len(fields), 1, -1) if fields[place - 1]), 1)
+    return fields[:last]
 
 
 def _has_decimal_comma(lines: Sequence[Line]) -> bool:
@@ -119,22 +122,57 @@ def _has_decimal_comma(lines: Sequence[Line]) -> bool:
     return any("," in field for field in numbers) and not any("." in field for field in numbers)
 
 
-def _table(path: Path, lines: list[Line], form: str, decimal_comma: bool) -> LooseTable:
+def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool = False) -> LooseTable:
     """The longest stretch of rows of numbers, with the heading and the units above it."""
+    lines = [(number, _filled(fields)) for number, fields in whole]
     numeric = [sum(map(is_number, fields)) * 2 >= len(fields) > 1 for _, fields in lines]
     if not any(numeric):
         raise InputError(f"{shown_path(path)}: expected a table of numbers, got none; check the file.")
-    widths = Counter(len(fields) for (_, fields), rows in zip(lines, numeric, strict=True) if rows)
+    first, begin, width = _begin(lines, numeric)
+    head, of_units = first - 1, False
+    if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
+        form, head, of_units = f"{form}, a row of units", head - 1, True
+    named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
+    rows = [line for line in lines[first:] if len(line[1]) > 1]
+    room = len(whole[head][1]) if named else width
+    _refuse_longer(path, rows if named else lines[begin:], room, separator, named)
+    width = max(width, min(room, max(len(fields) for _, fields in rows)))
+    units = tuple(_padded(lines[first - 1][1] if of_units else [], width))
+    headings = _padded(lines[head][1], width) if named else [str(number) for number in range(1, width + 1)]
+    kept = tuple((number, _padded(fields, width)) for number, fields in rows)
+    return LooseTable(tuple(headings), units, kept, decimal_comma, form if named else f"{form}, no heading")
+
+
+def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, int]:
+    """The first row of the table, the first of all rows of numbers around it, and the usual number of fields.
+
+    Rows of other widths belong to it where words stand above them: its first rows may lack or have a field.
+    """
+    widths = Counter(len(fields) for (_, fields), row in zip(lines, numeric, strict=True) if row)
     width = widths.most_common(1)[0][0]
     first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
-    head, units = first - 1, ("",) * width
-    if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
-        units = tuple(_padded(lines[head][1], width))
-        form, head = f"{form}, a row of units", head - 1
-    named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
-    headings = _padded(lines[head][1], width) if named else [str(number) for number in range(1, width + 1)]
-    rows = tuple((number, _padded(fields, width)) for number, fields in lines[first:] if len(fields) > 1)
-    return LooseTable(tuple(headings), units, rows, decimal_comma, form if named else f"{form}, no heading")
+    begin = first - next((i for i, row in enumerate(reversed(numeric[:first])) if not row), first)
+    return begin if begin > 0 and len(lines[begin - 1][1]) > 1 else first, begin, width
+
+
+def _refuse_longer(path: Path, rows: Sequence[Line], width: int, separator: str, named: bool) -> None:
+    """Errors: InputError for the first row whose fields may stand in the columns of others, as it has too many.
+
+    A comma may be that of a number, wherever it stands; elsewhere words behind the last column are a remark.
+    """
+    for number, fields in rows:
+        if len(fields) > width and (separator == "," or any(map(is_number, fields[width:]))):
+            advice = (
+                "if numbers are written with a decimal comma, part fields by semicolons or tabs, and put text with "
+                "commas in quotes"
+                if separator == ","
+                else "mend the row, or give each of its fields a heading"
+            )
+            pattern = "the heading" if named else "others"
+            raise InputError(
+                f"{shown_path(path)}, row {number}: expected {width} fields as in {pattern}, got "
+                f"{len(fields)}; {advice}."
+            )
 
 
 def _padded(fields: list[str], width: int) -> list[str]:

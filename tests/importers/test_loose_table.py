@@ -1,0 +1,60 @@
+"""Rows that do not fit their heading: refused where their numbers may stand in the columns of others, else read."""
+
+from pathlib import Path
+
+import pytest
+
+from vegglue.errors import InputError
+from vegglue.importers.loose_table import read_loosely
+
+HEADING = "experiment,section,x,y,u,u_se"
+ROWS = [f"low,D{number},{number}.0,-1.5,0.5718,0.012" for number in range(12)]
+
+
+def table_of(folder: Path, *lines: str) -> Path:
+    path = folder / "v.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def commas_in_x(row: str) -> str:
+    return row.replace(".0,", ",0,", 1)
+
+
+@pytest.mark.parametrize(
+    ("rows", "wrong", "fields"),
+    [
+        ([*ROWS[:8], commas_in_x(ROWS[8]), *ROWS[9:]], 10, 7),
+        ([*map(commas_in_x, ROWS[:5]), *ROWS[5:]], 2, 7),
+        ([row.replace("0.012", "0,012") for row in ROWS], 2, 7),
+        ([f"low,D0,3,0,-1,5,0,5718,0,0{number}" for number in range(12)], 2, 10),
+    ],
+)
+def test_decimal_commas_between_commas_are_refused(tmp_path: Path, rows: list[str], wrong: int, fields: int) -> None:
+    """Their row was read with its columns shifted, and averaged into a sound station."""
+    said = rf"v\.csv, row {wrong}: expected 6 fields as in the heading, got {fields}; if numbers are written with a dec"
+    with pytest.raises(InputError, match=said):
+        read_loosely(table_of(tmp_path, HEADING, *rows))
+
+
+def test_a_longer_row_without_a_heading_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"row 1: expected 3 fields as in others, got 4; if numbers"):
+        read_loosely(table_of(tmp_path, "1,5,2.0,0.3", "1.5,2.1,0.3", "1.5,2.2,0.3"))
+    with pytest.raises(InputError, match=r"row 2: expected 3 fields as in the heading, got 4; mend the row"):
+        read_loosely(table_of(tmp_path, "x;y;u", "1.5;2.1;0.3;0.3", "1.5;2.2;0.3"))
+
+
+@pytest.mark.parametrize(
+    ("lines", "headings", "first"),
+    [
+        (["x,y,u,", "1,2,0.5,dry,", "3,4,0.6,,,"], ("x", "y", "u", ""), ["1", "2", "0.5", "dry"]),
+        (["x,y,u,u_se", "1,2,0.5", "3,4,0.6", "5,6,0.7,0.1"], ("x", "y", "u", "u_se"), ["1", "2", "0.5", ""]),
+        (["x,y,u,u_se", "m,m,m/s,m/s", "1,2,0.5", "3,4,0.6,0.1"], ("x", "y", "u", "u_se"), ["1", "2", "0.5", ""]),
+        (["x y u", "1 2 0.5 top of bank", "3 4 0.6", "5 6 0.7"], ("x", "y", "u"), ["1", "2", "0.5"]),
+        (["Brook; 3 June", "x;y;u;;", "1;2;0.5;;", "# 7;7;7;7;7;7;7", "3;4;0.6"], ("x", "y", "u"), ["1", "2", "0.5"]),
+    ],
+)
+def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tuple[str, ...], first: list[str]) -> None:
+    table = read_loosely(table_of(tmp_path, *lines))
+    assert table.headings == headings
+    assert table.rows[0][1] == first
