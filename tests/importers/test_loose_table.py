@@ -1,9 +1,11 @@
-"""Rows that do not fit their heading: refused where their numbers may stand in the columns of others, else read."""
+"""Rows that are not as the others: refused where their numbers may stand in wrong columns, else read or counted."""
 
 from pathlib import Path
 
 import pytest
+from field_folders import field_folder
 
+import vegglue
 from vegglue.errors import InputError
 from vegglue.importers.loose_table import read_loosely
 
@@ -58,3 +60,29 @@ def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tupl
     table = read_loosely(table_of(tmp_path, *lines))
     assert table.headings == headings
     assert table.rows[0][1] == first
+
+
+def told_of(folder: Path, *lines: str) -> str:
+    """What is told of a table of measurements in a folder of a field team."""
+    table_of(field_folder(folder), *lines)
+    imported = vegglue.import_folder(folder, folder.parent / "brook.yaml").imported
+    assert imported is not None
+    return imported[0].taken
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("low,B,20,0,{},0.01", ["4 rows left out for want of u:", "4 marks for no value in u;"]),
+        ("low,B,20,0,,0.01", ["4 rows left out for want of u:", "4 empty cells in u;"]),
+        ("low,B,,0,0.5,0.01", ["4 rows left out for want of x or y:", "4 empty cells in x;"]),
+        ("low,B,20,0", ["4 rows left out for want of u:", "4 empty cells in u, 4 empty cells in u_se;"]),
+        ("none", ["commas, 4 lines of one field left out;"]),
+    ],
+)
+def test_rows_left_out_are_counted(tmp_path: Path, row: str, told: list[str]) -> None:
+    """Of four marks one was counted, and of empty cells and short rows none."""
+    said = told_of(tmp_path / "brook", HEADING, *ROWS, *(row.format(mark) for mark in ("-999", "NaN", "n/a", "-")))
+    assert said.startswith("12 of velocity")
+    for words in told:
+        assert words in said

@@ -140,7 +140,9 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
     units = tuple(_padded(lines[first - 1][1] if of_units else [], width))
     headings = _padded(lines[head][1], width) if named else [str(number) for number in range(1, width + 1)]
     kept = tuple((number, _padded(fields, width)) for number, fields in rows)
-    return LooseTable(tuple(headings), units, kept, decimal_comma, form if named else f"{form}, no heading")
+    lone = len(lines) - first - len(rows)
+    form += ("" if named else ", no heading") + (f", {so_many(lone, 'line')} of one field left out" if lone else "")
+    return LooseTable(tuple(headings), units, kept, decimal_comma, form)
 
 
 def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, int]:

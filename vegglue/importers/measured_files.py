@@ -165,10 +165,11 @@ def _brought(
     read = [with_experiments(reader_of(path)(path, words), experiments) for path, words in group]
     placed = [in_the_channel(one, place, words) for one, (_, words) in zip(read, group, strict=True)]
     path, words = group[0]
-    tables = station_tables(joined_rows(placed), path.stem, words, experiments, place, f"{shown_path(path)}:")
-    made = ", ".join(table.said for table in tables) or "no measurement, left out"
-    said = [f"{made if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)]
-    return tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
+    made = station_tables(joined_rows(placed), path.stem, words, experiments, place, f"{shown_path(path)}:")
+    said = [
+        f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)
+    ]
+    return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
 
 
 def _write(path: Path, table: StationTable) -> None:

@@ -81,12 +81,11 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
             texts[role] = fields
             continue
         units[role] = _unit(path, table, place, role, words)
-        values, marked = _numbers(path, table, place, words.missing)
+        values, absent = _numbers(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
         if ROLES[role].quantity == "velocity":
             said += _doubted(values, table.headings[place])
-        if marked:
-            said.append(f"{so_many(marked, 'mark')} for no value in {table.headings[place]}")
+        said += [f"{many} in {table.headings[place]}" for many in absent]
     if not numbers:
         known = ", ".join(sorted(ROLES))
         raise InputError(
@@ -228,7 +227,8 @@ def _bracketed(heading: str) -> str:
     return heading[heading.rfind("[") + 1 : -1] if heading.endswith("]") and "[" in heading else ""
 
 
-def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, int]:
+def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, list[str]]:
+    """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty."""
     values = np.full(len(table.rows), np.nan)
     for i, (line, row) in enumerate(table.rows):
         try:
@@ -244,7 +244,11 @@ def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]
         | (np.abs(values) > LARGEST_OF_ALL)
         | np.array([_nines(one) for one in values], dtype=bool)
     )
-    return np.where(marked, np.nan, values), int(marked.sum())
+    empty = sum(not row[place].strip() for _, row in table.rows)
+    values = np.where(marked, np.nan, values)
+    marks = int(np.isnan(values).sum()) - empty
+    absent = [f"{so_many(marks, 'mark')} for no value"] if marks else []
+    return values, absent + ([so_many(empty, "empty cell")] if empty else [])
 
 
 def _nines(value: float) -> bool:

@@ -1,17 +1,18 @@
 """Measured rows as tables that a case names: points in the vertical, or stations of each kind."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
+from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, Kind
 
 # Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
@@ -33,15 +34,40 @@ class StationTable:
     said: str
 
 
+@dataclass(frozen=True)
+class StationTables:
+    """The tables of one file; left_out: how many of its rows are in none of them and what they lack, in words."""
+
+    tables: list[StationTable]
+    left_out: tuple[str, ...]
+
+    @property
+    def said(self) -> str:
+        """What was made of the rows."""
+        made = [table.said for table in self.tables] or ["no measurement, left out"]
+        return ", ".join([*made, *self.left_out])
+
+
 def station_tables(
     taken: Taken, stem: str, words: FileWords, experiments: Sequence[str], place: Placement, where: str
-) -> list[StationTable]:
+) -> StationTables:
     """The tables of what was taken from one file. Errors: InputError, which begins with `where`."""
+    no_place = _lacking(taken, [role for role in ("x", "y") if role in taken.numbers], np.all)
     taken = _named(taken, words, experiments, where)
     if _in_verticals(taken):
-        return [_points(taken, stem, words)]
-    found = [_stations(taken, stem, words, kind, place) for kind in KINDS.values() if kind.column in taken.numbers]
-    return [table for table in found if table.rows]
+        return StationTables([_points(taken, stem, words)], (*no_place, *_lacking(taken, ["u", "z"], np.all)))
+    kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
+    found = [_stations(taken, stem, words, kind, place) for kind in kinds]
+    no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
+    return StationTables([table for table in found if table.rows], (*no_place, *no_value))
+
+
+def _lacking(taken: Taken, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
+    """`2 rows left out for want of x or y`, where all or any of the roles are needed; nothing where no row is."""
+    if not roles:
+        return ()
+    lacking = int((~needed([np.isfinite(taken.numbers[role]) for role in roles], axis=0)).sum())
+    return (f"{so_many(lacking, 'row')} left out for want of {' or '.join(roles)}",) if lacking else ()
 
 
 def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> Taken:
