@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES, role_of, words_of
+from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
 from vegglue.importers.placement import Placement
@@ -65,7 +66,7 @@ class Taken:
 
 def read_rows(path: Path, words: FileWords) -> Taken:
     """What a file of columns holds, in SI. Errors: InputError, naming file, row and column."""
-    return rows_of_table(path, read_loosely(path, words.sheet), words)
+    return rows_of_table(path, without_copies(read_loosely(path, words.sheet)), words)
 
 
 def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
