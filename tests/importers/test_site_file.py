@@ -117,6 +117,8 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, said: str) -> None:
 def test_an_experiment_keeps_its_name(tmp_path: Path, name: str) -> None:
     assert safe_yaml(as_yaml({name: {"a": name}})) == {name: {"a": name}}
     folder = field_folder(tmp_path / "site", experiments={name: SITE["experiments"]["low"]})
+    for table in (folder / "velocities.csv", folder / "levels.csv"):
+        table.write_text(table.read_text(encoding="utf-8").replace("low", name), encoding="utf-8")
     assert list(import_folder(folder, tmp_path / "site.yaml").experiments) == [name]
     assert list(load_case(tmp_path / "site.yaml").experiments) == [name]
 

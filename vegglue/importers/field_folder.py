@@ -29,7 +29,7 @@ from vegglue.importers.config_parts import (
     wall_prior,
 )
 from vegglue.importers.drawn_centreline import drawn_centreline
-from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record
+from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record, write_tables
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.site_file import (
@@ -71,6 +71,7 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
     measured = measured_files(folder, target, site, place, used)
+    held_out = held_out_files(folder, target, site, place)
     unknown = _viscosity(site)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
@@ -88,18 +89,17 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
         tree["parameters"].pop("k_s")
     if site.walls is not None:
         tree |= _as_flume(tree, site.walls.n)
-    held_out = held_out_files(folder, target, site, place)
     if held_out.observations:
         tree |= validated({name: _experiment(given) for name, given in site.holdout.items()}, held_out.observations)
         measured.imported.extend(held_out.imported)
     if drawn is not None:
         tree["grid"]["centreline"] = drawn.shape
         said = folder / given.file if isinstance(given, FileOfSite) else site_file(folder)
-        words = {"columns": drawn.columns, "units": drawn.units}
-        measured.imported.insert(0, record(said, None, drawn.taken) | words)
+        measured.imported.insert(0, record(said, None, drawn.taken) | {"columns": drawn.columns, "units": drawn.units})
     if patches:
         tree["plants"] = _plants(patches)
         tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
+    write_tables(target, [*measured.tables, *held_out.tables])
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
     return tree | kept | ({"imported": measured.imported} if measured.imported else {})
 

@@ -17,11 +17,13 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords, file_words
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
+from vegglue.importers.known_experiments import EXPERIMENTS, KnownExperiments
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
-from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_file
+from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_file, site_file
 from vegglue.importers.stations import StationTable, station_tables
+from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 
 # Endings of files that may hold measurements; others need an entry in `files`.
@@ -35,10 +37,13 @@ KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": ki
 
 @dataclass(frozen=True)
 class MeasuredFiles:
-    """observations: entries of a case; imported: for each file that was brought into another form what was taken."""
+    """observations: entries of a case; imported: for each file that was brought into another form what was taken;
+    tables: what is to be written into the folder of data.
+    """
 
     observations: list[Tree]
     imported: list[Tree]
+    tables: list[StationTable]
 
 
 def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement, used: Sequence[str]) -> MeasuredFiles:
@@ -47,7 +52,8 @@ def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement
     Errors: InputError where there are none, or one cannot be read.
     """
     said = _entries(folder, site)
-    found = _read(_candidates(folder, said, used), said, target, place, list(site.experiments))
+    known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
+    found = _read(_candidates(folder, said, used), said, target, place, known)
     if not found.observations:
         files = ", ".join(kind.file for kind in KINDS.values())
         raise InputError(
@@ -63,29 +69,40 @@ def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement
     Errors: InputError where a file cannot be read.
     """
     paths = [path for path in (held_out_file(folder),) if path is not None and site.holdout]
-    return _read(paths, _entries(folder, site), target, place, list(site.holdout))
+    known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
+    return _read(paths, _entries(folder, site), target, place, known)
+
+
+def write_tables(target: Path, tables: Sequence[StationTable]) -> None:
+    """Write tables beside the config, when all files were read and none was refused."""
+    for table in tables:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([table.heading, *table.rows])
+        write_text(data_folder(target) / table.file, text.getvalue(), "give another place by --to")
 
 
 def _read(
-    paths: Sequence[Path], said: Mapping[str, FileWords], target: Path, place: Placement, experiments: list[str]
+    paths: Sequence[Path], said: Mapping[str, FileWords], target: Path, place: Placement, known: KnownExperiments
 ) -> MeasuredFiles:
     """Tables that a case can name stay where they are; others are brought into that form beside the config."""
     found: list[Tree] = []
     imported: list[Tree] = []
+    written: list[StationTable] = []
     others = []
     for path in paths:
         kind = KIND_OF_FILE.get(path.name)
         if kind is not None and path.name not in said and not place.turned and _is_plain(path, kind):
+            _check_plain(path, kind, known)
             found.append(observed(kind.name, named_from(path, target)))
         else:
             others.append((path, said.get(path.name, FileWords())))
     for group in _groups(others):
-        tables, records = _brought(group, place, experiments)
+        tables, records = _brought(group, place, known)
+        written += tables
         for table in tables:
-            _write(data_folder(target) / table.file, table)
             found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
         imported += records
-    return MeasuredFiles(found, imported)
+    return MeasuredFiles(found, imported, written)
 
 
 def data_folder(target: Path) -> Path:
@@ -143,6 +160,14 @@ def _is_plain(path: Path, kind: Kind) -> bool:
     return {"experiment", kind.column, *place} <= set(heading)
 
 
+def _check_plain(path: Path, kind: Kind, known: KnownExperiments) -> None:
+    """Errors: InputError where a table that stays where it is lacks a value, or is of another experiment."""
+    names = ("experiment", *(["section"] if kind.velocity else []))
+    place = ("x", *(["y"] if kind.at_point else []))
+    rows = read_table(path, names, (*place, kind.column), (kind.error_column,))
+    known.refuse_unknown(shown_path(path), rows.index.tolist(), rows["experiment"].tolist())
+
+
 def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, FileWords]]]:
     """Each file for itself, but records of one point together where they belong to one section."""
     groups: dict[object, list[tuple[Path, FileWords]]] = {}
@@ -153,7 +178,7 @@ def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, Fi
 
 
 def _brought(
-    group: Sequence[tuple[Path, FileWords]], place: Placement, experiments: list[str]
+    group: Sequence[tuple[Path, FileWords]], place: Placement, known: KnownExperiments
 ) -> tuple[list[StationTable], list[Tree]]:
     """The tables of the files of a group, and what the config keeps of each file."""
     for path, words in group:
@@ -162,17 +187,11 @@ def _brought(
                 f"{shown_path(path)}: expected no `flip` of places on the map of a centreline; where velocities run "
                 "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
             )
-    read = [with_experiments(reader_of(path)(path, words), experiments) for path, words in group]
+    read = [with_experiments(reader_of(path)(path, words), known.names) for path, words in group]
     placed = [in_the_channel(one, place, words) for one, (_, words) in zip(read, group, strict=True)]
     path, words = group[0]
-    made = station_tables(joined_rows(placed), path.stem, words, experiments, place, f"{shown_path(path)}:")
+    made = station_tables(joined_rows(placed), path.stem, words, known, place, shown_path(path))
     said = [
         f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)
     ]
     return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
-
-
-def _write(path: Path, table: StationTable) -> None:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([table.heading, *table.rows])
-    write_text(path, text.getvalue(), "give another place by --to")

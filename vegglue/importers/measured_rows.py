@@ -31,7 +31,7 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 class Taken:
     """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
     each role came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns
-    that no role was found for, by heading.
+    that no role was found for, by heading; lines: the row of the file that each row stands in, none where it has none.
     """
 
     numbers: Mapping[str, Array]
@@ -40,6 +40,7 @@ class Taken:
     units: Mapping[str, str]
     said: tuple[str, ...]
     others: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    lines: Sequence[int] = ()
 
     @property
     def size(self) -> int:
@@ -53,7 +54,8 @@ class Taken:
             {name: [one for one, kept in zip(column, rows, strict=True) if kept] for name, column in texts.items()}
             for texts in (self.words, self.others)
         )
-        return replace(self, numbers=numbers, words=words, others=others)
+        lines = [line for line, kept in zip(self.lines, rows, strict=bool(self.lines)) if kept]
+        return replace(self, numbers=numbers, words=words, others=others, lines=lines)
 
     def having(self, numbers: Mapping[str, Array], *said: str) -> "Taken":
         """The rows with these numbers put in, None-valued roles left as they are, and what is said of it."""
@@ -96,7 +98,7 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
     named = {role: table.headings[place] for role, place in columns.items()}
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
     others = {table.headings[place]: [row[place] for _, row in table.rows] for place in unread}
-    return Taken(numbers, texts, named, units, tuple(said), others)
+    return Taken(numbers, texts, named, units, tuple(said), others, [line for line, _ in table.rows])
 
 
 def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
@@ -150,7 +152,7 @@ def joined_rows(parts: Sequence[Taken]) -> Taken:
     words = {role: [text for one in parts for text in one.words[role]] for role in first.words}
     shared = [name for name in first.others if all(name in one.others for one in parts)]
     others = {name: [text for one in parts for text in one.others[name]] for name in shared}
-    return replace(first, numbers=numbers, words=words, others=others)
+    return replace(first, numbers=numbers, words=words, others=others, lines=first.lines if len(parts) == 1 else ())
 
 
 def _in_all(role: str, parts: Sequence[Taken]) -> bool:

@@ -10,6 +10,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
 from vegglue.in_short import so_many
@@ -49,17 +50,27 @@ class StationTables:
 
 
 def station_tables(
-    taken: Taken, stem: str, words: FileWords, experiments: Sequence[str], place: Placement, where: str
+    taken: Taken, stem: str, words: FileWords, known: KnownExperiments, place: Placement, file: str
 ) -> StationTables:
-    """The tables of what was taken from one file. Errors: InputError, which begins with `where`."""
+    """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
     no_place = _lacking(taken, [role for role in ("x", "y") if role in taken.numbers], np.all)
-    taken = _named(taken, words, experiments, where)
+    taken = _named(taken, words, known.names, f"{file}:")
+    kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
+    _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
         return StationTables([_points(taken, stem, words)], (*no_place, *_lacking(taken, ["u", "z"], np.all)))
-    kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     return StationTables([table for table in found if table.rows], (*no_place, *no_value))
+
+
+def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str) -> None:
+    """Errors: InputError where a row that holds a value, or the entry of its file, names another experiment."""
+    if words.experiment is not None and words.experiment not in known.names:
+        raise InputError(f"{file}: {known.remedy(words.experiment)}; or correct `experiment` of this file.")
+    if columns and taken.lines:
+        measured = taken.only(np.any([np.isfinite(taken.numbers[column]) for column in columns], axis=0))
+        known.refuse_unknown(file, measured.lines, measured.words["experiment"])
 
 
 def _lacking(taken: Taken, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:

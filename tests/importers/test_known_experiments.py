@@ -1,0 +1,51 @@
+"""Rows of experiments that the site file lacks are refused with their own file and row, and nothing is written."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from field_folders import field_folder
+
+import vegglue
+from vegglue.errors import InputError
+
+OF_SITE = "is not in site.json: add it under `{}`, or take its rows out"
+CONVERTED = "experiment;section;x;y;u [cm/s]\nlow;A;12;0,5;45\n{};B;14;0,5;46\n"
+PLAIN = "experiment,section,x,y,u,u_se\nlow,A,12,0.5,0.45,0.01\nflood,A,14,0.5,0.46,0.01\n"
+HELD = "experiment,section,x,y,u\nhigh,A,12,0.5,0.6\nflood,A,14,0.5,0.6\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "said"),
+    [
+        ("survey.txt", CONVERTED.format("flood"), "row 3: experiment `flood` " + OF_SITE.format("experiments")),
+        ("velocities.csv", PLAIN, "row 3: experiment `flood` " + OF_SITE.format("experiments")),
+        ("holdout.csv", HELD, "row 3: experiment `flood` " + OF_SITE.format("holdout")),
+        ("holdout.csv", HELD.replace(",", ";"), "row 3: experiment `flood` " + OF_SITE.format("holdout")),
+        ("survey.txt", CONVERTED.format("high"), "row 3: experiment `high` is under `holdout` in site.json: put its "),
+        ("survey.txt", CONVERTED.format(""), "row 3: expected an experiment, one of low, got nothing; fill it in"),
+        ("levels.csv", "experiment,x,y,level\nlow,2,0,\n", "row 2: expected a number in column level, got ''"),
+    ],
+)
+def test_rows_that_the_site_file_does_not_know_are_refused(tmp_path: Path, name: str, table: str, said: str) -> None:
+    """The message named a generated file and no remedy, and the config stayed behind."""
+    folder = field_folder(tmp_path / "brook")
+    (folder / name).write_text(table, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        vegglue.import_folder(folder, tmp_path / "made" / "brook.yaml")
+    assert f"brook/{name}, {said}" in str(refused.value)
+    assert not (tmp_path / "made").exists()
+
+
+def test_an_entry_of_files_names_a_known_experiment(tmp_path: Path) -> None:
+    entry: dict[str, Any] = {"files": {"velocities.csv": {"experiment": "lo"}}}
+    folder = field_folder(tmp_path / "brook", **entry)
+    said = r"velocities\.csv: experiment `lo` is not in site\.json: .*; or correct `experiment` of this file"
+    with pytest.raises(InputError, match=said):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+def test_rows_without_a_value_may_name_any_experiment(tmp_path: Path) -> None:
+    folder = field_folder(tmp_path / "brook")
+    (folder / "survey.txt").write_text(CONVERTED.format("flood").replace("46", "-999"), encoding="utf-8")
+    assert vegglue.import_folder(folder, tmp_path / "brook.yaml").imported is not None
