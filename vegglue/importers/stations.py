@@ -1,6 +1,6 @@
 """Measured rows as tables that a case names: points in the vertical, or stations of each kind."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
+from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats
 from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, Kind
 
@@ -20,7 +21,6 @@ from vegglue.measurements.kinds import KINDS, Kind
 ONE_PLACE = 0.001
 # Stations of one section lie within so much of one another along the channel [m], where no section is named.
 SECTION_GAP = 0.25
-FEWEST_REPEATS = 3  # values at one place from which their scatter gives a standard error
 Row = list[str]
 
 
@@ -134,7 +134,7 @@ def _in_verticals(taken: Taken) -> bool:
     return len(set(keys)) * 2 <= len(keys)
 
 
-def _places(taken: Taken) -> list[tuple[str, str, float, float]]:
+def _places(taken: Taken) -> list[PlaceKey]:
     x, y = (np.round(taken.numbers[role] / ONE_PLACE) * ONE_PLACE for role in ("x", "y"))
     words = taken.words
     return list(zip(words["experiment"], words["section"], x.tolist(), y.tolist(), strict=True))
@@ -186,7 +186,7 @@ def _section_observation(file: str, name: str, words: FileWords, across: bool) -
 
 
 def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Placement) -> StationTable:
-    """Stations of one kind; values at one place are averaged, and their scatter is the error where none is given.
+    """Stations of one kind; values at one place are averaged, and their scatter gives errors where none is stated.
 
     What was measured at a point stands on the map of its centreline, as a case reads it.
     """
@@ -194,32 +194,19 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     errors = kept.numbers.get(kind.error_column)
     if errors is None:
         errors = np.full(kept.size, np.nan if words.standard_error is None else words.standard_error)
-    gathered: dict[tuple[str, str, float, float], list[tuple[float, float]]] = {}
+    gathered: dict[PlaceKey, list[RepeatedValue]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
     x, y = np.array([place[2:] for place in gathered]).reshape(-1, 2).T
     x, y = channel.to_case(x, y) if kind.at_point else (x, y)
     rows = [
-        [*place[:2], *map(_number, (*at, *_mean(values)))]
-        for (place, values), at in zip(gathered.items(), zip(x.tolist(), y.tolist(), strict=True), strict=True)
+        [*place[:2], *map(_number, (*at, *mean))]
+        for place, mean, *at in zip(gathered, means_of_repeats(gathered), x.tolist(), y.tolist(), strict=True)
     ]
-    repeats = kept.size - len(rows)
     file = f"{stem}-{kind.name}.csv"
-    said = f"{len(rows)} of {kind.words}" + (f", {repeats} repeats averaged" if repeats else "")
+    said = f"{len(rows)} of {kind.words}{said_of_repeats(gathered)}"
     heading = ("experiment", "section", "x", "y", kind.column, kind.error_column)
     return StationTable(file, heading, rows, (observed(kind.name, file),), said)
-
-
-def _mean(values: list[tuple[float, float]]) -> Iterator[float]:
-    """Mean, and its standard error: from those given, or s / sqrt(n); 0 for unknown where there is neither."""
-    value, error = (np.array(part) for part in zip(*values, strict=True))
-    yield float(value.mean())
-    if np.isfinite(error).all():
-        yield float(np.sqrt((error**2).sum()) / error.size)
-    elif value.size >= FEWEST_REPEATS:
-        yield float(value.std(ddof=1) / np.sqrt(value.size))
-    else:
-        yield 0.0
 
 
 def _number(value: float) -> str:
