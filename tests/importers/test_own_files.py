@@ -17,6 +17,7 @@ from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import read_rows
 from vegglue.importers.unit_words import in_si, unit_named
 from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_folder import assumptions_of
 
 CHANNEL = "channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
@@ -355,3 +356,14 @@ def test_import_says_which_measurements_lack_errors(
     assert code == 0
     assert "no standard error is stated for 1 of velocity, the first at x = 8, y = 0 m: add a column `u_se`" in told
     assert "`files: {NAME.csv: {standard_error: 5 mm}}`" in told
+
+
+@pytest.mark.parametrize(("slope", "beyond"), [(1.0, 0.2), (0.5, 0.2), (0.15, 0.075)])
+def test_flat_banks_of_a_channel_are_banks(tmp_path: Path, slope: float, beyond: float) -> None:
+    site = CHANNEL.replace("v_per_h: 0.5", f"v_per_h: {slope}") + JUNE
+    case = vegglue.import_folder(folder_of(tmp_path / "b", site, a__csv="x,y,u\n8,0,0.4\n"), tmp_path / "b.yaml")
+    assert [zone.beyond_slope_break for zone in case.friction.zones] == [beyond]
+    cells = build_site(case)
+    outside = cells.friction_class == cells.class_names.index("bank")
+    assert outside[:, np.abs(cells.grid.y) > 1.5].all()
+    assert not outside[:, np.abs(cells.grid.y) < 1.4].any()

@@ -10,6 +10,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_canopies,
     remarks_on_friction_classes,
     remarks_on_patches,
+    remarks_on_unnamed_banks,
 )
 from vegglue.checks.directions import remarks_on_directions
 from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
@@ -33,6 +34,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_kept_fields(case, site),
         remarks_on_patches(case, site),
         remarks_on_friction_classes(case, site),
+        remarks_on_unnamed_banks(case, site),
         remarks_on_idle_parameters(case, site),
         remarks_on_boundaries(case, site),
         remarks_on_steep_flow(case, site),

@@ -36,9 +36,9 @@ def import_command(
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
     imported = [one.model_dump() for one in case.imported or ()]
-    from vegglue.workflow.import_folder import assumptions_of, without_errors
+    from vegglue.workflow.import_folder import assumptions_of, unnamed_banks, without_errors
 
-    assumed, unstated = assumptions_of(folder), without_errors(case)
+    assumed, unstated = [*assumptions_of(folder), *unnamed_banks(case)], without_errors(case)
     if unstated is not None:
         print(f"`diagnose` and `run` will refuse this: {unstated}", file=sys.stderr)
     if as_object:

@@ -15,6 +15,7 @@ from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.banks import OF_TRAPEZOID, bank_break, roughness_of_banks, with_banks
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MANNING_BED,
@@ -73,20 +74,19 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     measured = measured_files(folder, target, site, place, used)
     held_out = held_out_files(folder, target, site, place)
     unknown = _viscosity(site)
+    ground = _ground(folder, target, site, place, measured)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
-        **_ground(folder, target, site, place, measured),
+        **ground,
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
         "eddy_viscosity": VISCOSITY if unknown else site.eddy_viscosity_m2_s,
         "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
-        "parameters": PARAMETERS | unknown,
+        "parameters": PARAMETERS | roughness_of_banks(ground["friction"]) | unknown,
         "observations": measured.observations,
         **FIRST_LOOK,
     }
-    if site.bed is not None or site.walls is not None:
-        tree["parameters"].pop("k_s")
     if site.walls is not None:
         tree |= _as_flume(tree, site.walls.n)
     if held_out.observations:
@@ -112,9 +112,8 @@ def _ground(folder: Path, target: Path, site: FieldSite, place: Placement, measu
         return ground.tree
     grid = _grid(site, site.channel, place)
     friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
-    if site.walls is None:
-        friction["classes"]["bank"] = {"law": "keulegan", "k_s": "k_s"}
-        friction["zones"] = [{"class": "bank", "beyond_slope_break": 0.2}]
+    if (steeper := bank_break(site)) is not None:
+        friction = with_banks(friction, min(OF_TRAPEZOID, steeper))
     return {"grid": grid, "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}], "friction": friction}
 
 
@@ -143,10 +142,7 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
     return found
 
 
-PARAMETERS: Tree = {
-    "n_b": bed_prior(0.01, 0.2),
-    "k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks"),
-}
+PARAMETERS: Tree = {"n_b": bed_prior(0.01, 0.2)}
 # Of plaster and glass up to cobbles.
 BED_OF_FLUME = bed_prior(0.005, 0.05)
 PHI = loguniform_prior(0.02, 100.0, "-", "φ", "drag of the densest patches")

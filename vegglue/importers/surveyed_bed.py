@@ -11,6 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.banks import BANK, bank_break, found_banks, with_banks
 from vegglue.importers.config_parts import MANNING_BED, even
 from vegglue.importers.file_words import file_words
 from vegglue.importers.measured_files import data_folder, record
@@ -18,7 +19,7 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.terrain_files import RASTERS, Terrain, filled, read_terrain
-from vegglue.site.grid import centres
+from vegglue.site.grid import Grid, centres
 
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
@@ -51,9 +52,10 @@ def surveyed_bed(folder: Path, target: Path, site: FieldSite, place: Placement) 
     beyond = _write_bed(data_folder(target) / file, terrain, grid, place)
     outside = f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level" if beyond > 0.0 else ""
     friction, imported = _friction(folder, site, place)
+    friction, banks = _banked(friction, site, terrain, grid, place)
     named = {form: f"{data_folder(target).name}/{name}" for form, name in layer.items()}
     tree = {"grid": grid, "bed": [named], "friction": friction}
-    return Ground(tree, [record(path, None, f"bed: {terrain.said}{outside}"), *imported])
+    return Ground(tree, [record(path, None, f"bed: {terrain.said}{outside}{banks}"), *imported])
 
 
 def _named(folder: Path, given: FileOfSite | None, key: str) -> Path:
@@ -105,6 +107,24 @@ def _ascii(x: Array, y: Array, size: float, level: Array) -> str:
     head |= {"cellsize": size, "nodata_value": NO_LEVEL}
     rows = [" ".join(f"{value:.4f}" for value in row) for row in level.T[::-1]]
     return "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
+
+
+def _banked(friction: Tree, site: FieldSite, terrain: Terrain, grid: Tree, place: Placement) -> tuple[Tree, str]:
+    """Friction with the banks that the site file states, as far as the survey has them, and what is said of them."""
+    steeper = bank_break(site)
+    if steeper is None or site.channel is None or BANK in friction["classes"]:
+        return friction, ""
+    cells = _cells(grid, place)
+    at = (part.ravel() for part in np.meshgrid(cells.x, cells.y, indexing="ij"))
+    level, _ = filled(terrain, *at)
+    found, said = found_banks(level.reshape(cells.x.size, cells.y.size), cells, site.channel, steeper)
+    return (with_banks(friction, steeper) if found else friction), f"; {said}"
+
+
+def _cells(grid: Tree, place: Placement) -> Grid:
+    (west, east), (south, north), (dx, dy) = grid["x"], grid["y"], grid["cell"]
+    along, across = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
+    return Grid(along, across, dx, dy, place.line)
 
 
 def _friction(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:

@@ -11,12 +11,15 @@ from vegglue.case.config import load_case
 from vegglue.case.made_files import write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
+from vegglue.checks.channel_and_plants import remarks_on_unnamed_banks
+from vegglue.errors import InputError
 from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
 from vegglue.measurements.kinds import unstated_errors
 from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -50,6 +53,14 @@ def assumptions_of(folder: Path | str) -> list[str]:
 def without_errors(case: Case) -> str | None:
     """Which measurements state no standard error, which the loop needs; None where all do."""
     return unstated_errors(read_observations(case).table)
+
+
+def unnamed_banks(case: Case) -> list[str]:
+    """That a bed is steep in many cells, and no class of friction is for them; nothing where it is not so."""
+    try:
+        return list(remarks_on_unnamed_banks(case, build_site(case)))
+    except InputError:  # of a bed or a grid that `check` refuses with the same words; the config is written
+        return []
 
 
 def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
