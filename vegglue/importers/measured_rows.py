@@ -22,7 +22,7 @@ MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
 # Words of a heading that say across; V alone says none, and may be the velocity.
-ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
+WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -200,7 +200,7 @@ def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
 def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
     """Whether a column V stands for the velocity: there is no other, and its name says no direction."""
     alone = not any(ROLES[role].quantity == "velocity" for role in found if role not in ("v", "u_se", "u_std"))
-    return "v" in found and alone and not ACROSS & set(words_of(headings[found["v"]]).split())
+    return "v" in found and alone and not WORDS_FOR_ACROSS & set(words_of(headings[found["v"]]).split())
 
 
 def _of_one(heading: str) -> bool:
