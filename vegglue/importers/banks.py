@@ -5,7 +5,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.importers.config_parts import loguniform_prior
-from vegglue.importers.site_file import Channel, FieldSite
+from vegglue.importers.field_site import Channel, FieldSite
 from vegglue.site.grid import Grid
 from vegglue.site.zones import beyond, slope
 

@@ -14,12 +14,12 @@ from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.field_site import FileOfSite
 from vegglue.importers.file_words import file_words
 from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
 from vegglue.importers.measured_rows import Taken, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import refuse_degrees
-from vegglue.importers.site_file import FileOfSite
 from vegglue.site.centreline import Centreline, centreline_of
 
 # Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.

@@ -30,19 +30,11 @@ from vegglue.importers.config_parts import (
     wall_prior,
 )
 from vegglue.importers.drawn_centreline import drawn_centreline
+from vegglue.importers.field_site import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid
 from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record, write_tables
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.site_file import (
-    Channel,
-    FieldSite,
-    FileOfSite,
-    MeasuredFlow,
-    PlantedPatch,
-    SiteGrid,
-    read_site,
-    site_file,
-)
+from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.surveyed_bed import surveyed_bed
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as

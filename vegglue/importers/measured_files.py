@@ -15,13 +15,14 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import observed
+from vegglue.importers.field_site import FieldSite
 from vegglue.importers.file_words import FileWords, file_words
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.known_experiments import EXPERIMENTS, KnownExperiments
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
-from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_file, site_file
+from vegglue.importers.site_file import HELD_OUT, held_out_file, site_file
 from vegglue.importers.stations import StationTable, station_tables
 from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of

@@ -13,11 +13,11 @@ from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.banks import BANK, bank_break, found_banks, with_banks
 from vegglue.importers.config_parts import MANNING_BED, even
+from vegglue.importers.field_site import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.file_words import file_words
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.terrain_files import RASTERS, Terrain, filled, read_terrain
 from vegglue.site.grid import Grid, centres
 
