@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import contenders_of, tempered_chances
+from vegglue.diagnosis.competition import contenders_of
 from vegglue.diagnosis.rivals import followed_further, with_chances
+from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
 from vegglue.screening import score_test

@@ -8,8 +8,9 @@ import scipy.stats
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
 from vegglue.calibration.baseline import log_evidence
-from vegglue.diagnosis.competition import Contender, chances_of, tempering
+from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.rivals import rivals_among
+from vegglue.diagnosis.tempered_chances import tempering
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 

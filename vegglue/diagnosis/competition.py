@@ -1,12 +1,11 @@
 """One competition of everything that could explain a misfit: listed effects, places and instruments.
 
-    p_j ~ exp((E_j - max E) / w_j),   E_j = ln B_j + ln prior_j,   w_j = 1 + FINGERPRINT_ERROR^2 2 E_j
+    E_j = ln B_j + ln prior_j
 
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters. All kinds are as likely before, see `evidence`. The
-fingerprint of an effect in nature differs from the model's, whose cells and laws are not nature's: where much is
-explained, errors count as w^(1/2) times as large.
+no flow: to first order is exact for them but for the parameters. All kinds are as likely before, see `evidence`, and
+their chances are tempered, see `tempered_chances`.
 
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
@@ -21,6 +20,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.tempered_chances import tempered_chances, tempering
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import place_candidate
@@ -30,8 +30,6 @@ from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
 from vegglue.screening.second_look import SecondLook, second_look
 
-# Relative error of a fingerprint [-]: on cells of two thirds of the size, those of mixing differ by 10 to 25 %.
-FINGERPRINT_ERROR = 0.15
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
 MOST_REFITTED, REACH = 8, 6.0
@@ -148,17 +146,6 @@ def _place_contender(
 def chances_of(contenders: Sequence[Contender]) -> Array:
     """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
     return tempered_chances(np.array([one.log_evidence for one in contenders]))
-
-
-def tempered_chances(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
-    """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
-    weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
-    return np.asarray(weight / weight.sum())
-
-
-def tempering(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
-    """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
-    return np.asarray(1.0 + trace_error**2 * 2.0 * np.maximum(evidence, 0.0))
 
 
 def _within_reach(evidence: float, best: float) -> bool:

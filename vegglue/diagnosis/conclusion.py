@@ -9,11 +9,11 @@ import scipy.stats
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, interval95
 from vegglue.diagnosis.between_sections import largest_error_between
-from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
+from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
 from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged

@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of, tempering
+from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
+from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.screening.instruments import InstrumentKind
 
 # Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.

@@ -61,8 +61,8 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING),
     ])  # fmt: skip
     x, y = np.concatenate([places.x[~near], window.x]), np.concatenate([places.y[~near], window.y])
-    chance, (x0, y0) = np.exp(weight - logsumexp(weight)), (moved.shapes["x"], moved.shapes["y"])
-    errors = [float(np.sqrt(chance @ (where - middle) ** 2)) for where, middle in ((x, x0), (y, y0))]
+    chance, middle = np.exp(weight - logsumexp(weight)), moved.shapes
+    errors = [float(np.sqrt(chance @ (at - middle[axis]) ** 2)) for axis, at in (("x", x), ("y", y))]
     return FoundPlace(moved, float(logsumexp(weight)), *errors)
 
 

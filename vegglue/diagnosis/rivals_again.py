@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, search_model
-from vegglue.diagnosis.competition import tempered_chances
 from vegglue.diagnosis.refits import Refit, RefitTrial, calibrated_with, refits_of, start_with, without_effect
 from vegglue.diagnosis.rivals import with_chances
+from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening.candidates import candidate_in_case, candidates_of

@@ -9,8 +9,9 @@ listed effect that was accepted they are told where they clearly explain more.
 import numpy as np
 
 from vegglue.calibration.baseline import log_evidence
-from vegglue.diagnosis.competition import LEAST_ODDS, tempered_chances
+from vegglue.diagnosis.competition import LEAST_ODDS
 from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.residual_screening import Screening

@@ -1,7 +1,7 @@
 """Chances of laws and other causes, each the one that is missing."""
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.competition import tempered_chances
+from vegglue.diagnosis.tempered_chances import tempered_chances
 
 # Relative error of a trace [-], half that of a diagnosis: of what cells and laws of nature do to a trace, most is
 # common to quantities of one term, which are what is to be told apart. Chosen after 76 sets of the study of laws were

@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.diagnosis.competition import REACH, Contender, contenders_of, tempering
+from vegglue.diagnosis.competition import REACH, Contender, contenders_of
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.discovery.chances import chances_in_set
 from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
 from vegglue.discovery.product import product_beside
