@@ -192,7 +192,7 @@ def _left_out(records: Sequence[Record]) -> str:
     others: Counter[str] = Counter()
     for record in records:
         if "left_out" in record:
-            found = re.match(r"--hide (\S+): at no plausible size", record["left_out"])
+            found = re.match(r"(?:--hide )?(\S+): at no plausible size", record["left_out"])
             names.update(found[1].split(",") if found else ())
             others.update([] if found else [record["left_out"].partition(":")[0]])
     told = "Left out, since the data would not show them at any plausible size: {}.".format(
