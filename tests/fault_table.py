@@ -280,8 +280,10 @@ finished is lost.
 - Every result, and every part file of a stopped run, is read by a process of its own first: the HDF5 library reads some
   damaged files in circles, and anyone can put the right digest behind one.
 - What is read is held against the shapes and types it was stored with, before anyone computes with it.
-- One run at a time writes in a folder: a lock of the operating system says who. Some network disks are mounted with
-  locks that do not reach other machines; of two runs the first then stops with a sentence, and the second is whole.
+- One ensemble at a time is written in a folder: a lock of the operating system says who, and a second `simulate` or
+  `run` that needs it is refused. A diagnosis, a posterior or a page is put in place whole when it is done: of two at
+  once both end well, and the later one stays. Some network disks are mounted with locks that do not reach other
+  machines; of two runs the first then stops with a sentence, and the second is whole.
 - Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum. The next run lays the file out
   anew, and takes over the chunks whose checksum is right.
 - Results hold no links and no data in other files. A file that has any is refused, and a soft or hard link in the

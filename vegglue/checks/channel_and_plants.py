@@ -52,8 +52,11 @@ def remarks_on_friction_classes(case: Case, site: Site) -> Iterator[str]:
 
 
 def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[str]:
-    """Steep cells of the bed [-] that share the friction of the floor because there is one class only."""
-    if len(case.friction.classes) > 1 or case.friction.walls is not None:
+    """Steep cells of a surveyed bed [-] that share the friction of the floor because there is one class only; whoever
+    writes a trapezoid knows its banks.
+    """
+    surveyed = any(layer.trapezoid is None for layer in case.bed)
+    if len(case.friction.classes) > 1 or case.friction.walls is not None or not surveyed:
         return
     shares = [
         float(steep[depth > 0].mean()) if (depth > 0).any() else 0.0
