@@ -118,7 +118,7 @@ class _Lanes:
 
 def fitting_width(members: int) -> int:
     """Lanes [-] for so many members: the next multiple of SIDE_BY_SIDE, or as many where they are few."""
-    return members if members < SIDE_BY_SIDE // 2 else -(-members // SIDE_BY_SIDE) * SIDE_BY_SIDE
+    return members if members <= SIDE_BY_SIDE // 2 else -(-members // SIDE_BY_SIDE) * SIDE_BY_SIDE
 
 
 def _begun(problem: Problem, members: np.ndarray, start: Array, shared: Factors) -> _Lanes:
