@@ -13,17 +13,16 @@ from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.polygons import area_of, corners_of
-from vegglue.site.zones import cells_of_patch, slope
+from vegglue.site.zones import BANK_SLOPE, cells_of_patch, slope
 
 # By `numerics.emergent`: what is taken for plants that stand out of the water.
 DRAG_OF_EMERGENT = {
     "constant": "phi is taken for the part in the water; `numerics.emergent: proportional` lets it fall with that part",
     "proportional": "phi falls with the part in the water, as `numerics.emergent` says",
 }
-# Slope of a bed from which it may be a bank: that of imported trapezoids [-]; and the share of the wet cells from which
-# this matters: with banks twice as rough as the floor, a tenth of the width changes its friction by a tenth, which is
-# twice what imported cases allow the model for.
-STEEP, MANY_STEEP = 0.2, 0.1
+# Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
+# of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
+MANY_STEEP = 0.1
 
 
 def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
@@ -62,13 +61,13 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[str]:
         float(steep[depth > 0].mean()) if (depth > 0).any() else 0.0
         for name, experiment in case.experiments.items()
         for now in [in_experiment(site, name)]
-        for steep, depth in [(slope(now.bed, now.grid) > STEEP, expected_depth(case, now, experiment))]
+        for steep, depth in [(slope(now.bed, now.grid) > BANK_SLOPE, expected_depth(case, now, experiment))]
     ]
     if max(shares) > MANY_STEEP:
         yield (
-            f"Up to {100 * max(shares):.0f} % of the wet cells are steeper than {STEEP:g} and have the friction of the "
-            f"floor: where they are banks, add a class for them, with the zone `{{class: bank, beyond_slope_break: "
-            f"{STEEP:g}}}`, or `diagnose` may name what is not there."
+            f"Up to {100 * max(shares):.0f} % of the wet cells are steeper than {BANK_SLOPE:g} and have the friction of "
+            f"the floor: where they are banks, add a class for them, with the zone `{{class: bank, beyond_slope_break: "
+            f"{BANK_SLOPE:g}}}`, or `diagnose` may name what is not there."
         )
 
 

@@ -11,8 +11,6 @@ from vegglue.site.zones import beyond, slope
 
 BANK = "bank"
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
-# Slope beyond which the cells of a trapezoid are bank [-], unless its banks are too flat for it.
-OF_TRAPEZOID = 0.2
 
 
 def bank_break(site: FieldSite) -> float | None:

@@ -15,7 +15,7 @@ from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.banks import OF_TRAPEZOID, bank_break, roughness_of_banks, with_banks
+from vegglue.importers.banks import bank_break, roughness_of_banks, with_banks
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MANNING_BED,
@@ -36,6 +36,7 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.surveyed_bed import surveyed_bed
+from vegglue.site.zones import BANK_SLOPE
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
@@ -105,7 +106,7 @@ def _ground(folder: Path, target: Path, site: FieldSite, place: Placement, measu
     grid = _grid(site, site.channel, place)
     friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
     if (steeper := bank_break(site)) is not None:
-        friction = with_banks(friction, min(OF_TRAPEZOID, steeper))
+        friction = with_banks(friction, min(BANK_SLOPE, steeper))
     return {"grid": grid, "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}], "friction": friction}
 
 

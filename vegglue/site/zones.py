@@ -15,6 +15,10 @@ from vegglue.site.grid import Grid, cell_stretch, places_on_map
 from vegglue.site.polygons import in_polygon
 from vegglue.site.terrain import nearest_at, read_raster
 
+# Slope of a cross-section beyond which cells are taken for bank where nothing else is said [-]. Chosen, not measured:
+# floors are flatter and banks of streams mostly steeper.
+BANK_SLOPE = 0.2
+
 
 def cells_of_patch(patch: Patch, grid: Grid) -> Mask:
     """Cells (nx, ny) whose centre lies in the patch."""
