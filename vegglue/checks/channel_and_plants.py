@@ -65,9 +65,9 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[str]:
     ]
     if max(shares) > MANY_STEEP:
         yield (
-            f"Up to {100 * max(shares):.0f} % of the wet cells are steeper than {BANK_SLOPE:g} and have the friction of "
-            f"the floor: where they are banks, add a class for them, with the zone `{{class: bank, beyond_slope_break: "
-            f"{BANK_SLOPE:g}}}`, or `diagnose` may name what is not there."
+            f"Up to {100 * max(shares):.0f} % of the wet cells are steeper than {BANK_SLOPE:g} and have the friction "
+            f"of the floor: where they are banks, add a class for them, with the zone `{{class: bank, "
+            f"beyond_slope_break: {BANK_SLOPE:g}}}`, or `diagnose` may name what is not there."
         )
 
 
