@@ -267,6 +267,11 @@ def error_fell_as_kept(record: Record) -> bool | None:
     return _less(record, "kept", "parent")
 
 
+def error_falls_with_truth(record: Record) -> bool | None:
+    """The held-out error is less with the true effect in the model, calibrated, than without."""
+    return _less(record, "oracle", "parent")
+
+
 def _less(record: Record, after: str, before: str) -> bool | None:
     errors = error_of(record, after), error_of(record, before)
     return None if errors[0] is None or errors[1] is None else errors[0] < errors[1]

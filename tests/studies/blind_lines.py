@@ -105,6 +105,7 @@ LINES: tuple[Line, ...] = (
     Line("Held-out error fell with what `extend --auto` kept", (), what.error_fell_as_kept, 0.95),
     Line("... with all that was named, where the verdict names", (), what.error_fell_where_said, 0.95),
     Line("... with all that was found, whatever the verdict", (), what.error_fell),
+    Line("... with the true effect itself, where that was looked into", (), what.error_falls_with_truth),
     Line("As `extend --auto` leaves it: within 1.1 of the true effect", (), what.near_oracle_as_kept, 0.8),
     Line("... with all that was found: within 1.1 of it", (), what.near_oracle, 0.8),
     Line("Nothing missing, but held-out error over 1.3 of the noise", (), what.silent_beside_error, 0.0, True),

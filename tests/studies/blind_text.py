@@ -108,6 +108,8 @@ is what `vegglue extend --auto` keeps of what was found, by the same calibration
 sections and experiments left out in turn have to fall. Its parent is the model calibrated without it. *All that was
 named* is added without asking, which no command does. An instrument of one section, or a gauge, is perfect at the
 sections that were not measured, both in the truth and in the model; what changes every probe alike acts there in both.
+*The true effect itself* is put into the model, with its shapes known, and all is calibrated: even then the error
+does not fall in every set, for the site is not quite what is told of it.
 {kept}
 
 ![Shares and their intervals, both truths](blind-shares.svg)

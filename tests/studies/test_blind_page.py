@@ -218,6 +218,8 @@ def test_amplitudes_and_held_out_errors() -> None:
     kept = NAMED | {"held_out": errors | {"parent": 0.02, "kept": 0.013}}
     assert what.error_fell_as_kept(kept) is True
     assert what.near_oracle_as_kept(kept) is True
+    assert [what.error_falls_with_truth(one) for one in (looked, kept)] == [None, True]
+    assert what.error_falls_with_truth(NAMED | {"held_out": errors | {"parent": 0.011}}) is False
     left = NAMED | {"held_out": errors | {"parent": 0.02, "kept": None}}
     assert what.near_oracle_as_kept(left) is False, "the model was left as it was"
     assert what.silent_beside_error(unknown) is True
