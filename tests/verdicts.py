@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 from diagnoses import a_suspect
 
-from vegglue.diagnosis.conclusion import chance_of_misfit
+from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.verdict import Grounds, judged
 from vegglue.results.diagnosis import EstimatedErrors, Misfit, Step, Suspect

@@ -7,8 +7,8 @@ import pytest
 from diagnoses import a_field, a_location, a_suspect, an_instrument
 from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 
+from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Contender
-from vegglue.diagnosis.conclusion import chance_of_misfit
 from vegglue.diagnosis.refits import Refit
 from vegglue.results.diagnosis import EstimatedErrors, ModelErrorUsed, Step
 from vegglue.screening.instruments import Instrument

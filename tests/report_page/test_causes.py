@@ -34,7 +34,10 @@ def test_odds_are_told_against_the_nearest_rivals() -> None:
         "4.0 to 1 against inflow, 210 to 1 against bed"
     )
     assert against_rivals(a_location(odds={"wind": 1e9})) == "over 1,000 to 1 against all else"
-    assert against_rivals(a_location(odds={"position": 20.0, "wind": 1e9})) == "20 to 1 against a probe that is off"
+    assert (
+        against_rivals(a_location(odds={"position": 20.0, "wind": 1e9}))
+        == "20 to 1 against a probe that is off in all experiments"
+    )
     assert against_rivals(a_location(odds={})) == ""
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
@@ -68,7 +69,17 @@ def at_point(noise: Noise, point: Point) -> MapEstimate:
 
 def chi2(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 over the used stations [-]."""
-    return _misfit(noise, point.prediction)
+    return squared_misfit(noise, point.prediction)
+
+
+def squared_misfit(noise: Noise, prediction: Array) -> float:
+    """|W (y - f)|^2 of predictions f (station,) [-]."""
+    return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
+
+
+def chance_of_misfit(misfit: float, freedom: int) -> float:
+    """P(chi2_f >= chi2): the chance of a misfit as large under errors alone [-]; freedom: its degrees."""
+    return float(scipy.stats.chi2.sf(misfit, max(freedom, 1)))
 
 
 def objective(noise: Noise, point: Point) -> float:
@@ -76,13 +87,9 @@ def objective(noise: Noise, point: Point) -> float:
     return chi2(noise, point) + float(point.z @ point.z)
 
 
-def _misfit(noise: Noise, prediction: Array) -> float:
-    return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
-
-
 def _is_below(limit: float, noise: Noise, z: Array, prediction: Array) -> bool:
     """Whether the objective of predictions (n,) at z is below a limit."""
-    return _misfit(noise, prediction) + float(z @ z) < limit
+    return squared_misfit(noise, prediction) + float(z @ z) < limit
 
 
 def covariance(noise: Noise, point: Point) -> Array:

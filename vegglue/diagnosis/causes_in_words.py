@@ -6,7 +6,7 @@ import numpy as np
 
 from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.findings import Findings
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import FAULT_WORDS, LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
     FieldFound,
@@ -23,12 +23,6 @@ STATED_BELOW = 0.995
 TOLD_ERROR = 0.3
 # Contenders that are told where none is surely it.
 UNDECIDED_TOLD = 3
-OFF = {
-    "reading": "one reading that is off",
-    "position": "a probe that is off in all experiments",
-    "probe": "a probe that is off in all sections",
-    "gauge": "a gauge that is off",
-}
 
 
 def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
@@ -161,7 +155,7 @@ def undecided_in_words(contenders: Sequence[Contender]) -> str:
 def _contender_words(one: Contender) -> str:
     """The name of an effect, what something unlisted does and where, or which instrument is off."""
     if isinstance(one.what, Instrument):
-        return f"{OFF[one.what.kind]} at {_where(one.what.x, one.what.y)} m"
+        return f"{FAULT_WORDS[one.what.kind]} at {_where(one.what.x, one.what.y)} m"
     if one.kind == "effect":
         return one.name
     return _briefly(one.kind, one.what.amplitude, one.what.shapes["x"], one.what.shapes["y"])

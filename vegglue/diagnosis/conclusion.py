@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import scipy.stats
 
 from vegglue.calibration.baseline import Baseline, log_evidence
-from vegglue.calibration.fit import chi2, interval95
+from vegglue.calibration.fit import chance_of_misfit, chi2, interval95
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
@@ -100,11 +99,6 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
     )
-
-
-def chance_of_misfit(misfit: float, freedom: int) -> float:
-    """P(chi2_f >= chi2): the chance of a misfit as large under errors alone [-]; freedom: its degrees."""
-    return float(scipy.stats.chi2.sf(misfit, max(freedom, 1)))
 
 
 def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:

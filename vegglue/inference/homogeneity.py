@@ -15,7 +15,7 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MapEstimate, covariance, fit
+from vegglue.calibration.fit import MapEstimate, covariance, fit, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of, with_correlation
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
@@ -48,7 +48,9 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         if fitted is not None:
             value[e], error[e] = without_prior(model.case, fitted.point.z, np.diag(fitted.covariance))
     error *= scale
-    together = [_misfit(part, joint.prediction[names == name]) for (_, part), name in zip(parts, here, strict=True)]
+    together = [
+        squared_misfit(part, joint.prediction[names == name]) for (_, part), name in zip(parts, here, strict=True)
+    ]
     alone = [np.nan if fitted is None else fitted.chi2 for fitted in fits]
     gain = float(np.nansum(np.array(together) - np.array(alone)) / scale**2)
     separate = sum(determined(one.covariance) for one in fits if one is not None)
@@ -133,7 +135,3 @@ def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, 
 def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
     start = linearise(own, joint.z, joint)
     return None if start is None else fit(own, errors, start)
-
-
-def _misfit(noise: Noise, prediction: Array) -> float:
-    return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))

@@ -8,6 +8,7 @@ import pandas as pd
 import scipy.stats
 
 from vegglue.arrays import Array
+from vegglue.calibration.fit import chance_of_misfit, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.prior import sample_prior
@@ -85,12 +86,12 @@ def _leave_one_out(left: Array, precision: Array, weights: Array, at_all: Callab
 def _misfit(base: ModesAndErrors, prediction: Array, at_all: Callable[[Array], Array]) -> MisfitTest:
     """chi2 = |W (y - f)|^2 of the best member's predictions f (station,), and each residual that stands out."""
     noise, count = base.noise, base.noise.rows.size
-    chi2 = float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
+    chi2 = squared_misfit(noise, prediction)
     freedom = count - len(base.model.names)
     return MisfitTest(
         chi2=chi2,
         freedom=freedom,
-        p_misfit=float(scipy.stats.chi2.sf(chi2, max(freedom, 1))),
+        p_misfit=chance_of_misfit(chi2, freedom),
         surprise=at_all(base.standardised),
         outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.standardised)) * 2) < OUTLIER_BELOW,
     )

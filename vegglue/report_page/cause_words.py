@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.figures.places import TERM_SIGNS
 from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
+from vegglue.results.causes import FAULT_WORDS
 from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 
 # Quantity and unit of a field, as they are told.
@@ -21,13 +22,6 @@ OF_KIND = {
     "position": "probe, in all experiments",
     "probe": "probe, in all sections",
     "gauge": "gauge, in all experiments",
-}
-# Rivals of a place that do not go by the name of an effect or a term.
-RIVAL_WORDS = {
-    "reading": "one bad reading",
-    "position": "a probe that is off",
-    "probe": "a probe that is off in all sections",
-    "gauge": "a gauge that is off",
 }
 # Rivals of a place whose odds are told: the nearest ones; and odds above which the figure no longer says more.
 RIVALS_TOLD, TOLD_ODDS = 2, 1000.0
@@ -88,7 +82,7 @@ def against_rivals(place: Location) -> str:
     if nearest and nearest[0][1] > TOLD_ODDS:
         return f"{odds_in_words(nearest[0][1])} against all else"
     told = [(name, odds) for name, odds in nearest if odds <= TOLD_ODDS]
-    return ", ".join(f"{odds_in_words(odds)} against {RIVAL_WORDS.get(name, name)}" for name, odds in told)
+    return ", ".join(f"{odds_in_words(odds)} against {FAULT_WORDS.get(name, name)}" for name, odds in told)
 
 
 def size_of(place: Location) -> str:

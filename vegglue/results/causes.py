@@ -4,6 +4,14 @@ from dataclasses import dataclass
 
 from vegglue.arrays import Array
 
+# Faulty instruments by their kind.
+FAULT_WORDS = {
+    "reading": "one reading that is off",
+    "position": "a probe that is off in all experiments",
+    "probe": "a probe that is off in all sections",
+    "gauge": "a gauge that is off",
+}
+
 
 @dataclass(frozen=True)
 class Location:
