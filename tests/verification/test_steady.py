@@ -285,9 +285,30 @@ def test_side_inflows_conserve_mass():
     assert flow[28:31] == pytest.approx(1.5, rel=1e-9)
     assert flow[34:] == pytest.approx(1.75, rel=1e-9)
     assert np.diff(flow)[20:28] == pytest.approx(0.5 / 8, rel=1e-9)
-    station = pd.DataFrame({"kind": [], "x": [], "y": []})
-    grid = Grid(centres(30.0, 60), centres(4.0, 8), 0.5, 0.5)
-    assert read_sensors(problem, state, grid, station, ()).mass_error[0] < 1e-9
+    assert shown(problem, state).mass_error[0] < 1e-9
+
+
+def shown(problem, state):
+    """What `read_sensors` tells of the joined channel."""
+    station, grid = pd.DataFrame({"kind": [], "x": [], "y": []}), Grid(centres(30.0, 60), centres(4.0, 8), 0.5, 0.5)
+    return read_sensors(problem, state, grid, station, ())
+
+
+@pytest.mark.parametrize("west", [1.0, 0.0])
+def test_water_that_enters_unevenly_is_no_error_of_mass(west):
+    """By conveyance more of it enters where it is deeper; west 0: nothing comes from the west end."""
+    problem = joined()
+    humps = 0.1 * np.sin(2.0 * np.pi * centres(30.0, 60) / 3.0)[:, None]
+    sides = tuple(
+        replace(one, by_conveyance=True, discharge=one.discharge * (west if one.side == "west" else 1.0))
+        for one in problem.boundaries.inflows
+        if west or one.side != "west"
+    )
+    problem = replace(problem, bed=problem.bed + humps, boundaries=replace(problem.boundaries, inflows=sides))
+    state = solved(problem)
+    gained = np.diff(discharge(problem, state)[:, 0])[20:28]
+    assert gained.max() > 1.2 * gained.min()
+    assert shown(problem, state).mass_error[0] < 1e-8
 
 
 def test_inflow_is_spread_by_conveyance():

@@ -111,6 +111,17 @@ def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
     return fluxes["west"], fluxes["south"], fluxes["north"]
 
 
+def side_discharges(problem: Problem, depth: Array) -> Array:
+    """Discharge that enters each column of cells through its south and north side, (nx, m) [m3/s]."""
+    entering = np.zeros((problem.shape[0], problem.members))
+    for inflow in problem.boundaries.inflows:
+        if inflow.side != "west":
+            part = slice(inflow.start, inflow.stop)
+            flux = _inflow_flux(problem, inflow, depth[part, 0 if inflow.side == "south" else -1])
+            entering[part] += flux * _stretch_of(problem, inflow, 0.0) * problem.dx
+    return entering
+
+
 def _inflow_flux(problem: Problem, inflow: InflowSegment, depth: Array) -> Array:
     """q [m2/s] in each cell of an inflow, of their depths (cell, m)."""
     weight = (depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread

@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
 from vegglue.flow.closures import closures
-from vegglue.flow.equations import Faces, faces
+from vegglue.flow.equations import Faces, faces, side_discharges
 from vegglue.flow.problem import Problem, stretch_of_cells
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
 from vegglue.measurements.kinds import Kind, kind_of
@@ -34,8 +34,9 @@ class FlowFields:
 
 @dataclass(frozen=True)
 class Readings:
-    """Of m members: prediction (m, station) [unit of its kind], flow (m, section) [m3/s], largest |Q/Q_in - 1| (m,)
-    [-], and level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a cell is wet.
+    """Of m members: prediction (m, station) [unit of its kind], flow (m, section) [m3/s], largest |Q - Q_in| over all
+    that enters (m,) [-], and level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a
+    cell is wet.
     """
 
     prediction: Array
@@ -64,7 +65,8 @@ def read_sensors(
     if any(active.effect.stage == "sensor" for active in problem.effects):
         prediction = _shown(flow, prediction, station)
     through = flow.discharge
-    error = np.abs(through / _entered(problem) - 1.0).max(axis=0)
+    entered = _entered(problem, now.cell)
+    error = (np.abs(through - entered) / entered[-1]).max(axis=0)
     wet = now.cell[kept] > FILM_ON_LAND * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
     nearest = [nearest_face(grid, x) for _, x in sections]
@@ -140,24 +142,14 @@ def _at_centres(now: Faces, columns: slice) -> Array:
     return np.stack([now.level[columns], u, v])
 
 
-def _entered(problem: Problem) -> Array:
-    """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s]."""
-    nx = problem.shape[0]
-    entered = np.zeros((nx + 1, problem.members))
+def _entered(problem: Problem, depth: Array) -> Array:
+    """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s], at depths (nx, ny, m)."""
+    entered = np.zeros((problem.shape[0] + 1, problem.members))
+    entered[1:] = side_discharges(problem, depth).cumsum(axis=0)
     if problem.boundaries.lateral_inflow.size:
         entering = problem.boundaries.lateral_inflow * stretch_of_cells(problem)
         entered[1:] += entering.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
     for inflow in problem.boundaries.inflows:
         if inflow.side == "west":
             entered += inflow.discharge
-    return entered + _from_sides(problem, nx)
-
-
-def _from_sides(problem: Problem, nx: int) -> Array:
-    """The part that enters through the sides, counted by its even share; exact beyond the segment."""
-    entered = np.zeros((nx + 1, problem.members))
-    for inflow in problem.boundaries.inflows:
-        if inflow.side != "west":
-            share = np.clip((np.arange(nx + 1) - inflow.start) / (inflow.stop - inflow.start), 0.0, 1.0)
-            entered += share[:, None] * inflow.discharge
     return entered

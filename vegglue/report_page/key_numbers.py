@@ -14,7 +14,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED
 
-# Largest |Q/Q_in - 1| [-] of a sound member: a hundredth of what a flow meter can tell.
+# Largest |Q - Q_in| over all that enters [-] of a sound member: a hundredth of what a flow meter can tell.
 MASS_LIMIT = 1e-4
 # Standard deviation of log10 [-] above which a value is told as a power of ten: below, both sides of it are alike.
 WIDE = 0.05
@@ -162,7 +162,7 @@ def with_unit(value: float, kind: str) -> str:
 
 
 def largest_mass_error(ensemble: Ensemble) -> float:
-    """Largest |Q/Q_in - 1| of the solved members [-]."""
+    """Largest |Q - Q_in| over all that enters, of the solved members [-]."""
     return float(np.max(ensemble.mass_error[ensemble.status != FAILED]))
 
 

@@ -57,7 +57,7 @@ class Ensemble:
     status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]  # one of `solver.status`
     reason: Annotated[np.ndarray, Stored(("member",), fill=b"", type="S240")]  # '' or a sentence
     iterations: Annotated[np.ndarray, Stored(("member",), fill=0, type=np.int32)]
-    mass_error: Annotated[np.ndarray, Stored(("member",))]  # largest |Q/Q_in - 1| over sections and experiments
+    mass_error: Annotated[np.ndarray, Stored(("member",))]  # largest |Q - Q_in| over all that enters
     seconds: Annotated[np.ndarray, Stored(("member",), "s")]
     section_flow: Annotated[np.ndarray, Stored(("member", "experiment", "section"), "m3/s")]
     station: pd.DataFrame
