@@ -8,6 +8,7 @@ import pytest
 from vegglue.screening import score_test
 
 ROWS, SLOPES, PRINTS = 60, 3, 8
+LENGTHS = (2.0, 3.0, 4.0)
 
 
 @pytest.fixture
@@ -60,7 +61,7 @@ def test_the_fewest_groups_hold_what_is_asked() -> None:
 
 
 def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
-    """One of six effects, the last of three shapes, is there, 3 standard errors long: sets hold it as often as said."""
+    """One of six effects, the last of three shapes, is there, of three lengths: sets hold it as often as said."""
     slopes, fingerprints = problem
     random, family, tries = np.random.default_rng(2), [np.array([j]) for j in range(5)] + [np.array([5, 6, 7])], 800
     projected = score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), fingerprints)
@@ -70,9 +71,10 @@ def test_chances_are_kept(problem: tuple[np.ndarray, np.ndarray]) -> None:
     for _ in range(tries):
         true = int(random.integers(len(family)))
         sign, column = ways[true][random.integers(len(ways[true]))]
-        residual = (1 - 2 * sign) * 3.0 * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
+        length = LENGTHS[random.integers(3)]
+        residual = (1 - 2 * sign) * length * projected.units[:, column] + random.standard_normal(ROWS + SLOPES)
         drawn = replace(projected, residual=residual)
-        chance = score_test.chances(drawn, family, allowed, 3.0)
+        chance = score_test.chances(drawn, family, dict.fromkeys(LENGTHS, allowed))
         kept = [j for group in score_test.likeliest_families(drawn, family, chance, 0.9) for j in group]
         said, held = said + sum(chance[family[j]].sum() for j in kept), held + (true in kept)
         sizes.append(len(kept))
@@ -87,7 +89,7 @@ def test_without_a_score_all_that_may_be_are_as_likely(problem: tuple[np.ndarray
     family = [np.arange(3), np.arange(3, 6), np.arange(6, PRINTS)]
     allowed = np.ones((2, PRINTS), bool)
     allowed[:, 6:] = False
-    chance = score_test.chances(projected, family, allowed, 3.0)
+    chance = score_test.chances(projected, family, {3.0: allowed})
     assert [chance[columns].sum() for columns in family] == pytest.approx([0.5, 0.5, 0.0])
     assert score_test.likeliest_families(projected, family, chance, 0.9) == [[0], [1]]
     assert score_test.likeliest_families(projected, [], np.zeros(0), 0.9) == []

@@ -8,8 +8,9 @@ from vegglue.screening.residual_screening import Screening
 
 # Rate at which errors alone make some listed effect score higher than what counts as detectable.
 FALSE_ALARMS_OF_EFFECTS = 0.04
-# Length of a fingerprint, in standard errors, that is missed more often than not: thresholds are near a score of 3.2.
-UNDETECTED_LENGTH = 3.0
+# Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
+# that longer ones stand out and shorter ones change little. Which it is nobody knows.
+UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
 # Share of the chances that the effects listed as not excluded hold together.
 NOT_EXCLUDED_CHANCE = 0.9
 # Standard deviations of an effect's prior beyond which its size is not taken to be possible.
@@ -31,12 +32,12 @@ def suspects_of(screening: Screening) -> dict[str, Suspect]:
 def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     """Groups of effects among which one that is there undetected is in nine of ten cases, the likeliest first.
 
-    One is taken to be there, as long as is missed more often than not, and at a possible size.
+    One is taken to be there, as long as may be missed, and at a possible size.
     """
     families = screening.fingerprints.columns
     names = [one.name for one in screening.fingerprints.candidates]
-    possible = screening.possible_signs(UNDETECTED_LENGTH, LARGEST_POSSIBLE)
-    chance = score_test.chances(screening.projected, families, possible, UNDETECTED_LENGTH)
+    possible = {length: screening.possible_signs(length, LARGEST_POSSIBLE) for length in UNDETECTED_LENGTHS}
+    chance = score_test.chances(screening.projected, families, possible)
     groups = score_test.likeliest_families(screening.projected, families, chance, NOT_EXCLUDED_CHANCE)
     return tuple(tuple(names[j] for j in group) for group in groups)
 

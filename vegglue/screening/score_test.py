@@ -6,7 +6,7 @@ Everything here is whitened: errors are independent and standard normal. Rows of
 data, so that a calibrated parameter is as free as its prior says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -65,20 +65,25 @@ def null_draws(projected: Projected, one_sided: np.ndarray, errors: Array, seed:
     return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
 
 
-def chances(projected: Projected, family: Sequence[np.ndarray], allowed: np.ndarray, length: float) -> Array:
-    """Chance of each fingerprint (c,) [-] to be the one missing effect, if it is `length` standard errors long.
+def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping[float, np.ndarray]) -> Array:
+    """Chance of each fingerprint (c,) [-] to be the one missing effect, whose length L [standard errors] is one of a
+    few, all as likely before.
 
-        p_i ~ sum_s exp(s length T_i - length^2 / 2) / n_j,  s = +1, -1
+        p_i ~ sum_L sum_s exp(s L T_i - L^2 / 2) / n_jL,  s = +1, -1
 
-    allowed (2, c): whether it may have either sign at that length; n_j: number of fingerprints and signs of its family
-    that are allowed. All families with any allowed are as likely before (Bayes).
+    allowed {L: (2, c)}: whether it may have either sign at that length; n_jL: number of fingerprints and signs of its
+    family that are allowed. All families with any allowed are as likely before (Bayes).
     """
-    score = length * (projected.units.T @ projected.residual)
-    weight = np.where(allowed, np.exp(np.stack([score, -score]) - np.abs(score).max(initial=0.0)), 0.0).sum(axis=0)
-    ways = allowed.sum(axis=0)
-    for columns in family:
-        weight[columns] /= max(int(ways[columns].sum()), 1)
-    return np.asarray(weight / max(float(weight.sum()), 1e-300))
+    score = projected.units.T @ projected.residual
+    signed, highest = np.stack([score, -score]), float(np.abs(score).max(initial=0.0))
+    most = max(length * highest - 0.5 * length**2 for length in allowed)
+    chance = np.zeros(score.size)
+    for length, possible in allowed.items():
+        weight = np.where(possible, np.exp(length * signed - 0.5 * length**2 - most), 0.0).sum(axis=0)
+        ways = possible.sum(axis=0)
+        for columns in family:
+            chance[columns] += weight[columns] / max(int(ways[columns].sum()), 1)
+    return np.asarray(chance / max(float(chance.sum()), 1e-300))
 
 
 def likeliest_families(
