@@ -12,7 +12,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
-from vegglue.diagnosis.comparison import homogeneity, rung
+from vegglue.diagnosis.comparison import Rung, homogeneity, improvement, rung
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 SECTIONS, POINTS = ("A", "B", "C"), 6
@@ -67,3 +67,23 @@ def test_held_out_errors_are_those_of_calibrating_without_the_section(slope: Arr
     assert found.held_out.sections[out] == pytest.approx(values[out] - slope[out] @ z)
     without = rung(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
     assert without.in_sample.stations == (~out).sum()
+
+
+def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) -> None:
+    """Sections of 40, 5, 5, 5, 5 and 5 velocities, each with a gain of its own that all of them share, 0 on average."""
+    found = rung(calibrated(measured(slope, np.zeros(slope.shape)), slope))
+    sizes, random = [40, 5, 5, 5, 5, 5], np.random.default_rng(4)
+    clusters = tuple(("low", name) for name, size in zip("ABCDEF", sizes, strict=True) for _ in range(size))
+    held = replace(found.held_out, velocity=np.ones(len(clusters), bool), clusters=clusters)
+
+    def with_errors(errors: Array) -> Rung:
+        return replace(found, held_out=replace(held, sections=errors))
+
+    after = with_errors(np.ones(len(clusters)))
+    told = []
+    for _ in range(2000):
+        shared = np.repeat(0.2 * random.standard_normal(len(sizes)), sizes)
+        told.append(improvement(with_errors(np.sqrt(1.0 + np.clip(shared, -0.9, None))), after))
+    means, errors = np.array(told).T
+    assert np.sqrt(np.mean(errors**2)) > 0.8 * means.std(), "of the unweighted means it is 0.6"
+    assert np.mean(means > 2.0 * errors) < 0.1

@@ -236,12 +236,16 @@ def _with_cholesky(noise: Noise) -> Noise:
 
 def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E + M + O O' of the used stations (n, n)."""
-    rho, size = noise.correlation, noise.rows.size
-    correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
-    covariance = noise.scale**2 * correlations * np.outer(noise.error, noise.error)
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
     own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
-    return np.asarray(covariance + shared + own + noise.model_error + noise.offsets @ noise.offsets.T)
+    return np.asarray(covariance_of_data(noise) + shared + own + noise.model_error + noise.offsets @ noise.offsets.T)
+
+
+def covariance_of_data(noise: Noise) -> Array:
+    """s^2 D R D of the used stations (n, n)."""
+    rho, size = noise.correlation, noise.rows.size
+    correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
+    return np.asarray(noise.scale**2 * correlations * np.outer(noise.error, noise.error))
 
 
 def _separation(used: pd.DataFrame) -> Array:

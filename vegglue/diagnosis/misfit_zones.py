@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.noise import Noise
+from vegglue.calibration.noise import Noise, covariance_of_data
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.engine.interface import Model, Point
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of
@@ -33,9 +33,9 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
         }
     )
     rows = []
+    covariance = covariance_of_data(noise)
     for (experiment, section, zone), part in table.groupby(["experiment", "section", "zone"], sort=False):
-        size = len(part)
-        related = 1.0 + (noise.correlation / (1.0 - noise.correlation) * 2.0 if size > 2 else 0.0)
+        size, here = len(part), part.index.to_numpy()
         rows.append(
             {
                 "experiment": experiment,
@@ -43,7 +43,7 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
                 "zone": zone,
                 "stations": size,
                 "mean": float(part["left"].mean()),
-                "standard_error": float(np.sqrt((part["error"] ** 2).sum() * related) / size),
+                "standard_error": float(np.sqrt(covariance[np.ix_(here, here)].sum()) / size),
                 "chi2": float(((part["left"] / part["error"]) ** 2).sum()),
             }
         )
