@@ -24,11 +24,11 @@ def at_best(slopes: Array, values: Array) -> tuple[Array, Array]:
     return values - slopes @ z, z
 
 
-def kind_of(slopes: Array, prints: Array, values: Array, size: float = 1.0, one_sided: bool = False) -> HypothesisKind:
+def kind_of(slopes: Array, prints: Array, values: Array, size: float = 1.0, only_sign: int = 0) -> HypothesisKind:
     columns = prints.shape[1]
     projected = score_test.project(slopes, *at_best(slopes, values), prints)
     sizes, prior = np.full(columns, size), np.full(columns, 0.1 / columns)
-    return kind_of_hypotheses("made", projected, sizes, prior, np.full(columns, one_sided))
+    return kind_of_hypotheses("made", projected, sizes, prior, np.full(columns, only_sign))
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 5.0])
@@ -62,21 +62,24 @@ def test_a_kind_has_the_evidence_of_all_its_hypotheses() -> None:
     assert twice.total == pytest.approx(apart.total), "to list a hypothesis twice makes it no likelier"
 
 
-def test_what_can_only_have_the_other_sign_explains_nothing() -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_can_only_have_the_other_sign_explains_nothing(sign: int) -> None:
     slopes, prints = made(np.random.default_rng(3), 1)
-    against = -2.0 * prints[:, 0]
+    against = -2.0 * sign * prints[:, 0]
     assert kind_of(slopes, prints, against).total > 10.0
-    found = kind_of(slopes, prints, against, one_sided=True)
+    assert kind_of(slopes, prints, against, only_sign=-sign).total > 10.0
+    found = kind_of(slopes, prints, against, only_sign=sign)
     assert found.total == pytest.approx(float(np.log(0.1) - 0.5 * np.log1p(found.size[0] ** 2)))
 
 
 def kinds_of(values: Array) -> list[HypothesisKind]:
-    """A kind of many hypotheses, one of a few that have one sign, and one of a single hypothesis of another size."""
+    """A kind of many hypotheses, two of a few that have one sign, and one of a single hypothesis of another size."""
     random = np.random.default_rng(7)
     slopes, prints = made(random, 31)
     return [
         kind_of(slopes, prints[:, :20], values),
-        kind_of(slopes, prints[:, 20:30], values, 0.3, one_sided=True),
+        kind_of(slopes, prints[:, 20:25], values, 0.3, only_sign=1),
+        kind_of(slopes, prints[:, 25:30], values, 0.3, only_sign=-1),
         kind_of(slopes, prints[:, 30:], values, 3.0),
     ]
 

@@ -21,21 +21,21 @@ def smooth_fingerprints() -> tuple[Array, Array, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def family() -> Family:
-    slopes, prints, one_sided = smooth_fingerprints()
+    slopes, prints, only_sign = smooth_fingerprints()
     errors = np.random.default_rng(11).standard_normal((score_test.NULL_DRAWS, ROWS))
-    return family_of(score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints), one_sided, errors, 3)
+    return family_of(score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints), only_sign, errors, 3)
 
 
 @pytest.fixture(scope="module")
 def best_scores(family: Family) -> Array:
     """|T| of the best fingerprint of residuals that are errors only, after the true parameters were calibrated."""
-    slopes, prints, one_sided = smooth_fingerprints()
+    slopes, prints, only_sign = smooth_fingerprints()
     random, found = np.random.default_rng(12), []
     for _ in range(NULLS):
         values = slopes @ random.standard_normal(SLOPES) + random.standard_normal(ROWS)
         z = np.linalg.solve(slopes.T @ slopes + np.eye(SLOPES), slopes.T @ values)
         projected = score_test.project(slopes, values - slopes @ z, z, prints)
-        found.append(np.abs(score_test.scores(projected, one_sided)).max())
+        found.append(np.abs(score_test.scores(projected, only_sign)).max())
     return np.array(found)
 
 

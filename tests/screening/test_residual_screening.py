@@ -142,3 +142,10 @@ def test_what_was_set_aside_is_not_set_aside_again() -> None:
     again = kind_of(screened(values, flagged=(7,)), "reading")
     assert again.size[7] == 0.0
     assert again.best != 7
+
+
+@pytest.mark.parametrize(("low", "high", "sign"), [(0.0, 0.9, 1), (-0.9, 0.0, -1), (-0.9, 0.9, 0)])
+def test_an_amplitude_on_one_side_of_off_has_one_sign(low: float, high: float, sign: int) -> None:
+    amplitude = Amplitude("share", "-", "", 0.3, low, high)
+    assert amplitude.only_sign == sign
+    assert {way for way in (1, -1) if amplitude.allows(0.1 * way, 1.0)} == ({sign} if sign else {1, -1})

@@ -43,13 +43,14 @@ def test_the_score_of_a_planted_effect_is_its_length(problem: tuple[np.ndarray, 
     assert found[3] / projected.length[3] == pytest.approx(2.5), "the amplitude to first order"
 
 
-def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.ndarray, np.ndarray]) -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_effect_with_one_sign_is_not_accused_of_the_other(problem: tuple[np.ndarray, np.ndarray], sign: int) -> None:
     slopes, fingerprints = problem
-    projected = score_test.project(slopes, -2.5 * fingerprints[:, 3], np.zeros(SLOPES), fingerprints)
-    one_sided = np.zeros(PRINTS, bool)
-    one_sided[3] = True
-    assert score_test.scores(projected, one_sided)[3] == 0.0
-    assert score_test.scores(projected, ~one_sided)[3] < -5.0
+    projected = score_test.project(slopes, -2.5 * sign * fingerprints[:, 3], np.zeros(SLOPES), fingerprints)
+    only_sign = sign * np.eye(PRINTS, dtype=int)[3]
+    assert score_test.scores(projected, only_sign)[3] == 0.0
+    assert sign * score_test.scores(projected, -only_sign)[3] < -5.0
+    assert sign * score_test.scores(projected, 0 * only_sign)[3] < -5.0
 
 
 def test_the_fewest_groups_hold_what_is_asked() -> None:

@@ -50,13 +50,13 @@ class Rival:
     units: Array
     size: Array
     log_prior: Array
-    one_sided: np.ndarray
+    only_sign: np.ndarray
     law: bool
 
     def log_evidence(self, residual: Array) -> float:
         """Of all its columns together, for a residual (rows,)."""
         score = self.units.T @ residual
-        score = np.where(self.one_sided & (score < 0.0), 0.0, score)
+        score = np.where(self.only_sign * score < 0.0, 0.0, score)
         return float(np.logaddexp.reduce(log_factors(score, self.size) + self.log_prior))
 
 
@@ -65,7 +65,7 @@ def rivals_of(screening: LawScreening) -> list[Rival]:
 
     def rival(kind: Any, said: Said, columns: Any, law: bool = False) -> Rival:
         parts = (kind.projected.units[:, columns], kind.size[columns], kind.log_prior[columns])
-        return Rival(said, *parts, kind.one_sided[columns], law)
+        return Rival(said, *parts, kind.only_sign[columns], law)
 
     listed, *others = screening.listed.kinds
     traces = screening.listed.fingerprints

@@ -53,6 +53,11 @@ class Amplitude:
     off: float = 0.0
     power: int = 1
 
+    @property
+    def only_sign(self) -> int:
+        """The only sign that its gain may have, 0 where it may have both."""
+        return int(self.low >= self.off) - int(self.high <= self.off)
+
     def gain(self, value: float) -> float:
         """g = |value - off|^power with the sign of value - off, to which predictions change in proportion."""
         return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)

@@ -29,14 +29,14 @@ class HypothesisKind:
     """Hypotheses of one kind, whitened and projected.
 
     log_prior (c,): ln of the chance of each column before the data; size (c,): a = s |S_perp| [-]; scores T (c,);
-    one_sided (c,): whether its amplitude has one sign, so that a score below 0 counts as 0.
+    only_sign (c,): the only sign that its amplitude may have, 0 for both: a score of the other counts as 0.
     """
 
     name: str
     projected: score_test.Projected
     log_prior: Array
     size: Array
-    one_sided: np.ndarray
+    only_sign: np.ndarray
     scores: Array
 
     @property
@@ -61,13 +61,13 @@ class HypothesisKind:
 
 
 def kind_of_hypotheses(
-    name: str, projected: score_test.Projected, plausible: Array, prior: Array, one_sided: np.ndarray | None = None
+    name: str, projected: score_test.Projected, plausible: Array, prior: Array, only_sign: np.ndarray | None = None
 ) -> HypothesisKind:
     """plausible (c,): s [unit of the size]; prior (c,): chance of each column before the data."""
-    if one_sided is None:
-        one_sided = np.zeros(plausible.size, dtype=bool)
-    scores = score_test.scores(projected, one_sided)
-    return HypothesisKind(name, projected, np.log(prior), plausible * projected.length, one_sided, scores)
+    if only_sign is None:
+        only_sign = np.zeros(plausible.size, dtype=int)
+    scores = score_test.scores(projected, only_sign)
+    return HypothesisKind(name, projected, np.log(prior), plausible * projected.length, only_sign, scores)
 
 
 def log_factors(scores: Array, size: Array) -> Array:
@@ -105,7 +105,7 @@ class _DrawnTerms:
     """ln (B prior) = constant + factor T^2 of each column of a kind (c,), T = draw . unit; units (rows, c)."""
 
     units: Single
-    one_sided: np.ndarray
+    only_sign: np.ndarray
     constant: Array
     factor: Array
 
@@ -113,7 +113,7 @@ class _DrawnTerms:
 def _drawn_terms(kind: HypothesisKind) -> _DrawnTerms:
     constant = log_factors(np.zeros(kind.size.size), kind.size) + kind.log_prior
     return _DrawnTerms(
-        kind.projected.units.astype(np.float32), kind.one_sided, constant, 0.5 * prior_shrinkage(kind.size)
+        kind.projected.units.astype(np.float32), kind.only_sign, constant, 0.5 * prior_shrinkage(kind.size)
     )
 
 
@@ -127,7 +127,8 @@ def _sums_of_kind(one: _DrawnTerms, drawn: Single) -> Array:
     if not one.constant.size:
         return np.full(len(drawn), -np.inf)
     values = (drawn @ one.units).astype(np.float64)
-    values[:, one.one_sided] = np.maximum(values[:, one.one_sided], 0.0)
+    values[:, one.only_sign > 0] = np.maximum(values[:, one.only_sign > 0], 0.0)
+    values[:, one.only_sign < 0] = np.minimum(values[:, one.only_sign < 0], 0.0)
     np.square(values, out=values)
     values *= one.factor
     values += one.constant

@@ -34,8 +34,8 @@ class Family:
         return float(np.sqrt(np.quantile(self.maxima, 1.0 - rate)))
 
 
-def family_of(projected: score_test.Projected, one_sided: np.ndarray, errors: Array, seed: int) -> Family:
+def family_of(projected: score_test.Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Family:
     """Scores of fingerprints against their residual, and what they come to in whitened errors (draws, n) alone."""
-    drawn = score_test.null_draws(projected, one_sided, errors, seed) ** 2
+    drawn = score_test.null_draws(projected, only_sign, errors, seed) ** 2
     maxima = np.asarray(drawn.max(axis=1, initial=0.0))
-    return Family(score_test.scores(projected, one_sided), maxima)
+    return Family(score_test.scores(projected, only_sign), maxima)

@@ -30,9 +30,9 @@ class Fingerprints:
     places: tuple[Places, ...]
 
     @property
-    def one_sided(self) -> np.ndarray:
-        """Whether the effect of each column (c,) has amplitudes on one side of off only."""
-        return np.array([amplitude.low >= amplitude.off for amplitude in self.amplitudes], bool)
+    def only_sign(self) -> np.ndarray:
+        """The only sign that a gain of each column (c,) may have, 0 where it may have both."""
+        return np.array([amplitude.only_sign for amplitude in self.amplitudes], dtype=int)
 
     def allowed(self, gains: Array, largest: float) -> np.ndarray:
         """Whether gains (c,), and their opposites, are allowed for each column, (2, c); see `Amplitude.allows`."""

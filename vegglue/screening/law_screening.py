@@ -187,6 +187,6 @@ def of_listed(full: Screening, listed: Fingerprints) -> Screening:
         fingerprints=listed,
         whitened_fingerprints=full.whitened_fingerprints[:, :count],
         projected=projected,
-        effects=family_of(projected, listed.one_sided, full.errors, LAW_SEED),
+        effects=family_of(projected, listed.only_sign, full.errors, LAW_SEED),
         kinds=(kind_of_listed(listed, projected), *full.kinds[1:]),
     )

@@ -116,7 +116,7 @@ def screen(
         whitened_slopes=noise.whiten(slope),
         whitened_fingerprints=noise.whiten(of_effects),
         projected=projected,
-        effects=family_of(projected, fingerprints.one_sided, errors, seed),
+        effects=family_of(projected, fingerprints.only_sign, errors, seed),
         kinds=(
             kind_of_listed(fingerprints, projected),
             *_kinds_of_places(fingerprints, in_places),
@@ -143,7 +143,7 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
     prior = np.empty(plausible.size)
     for columns in fingerprints.columns:
         prior[columns] = 1.0 / (GROUPS * len(fingerprints.columns) * columns.size)
-    return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.one_sided)
+    return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)
 
 
 def _kinds_of_places(

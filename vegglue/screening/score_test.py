@@ -53,16 +53,16 @@ def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Pr
     return Projected(basis, remaining - basis @ (basis.T @ remaining), seen, length, visible)
 
 
-def scores(projected: Projected, one_sided: np.ndarray) -> Array:
+def scores(projected: Projected, only_sign: np.ndarray) -> Array:
     """T = S_perp' r / |S_perp| (c,); 0 where an effect that only has one sign would need the other."""
-    return _signed(projected.units.T @ projected.residual, one_sided)
+    return _signed(projected.units.T @ projected.residual, only_sign)
 
 
-def null_draws(projected: Projected, one_sided: np.ndarray, errors: Array, seed: int) -> Array:
+def null_draws(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Array:
     """T (draws, c) of residuals that are errors (draws, n) only; the rows of the prior are drawn here."""
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), projected.residual.size - errors.shape[1]))
     noise = np.hstack([errors, of_prior]).astype(np.float32)
-    return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), one_sided)
+    return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), only_sign)
 
 
 def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping[float, np.ndarray]) -> Array:
@@ -130,5 +130,5 @@ def _lengths(columns: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,ij->j", columns, columns)))
 
 
-def _signed(values: Array, one_sided: np.ndarray) -> Array:
-    return np.where(one_sided & (values < 0), 0.0, values)
+def _signed(values: Array, only_sign: np.ndarray) -> Array:
+    return np.where(only_sign * values < 0, 0.0, values)

@@ -39,7 +39,7 @@ def second_look(screening: Screening) -> SecondLook | None:
     found = responses(model, point, fingerprints.causes)
     slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
     projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(found)))
-    score = score_test.scores(projected, fingerprints.one_sided)
+    score = score_test.scores(projected, fingerprints.only_sign)
     size = projected.length * np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     nothing = float(projected.residual @ projected.residual)
     log_factor = 0.5 * (objective(noise, search.point) - nothing) + log_factors(score, size)
