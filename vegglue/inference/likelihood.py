@@ -1,5 +1,6 @@
 """How well each member of an ensemble predicts what was measured: residuals, efficiency and likelihood."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,11 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
-from vegglue.measurements.kinds import unstated_errors
+from vegglue.measurements.kinds import kind_of, unstated_errors
+
+# Readings of a kind from which the size of its errors is taken from the residual [-]: from ten it is known to a fourth,
+# 1 / (2 (n - 1))^(1/2). A model passes through one or two exactly, and the likelihood of a size has no bound then.
+LEAST_FOR_SIZE = 10
 
 
 @dataclass(frozen=True)
@@ -34,8 +39,10 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
 
     prediction (member, station), NaN where a member failed.
 
-    best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2;
-    known: the standard errors of the data. E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
+    best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2,
+    and as `sizes_as_stated` says where they are few; known: the standard errors of the data.
+
+    E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
 
     Errors: InputError when no member was solved, a standard error is missing, or sigma would be zero.
     """
@@ -47,13 +54,13 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
     value = station["value"].to_numpy(float)
     residual = np.where(solved[:, None], value - prediction, np.nan)
     mean_square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
-    errors = _known_errors(station, used) if rule == "known" else None
+    errors, few = (_known_errors(station, used) if rule == "known" else None), sizes_as_stated(station)
     if errors is None:
-        misfit = _profile_misfit(mean_square, kinds)
+        misfit = _profile_misfit(mean_square, kinds, few)
     else:
         misfit = np.sum((residual / errors)[:, used] ** 2, axis=1)
     best = int(np.nanargmin(misfit))
-    sigma = {kind: float(np.sqrt(each[best])) for kind, each in mean_square.items()}
+    sigma = {kind: float(np.sqrt(each[best])) for kind, each in mean_square.items()} | few
     noise = station["kind"].map(sigma).to_numpy(float) if errors is None else errors
     return MemberFit(
         solved=solved,
@@ -63,6 +70,18 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
         efficiency=efficiency(residual, station),
         log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy(bool)),
     )
+
+
+def sizes_as_stated(station: pd.DataFrame) -> dict[str, float]:
+    """Standard errors of kinds with fewer than LEAST_FOR_SIZE used readings [unit of the kind]: the root mean square of
+    those stated, the usual one where any is not.
+    """
+    error = station["standard_error"].to_numpy(float)
+    few = {kind: error[rows] for kind, rows in stations_by_kind(station).items() if rows.size < LEAST_FOR_SIZE}
+    return {
+        kind: root_mean_square(stated) if (stated > 0).all() else kind_of(kind).usual_error
+        for kind, stated in few.items()
+    }
 
 
 def efficiency(residual: Array, station: pd.DataFrame) -> Array:
@@ -82,15 +101,23 @@ def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Array:
     return errors
 
 
-def _profile_misfit(mean_square: dict[str, Array], kinds: dict[str, NDArray[np.intp]]) -> Array:
-    """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]."""
+def _profile_misfit(
+    mean_square: dict[str, Array], kinds: dict[str, NDArray[np.intp]], few: Mapping[str, float]
+) -> Array:
+    """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]; of those
+    that are few sum_k n_k s_k^2 / e_k^2, e_k their standard errors.
+    """
     for kind, each in mean_square.items():
-        if np.nanmin(each) == 0:
+        if kind not in few and np.nanmin(each) == 0:
             raise InputError(
                 f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the residual; "
                 "give standard errors and use `infer.sigma: known`."
             )
-    return np.sum([len(kinds[kind]) * np.log(each) for kind, each in mean_square.items()], axis=0)
+    terms = [
+        len(kinds[kind]) * (each / few[kind] ** 2 if kind in few else np.log(each))
+        for kind, each in mean_square.items()
+    ]
+    return np.sum(terms, axis=0)
 
 
 def _variance(values: Array) -> float:

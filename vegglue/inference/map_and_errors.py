@@ -18,7 +18,7 @@ from vegglue.calibration.noise import Noise, noise_of, with_grid_error
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
-from vegglue.inference.likelihood import fit_members
+from vegglue.inference.likelihood import fit_members, sizes_as_stated
 from vegglue.inference.tried_members import TriedMembers, grids_of
 from vegglue.parallel import in_threads, side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
@@ -200,13 +200,13 @@ def _initial_noise(model: Model, tried: TriedMembers, rule: str) -> Noise:
 
 
 def _with_estimated_sizes(noise: Noise, fitted: MapEstimate, station: pd.DataFrame) -> Noise:
-    """s_k^2 = sum_k r^2 / (n_k (1 - p / n)) for each kind k; p: effective number of parameters."""
+    """s_k^2 = sum_k r^2 / (n_k (1 - p / n)) for each kind k of enough readings; p: effective number of parameters."""
     residual = noise.residual(fitted.point.prediction)
     kind = station["kind"].to_numpy()[noise.rows]
     determined = fitted.covariance.shape[0] - float(np.trace(fitted.covariance))
     free = max(1.0 - determined / residual.size, 1.0 / residual.size)
     sigma = {str(k): float(np.sqrt(np.mean(residual[kind == k] ** 2) / free)) for k in np.unique(kind)}
-    return noise_of(station.assign(standard_error=np.nan), sigma)
+    return noise_of(station.assign(standard_error=np.nan), sigma | sizes_as_stated(station))
 
 
 def _refitted(model: Model, noise: Noise, fits: list[MapEstimate]) -> list[MapEstimate]:

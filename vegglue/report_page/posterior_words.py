@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.figures.typography import PLAIN_TEXT, Notation
+from vegglue.inference.likelihood import sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
@@ -208,8 +209,10 @@ def _modes(posterior: Posterior, modes: PosteriorModes) -> str:
 def _errors(posterior: Posterior, model: ErrorModel) -> list[str]:
     sizes = errors_by_kind(posterior.fit.sigma, "for")
     if model.errors == "estimated":
+        few = " and ".join(kind_of(name).words for name in sizes_as_stated(posterior.station))
+        few = f" (that of {few} not, for want of readings)" if few else ""
         estimate = (
-            f"The errors are estimated from what the best place leaves, {sizes}: what the model misses counts as "
+            f"The errors are estimated from what the best place leaves, {sizes}{few}: what the model misses counts as "
             "error, so its chi2 says nothing; give standard errors and `infer.sigma: known` to test the model."
         )
         return [estimate, *_neighbours(model)]
