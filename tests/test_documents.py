@@ -15,6 +15,8 @@ from reach import ENVIRONMENT, ROOT, block, command, write_reach
 
 import vegglue
 from vegglue.cli.main import app
+from vegglue.effects.library import library
+from vegglue.screening.candidates import NOT_SEARCHED
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.
@@ -205,3 +207,11 @@ def printed(line: str, folder: Path) -> list[str]:
     )
     assert done.returncode == 0, f"$ {line}\n{done.stderr}"
     return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md"])
+def test_pages_count_the_effects_that_can_be_named(page: str) -> None:
+    nameable = [one for one in library(None).values() if not NOT_SEARCHED & set(one.tags)]
+    counted = re.search(r"one of (\d+) effects|each of (\d+) causes", (ROOT / page).read_text(encoding="utf-8"))
+    assert counted
+    assert int(counted[1] or counted[2]) == len(nameable)

@@ -102,6 +102,7 @@ def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
         ("outlet: {}", "outlet: {range: [4.26, 4.75]}", "The outlet holds no cell centre"),
         ("{side: west}", "{side: west, range: [4.26, 4.75]}", "Inflow upstream holds no cell centre"),
         ("{side: west}", "{side: west, range: [4.2, 5]}", "Inflow upstream lies above the water of experiment low"),
+        ("{side: west}", "{side: south, range: [2, 6]}", "Inflow upstream lies above the water of experiment low"),
         ("members: 1024}", "members: 1024}\ninfer: {sigma: known}", None),
         (
             "discharge: 2.0, level: 1.0}",

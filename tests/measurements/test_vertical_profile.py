@@ -124,3 +124,13 @@ def test_canopy_height_is_unknown_for_emergent_plants():
     assert np.isnan(canopy.value)
     assert "no canopy top" in canopy.reason
     assert "enough points" in fit_canopy_height([]).reason
+
+
+def test_canopy_height_is_unknown_where_verticals_share_no_height():
+    low, high = (
+        Column(heights, np.full(5, 0.2), np.full(5, 0.01), DEPTH)
+        for heights in (np.linspace(0.05, 0.2, 5), np.linspace(0.65, 0.8, 5))
+    )
+    canopy = fit_canopy_height([low, high])
+    assert np.isnan(canopy.value)
+    assert "share no height" in canopy.reason

@@ -14,6 +14,7 @@ from vegglue.calibration.noise import (
     with_independent_grid_errors,
     with_model_error,
 )
+from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -79,8 +80,9 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     """The calibrated model, from z = `known` (p,), else from the best points of the prior on coarse grids.
 
     What can be is done on cells of twice the size: there a fit costs a quarter. Errors: InputError when no steady flow
-    is found.
+    is found, or there is nothing to calibrate.
     """
+    refuse_without_parameters(model.case)
     noise, coarse = noise_of(model.station), coarser(model)
     if coarse is None:
         start = _best_from_prior(model, noise) if known is None else linearise(model, known)

@@ -14,10 +14,17 @@ from vegglue.arrays import Array
 from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
+from vegglue.errors import InputError, shown_path
 
 Bounds = tuple[float, float]
 # Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.
 FURTHEST = 6.0
+
+
+def refuse_without_parameters(case: Case) -> None:
+    """Errors: InputError for a case with nothing to calibrate."""
+    if not case.parameters:
+        raise InputError(f"{shown_path(case.source)}: `parameters` expected a prior or more, got none: add one.")
 
 
 def theta_at(case: Case, z: Array) -> dict[str, Array]:

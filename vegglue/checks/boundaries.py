@@ -45,7 +45,7 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
             cells = inflow_cells(side, site.grid)
             if not cells.size:
                 yield f"Inflow {inflow} holds no cell centre: no water can enter."
-            elif side.side == "west" and not (edge[cells] > 0).any():
+            elif not (edge[cells] > 0).any():
                 yield f"Inflow {inflow} lies above the water of experiment {name}."
 
 

@@ -28,6 +28,8 @@ def shown_bounds(bounds: Bounds) -> str:
 def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]:
     """Its size against what quantiles and Sobol' points need, and what the observations can settle."""
     members, table = case.simulate.members, observations.table
+    if not case.parameters:
+        yield "There are no `parameters`: every command that simulates or calibrates will refuse this; add a prior."
     if members < FEW_MEMBERS and case.infer.method == "glue":
         yield f"Only {members} members will be simulated: quantiles need some hundreds."
     if members & (members - 1):

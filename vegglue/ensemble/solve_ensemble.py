@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vegglue.case.parameter_space import PriorSample, parameters_at, sample_of, sobol_sample
+from vegglue.case.parameter_space import PriorSample, parameters_at, refuse_without_parameters, sample_of, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_PREDICTIONS
@@ -90,8 +90,7 @@ def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], wat
 
 def refuse_too_many(case: Case, observations: Observations) -> None:
     """Errors: InputError for a case without parameters, or with more predictions than a file is laid out for."""
-    if not case.parameters:
-        raise InputError(f"{shown_path(case.source)}: `parameters` expected a prior or more, got none: add one.")
+    refuse_without_parameters(case)
     if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
         raise InputError(
             f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "

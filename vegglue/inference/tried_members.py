@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import z_at
+from vegglue.case.parameter_space import refuse_without_parameters, z_at
 from vegglue.case.prior import sample_prior
 from vegglue.engine.interface import Model, linearise, predict
 from vegglue.engine.model import ever_coarser
-from vegglue.errors import InputError
 from vegglue.results.ensemble import Ensemble
 from vegglue.site.channel_geometry import cells_across
 
@@ -42,8 +41,7 @@ def points_of_prior(model: Model) -> TriedMembers:
 
     Errors: InputError for a case without parameters.
     """
-    if not model.names:
-        raise InputError(f"{model.case.name}: `parameters` expected a prior or more, got none: add one.")
+    refuse_without_parameters(model.case)
     coarsest = grids_of(model)[0]
     z = z_at(model.case, sample_prior(model.case.parameters, TRIED_POINTS, model.case.simulate.seed))
     middle = linearise(coarsest, np.zeros(z.shape[1]))

@@ -147,6 +147,8 @@ def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
         return CanopyHeight(np.nan, np.nan, 0, "no vertical inside the plants has enough points")
     lowest = max(column.height[1] for column in columns)
     highest = min(column.height[-2] for column in columns)
+    if lowest >= highest:
+        return CanopyHeight(np.nan, np.nan, len(columns), "the verticals share no height at which a top could lie")
     tops = np.arange(lowest, highest, CANOPY_STEP)
     misfit = np.sum([_with_offset(column, tops)[2] for column in columns], axis=0)
     uniform = sum(_with_offset(column, np.array([np.inf]))[2][0] for column in columns)

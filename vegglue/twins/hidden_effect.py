@@ -92,8 +92,13 @@ def case_hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
 
 
 def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
-    """A probe of velocity that reads wrong, by `size` standard errors if that is given."""
+    """A probe of velocity that reads wrong, by `size` standard errors if that is given.
+
+    Errors: InputError where no section has two velocities.
+    """
     velocity = np.flatnonzero(np.isfinite(errors.separation).sum(axis=1) > 1)  # gauges have no neighbours
+    if not velocity.size:
+        raise InputError(f"--hide {BAD_PROBE} expected a section with two velocities or more, got none; hide another.")
     station = int(errors.rows[random.choice(velocity)])
     excess = size_given(f"{BAD_PROBE}={size}", size)
     return Hidden(BAD_PROBE, BAD * float(random.choice([-1.0, 1.0])) if excess is None else excess, {}, 0.0, station)

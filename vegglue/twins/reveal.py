@@ -99,9 +99,7 @@ def _truth(hidden: Hidden) -> str:
 def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     truth = f"Hidden: {_truth(mark.hidden)}. "
     if mark.hidden.name == BAD_PROBE:
-        alone = (
-            " The verdict was instrument: nothing else is missing." if diagnosis.verdict.kind == "instrument" else ""
-        )
+        alone = " The verdict was instrument." if diagnosis.verdict.kind == "instrument" else ""
         return truth + ("It was set aside." + alone if mark.found else "It was not noticed.")
     if not mark.hidden.listed:
         told = f"The verdict was {diagnosis.verdict.kind}"

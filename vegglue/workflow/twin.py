@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vegglue.case.config import load_case
+from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.errors import InputError
 from vegglue.parallel import one_thread
 from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.twins.reveal import guess_in_words
@@ -37,8 +37,7 @@ def make_twin(
     """
     refuse_command(case, "twin")
     model = model_in(case)
-    if not case.parameters:
-        raise InputError(f"{case.source}: `parameters` expected a prior or more, got none; add one.")
+    refuse_without_parameters(case)
     station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
     return load_case(write_twin(case, Path(to), station, sealed_answer(answer), force))
 

@@ -1,0 +1,61 @@
+"""Cases that hold as little as a case can: what they lack is told in a sentence, and what they hold is used."""
+
+import re
+from pathlib import Path
+
+import pytest
+from reach import COARSE, block, said_to, write_reach
+
+from vegglue.cli.main import main
+
+
+def thin(folder: Path, lines: int) -> Path:
+    """The coarse brook with its first measurements only."""
+    config = write_reach(folder, COARSE)
+    table = folder / "velocities.csv"
+    table.write_text("".join(block("csv").splitlines(keepends=True)[: lines + 1]), encoding="utf-8")
+    return config
+
+
+def without_parameters(folder: Path) -> Path:
+    """The coarse brook with numbers in place of its priors."""
+    config = write_reach(folder, COARSE)
+    text = re.sub(r"^(parameters:|  (n_b|phi): {distribution).*\n", "", config.read_text("utf-8"), flags=re.MULTILINE)
+    config.write_text(text.replace("n: n_b", "n: 0.05").replace("phi: phi", "phi: 8"), encoding="utf-8")
+    return config
+
+
+@pytest.mark.parametrize("command", ["diagnose", "next", "discover", "run", "simulate", "infer"])
+def test_nothing_to_calibrate_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    config = without_parameters(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    code, told = said_to(monkeypatch, capsys, command, config, "--jobs", 1)
+    assert (code, "`parameters` expected a prior or more, got none" in told) == (2, True), told
+
+
+def test_check_remarks_that_there_is_nothing_to_calibrate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = without_parameters(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["vegglue", "check", str(config)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert "There are no `parameters`" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("lines", [1, 5])
+def test_one_reading_and_one_section_are_diagnosed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lines: int
+) -> None:
+    config = thin(tmp_path, lines)
+    monkeypatch.chdir(tmp_path)
+    text = config.read_text(encoding="utf-8").replace("experiment: June}", "experiment: June, standard_error: 0.01}")
+    config.write_text(text, encoding="utf-8")
+    for command in ("diagnose", "next"):
+        code, told = said_to(monkeypatch, capsys, command, config, "--jobs", 1)
+        assert code == 0, told
+        assert "Traceback" not in told
