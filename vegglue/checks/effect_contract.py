@@ -14,6 +14,7 @@ from vegglue.checks.trial_channel import PAIRS, Trial, answer, at_rest, dry, mir
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
+from vegglue.errors import InputError
 from vegglue.flow.backwater import backwater
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
@@ -30,6 +31,8 @@ def breaches(effect: Effect, own: Path | None = None) -> list[str]:
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise", under="ignore"):
             return [sentence for check in CHECKS for sentence in check(tried)]
+    except InputError as error:
+        return [str(error)]
     except (ArithmeticError, *OF_ITS_FUNCTION) as error:
         return [f"its function fails: {type(error).__name__}: {error}"]
 

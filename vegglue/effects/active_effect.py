@@ -1,5 +1,6 @@
 """An effect with the values of its parameters, and what a stage hands on after all that act there."""
 
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,10 +45,7 @@ def applied(
         on = active.on
         if active.effect.stage != stage or not on.any():
             continue
-        try:
-            change = active.effect.act(surroundings, **active.values)
-        except SystemExit:  # of a user's effect; it would end the command as if all were well
-            raise InputError(f"The effect `{active.effect.name}` ends the program when it acts; mend it.") from None
+        change = _change(active, surroundings, now)
         for name, value in change.items():
             if name in added:
                 now[name] = now[name] + _chosen(on, value, np.zeros(1))
@@ -56,6 +54,43 @@ def applied(
         if not added:
             surroundings = replace(surroundings, **{name: now[name] for name in change})
     return now
+
+
+def _change(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -> Mapping[str, Array]:
+    """What the effect makes of its surroundings; now: what the stage hands on so far.
+
+    Errors: InputError where the effect of a user fails, or gives what the stage does not hand on.
+    """
+    act = active.effect.act
+    try:
+        change = act(surroundings, **active.values)
+    except SystemExit:  # it would end the command as if all were well
+        raise InputError(f"The effect `{active.effect.name}` ends the program when it acts; mend it.") from None
+    except Exception as error:
+        if act.__module__.startswith("vegglue."):
+            raise
+        line = traceback.extract_tb(error.__traceback__)[-1].lineno
+        what = f"{type(error).__name__}: {error}"
+        name = active.effect.name
+        raise InputError(f"The effect `{name}` fails when it acts, in line {line}: {what}; mend it.") from None
+    if not act.__module__.startswith("vegglue."):
+        _refuse_misfits(active.effect, change, now)
+    return change
+
+
+def _refuse_misfits(effect: Effect, change: Any, now: Mapping[str, Array]) -> None:
+    """Errors: InputError for anything but arrays by the names and of the shapes that its stage hands on."""
+    expected = f"expected a dict with {' or '.join(f'`{name}`' for name in now)}"
+    if not isinstance(change, Mapping):
+        raise InputError(f"The effect `{effect.name}` gives {type(change).__name__}; {expected}.")
+    for name, value in change.items():
+        if name not in now:
+            raise InputError(f"The effect `{effect.name}` gives `{name}`; {expected}.")
+        try:
+            np.broadcast_shapes(np.shape(value), np.shape(now[name]))
+        except ValueError:
+            shapes = f"the shape {np.shape(now[name])}, got {np.shape(value)}"
+            raise InputError(f"The effect `{effect.name}` gives `{name}`; expected {shapes}.") from None
 
 
 def _chosen(on: NDArray[np.bool_], value: Array, otherwise: Array) -> Array:

@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Cause, Point, responses
+from vegglue.errors import InputError
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of
 from vegglue.screening.places import Places, places_of
 
@@ -47,6 +48,9 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     tried = [one.settings() for one in candidates]
     every = [(one, shapes) for one, settings in zip(candidates, tried, strict=True) for shapes in settings]
     causes = [cause_of(model.case, one, shapes) for one, shapes in every]
+    values = responses(model, point, causes)
+    for column in np.flatnonzero(~np.isfinite(values[model.station["used"].to_numpy(bool)]).all(axis=0)):
+        raise InputError(f"The effect `{every[column][0].name}` gives what is no finite number; mend it.")
     return Fingerprints(
         point=point,
         candidates=candidates,
@@ -54,6 +58,6 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
         settings=[shapes for _, shapes in every],
         amplitudes=[one.amplitude for one, _ in every],
         causes=causes,
-        values=responses(model, point, causes),
+        values=values,
         places=places_of(model, point, half_width),
     )

@@ -1,0 +1,54 @@
+"""Effects of a user that fail when they act: a sentence with their name, whatever the command."""
+
+from pathlib import Path
+
+import pytest
+from reach import COARSE, said_to, write_reach
+
+EFFECT = '''from vegglue.effects.definition import Amplitude, Effect
+
+
+def act(cells, excess):
+    """k -> k (1 + a)."""
+    {body}
+
+
+EFFECTS = (Effect(
+    name="slow_stones", stage="resistance", title="Stones hold back slow water", act=act,
+    equation="k -> k (1 + a)", source="a guess",
+    amplitude=Amplitude("excess", "-", "relative excess of friction", scale=0.5, low=-0.9, high=5.0),
+),)
+'''
+SMALL = ("simulate: {members: 1024, seed: 7}", "simulate: {members: 4, seed: 7}\neffect_file: stones.py")
+ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.01}")
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("raise KeyError('x')", "The effect `slow_stones` fails when it acts, in line 6: KeyError: 'x'; mend it."),
+        ("return {'rate': cells.rate * float('nan')}", "The effect `slow_stones` gives what is no finite number"),
+        ("return {'rate': cells.rate[:2, :2] * excess}", "The effect `slow_stones` gives `rate`; expected the shape"),
+        ("return {'ratte': cells.rate}", "The effect `slow_stones` gives `ratte`; expected a dict with `rate`."),
+        ("cells.rate * (1 + excess)", "The effect `slow_stones` gives NoneType; expected a dict with `rate`."),
+    ],
+)
+def test_what_an_effect_does_wrong_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], body: str, said: str
+) -> None:
+    config = write_reach(tmp_path, COARSE, SMALL, ERRORS)
+    (tmp_path / "stones.py").write_text(EFFECT.format(body=body), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    code, told = said_to(monkeypatch, capsys, "diagnose", config, "--trust", "--jobs", 1)
+    assert (code, said in told) == (2, True), told
+
+
+def test_an_effect_at_work_that_fails_ends_a_simulation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write_reach(tmp_path, COARSE, SMALL, ERRORS)
+    config.write_text(config.read_text("utf-8") + "effects: {slow_stones: {values: {excess: 0.3}}}\n", encoding="utf-8")
+    (tmp_path / "stones.py").write_text(EFFECT.format(body="raise KeyError('x')"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    code, told = said_to(monkeypatch, capsys, "simulate", config, "--trust", "--jobs", 1)
+    assert (code, "fails when it acts, in line 6" in told) == (2, True), told
