@@ -52,3 +52,25 @@ def test_an_effect_at_work_that_fails_ends_a_simulation(
     monkeypatch.chdir(tmp_path)
     code, told = said_to(monkeypatch, capsys, "simulate", config, "--trust", "--jobs", 1)
     assert (code, "fails when it acts, in line 6" in told) == (2, True), told
+
+
+@pytest.mark.parametrize(
+    ("changed", "to", "said"),
+    [
+        ('"slow_stones"', '"slow stones"', "expected letters, digits and underscores, got `slow stones`"),
+        ('"resistance"', '"resitance"', "expected one of site, boundary, plants, resistance"),
+        ("EFFECTS = (Effect(", "EFFECTS = ()\nOTHERS = (Effect(", "got none in it"),
+    ],
+)
+def test_what_no_command_could_use_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    changed: str,
+    to: str,
+    said: str,
+) -> None:
+    text = EFFECT.format(body="return {'rate': cells.rate * (1 + excess)}").replace(changed, to)
+    (tmp_path / "stones.py").write_text(text, encoding="utf-8")
+    code, told = said_to(monkeypatch, capsys, "effects", "--check", tmp_path / "stones.py", "--trust")
+    assert (code, said in told) == (2, True), told

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from vegglue.effects import boundary, exchange, force, grammar, plants, resistance, sensor, site, unlisted
-from vegglue.effects.definition import Effect
+from vegglue.effects.definition import STAGES, Effect
 from vegglue.errors import InputError, shown_path
 
 SHIPPED: tuple[Effect, ...] = (
@@ -53,4 +53,18 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
     found = getattr(module, "EFFECTS", None)
     if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):
         raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {type(found).__name__}; add it.")
+    if not found:
+        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got none in it; add one.")
+    for effect in found:
+        _refuse_unusable(effect, shown)
     return found
+
+
+def _refuse_unusable(effect: Effect, shown: str) -> None:
+    """Errors: InputError for a name that no config and no command can hold, or a stage that there is not."""
+    if not (effect.name.isascii() and effect.name.isidentifier()):
+        said = f"expected letters, digits and underscores, got `{effect.name}`"
+        raise InputError(f"{shown}: the name of an effect {said}; correct it.")
+    if effect.stage not in STAGES:
+        said = f"expected one of {', '.join(STAGES)}, got `{effect.stage}`"
+        raise InputError(f"{shown}: the stage of `{effect.name}` {said}; correct it.")
