@@ -74,3 +74,15 @@ def test_what_no_command_could_use_is_refused(
     (tmp_path / "stones.py").write_text(text, encoding="utf-8")
     code, told = said_to(monkeypatch, capsys, "effects", "--check", tmp_path / "stones.py", "--trust")
     assert (code, said in told) == (2, True), told
+
+
+def test_a_case_with_an_effect_file_can_be_twinned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = write_reach(tmp_path, COARSE, SMALL, ERRORS)
+    (tmp_path / "stones.py").write_text(EFFECT.format(body="return {'rate': cells.rate * (1 + excess)}"), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert said_to(monkeypatch, capsys, "twin", config, "--hide", "slow_stones=0.4", "--to", "twin", "--trust")[0] == 0
+    assert said_to(monkeypatch, capsys, "reveal", "twin", "--trust") == (0, "")
+    code, told = said_to(monkeypatch, capsys, "reveal", "twin")
+    assert (code, "add --trust" in told) == (2, True), told

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import vegglue
-from vegglue.cli.options import Force, Json, Quiet, Runs
+from vegglue.cli.options import Force, Json, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
 from vegglue.errors import shown_path
 
@@ -24,9 +24,10 @@ def twin_command(
     as_object: Json = False,
     quiet: Quiet = False,
     force: Force = False,
+    trust: Trust = False,
 ) -> None:
     """Make measurements with a hidden effect, to play blind against `diagnose`; the answer is sealed."""
-    parent = vegglue.load_case(config)
+    parent = vegglue.load_case(config, trust)
     case = vegglue.make_twin(parent, to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed, force=force)
     from vegglue.measurements.observations import read_observations
 
@@ -37,7 +38,7 @@ def twin_command(
         return
     print(f"{target}: {measurements} measurements.")
     if not quiet:
-        print(f"Next: {command_line('diagnose', target)}, then {command_line('reveal', to)}")
+        print(f"Next: {command_line('diagnose', target, trust=trust)}, then {command_line('reveal', to, trust=trust)}")
 
 
 def reveal_command(
@@ -45,9 +46,10 @@ def reveal_command(
     runs: Runs = Path("runs"),
     as_object: Json = False,
     quiet: Quiet = False,
+    trust: Trust = False,
 ) -> None:
     """Open the seal of a twin, and say how well its diagnosis guessed."""
-    lines = vegglue.reveal(folder, runs=runs)
+    lines = vegglue.reveal(folder, runs=runs, trust=trust)
     if as_object:
         print_object({"folder": folder, "sentences": lines})
         return

@@ -39,16 +39,17 @@ def make_twin(
     model = model_in(case)
     refuse_without_parameters(case)
     station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
-    return load_case(write_twin(case, Path(to), station, sealed_answer(answer), force))
+    # The twin names the effect file of its case, which was trusted when that was read.
+    return load_case(write_twin(case, Path(to), station, sealed_answer(answer), force), case.effect_file is not None)
 
 
-def reveal(folder: Path | str, *, runs: Path | str = "runs") -> list[str]:
+def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False) -> list[str]:
     """Open the seal of a twin: what is true and, where there is a diagnosis of it, how well that guessed; one sentence
-    each. Errors: InputError when there is no seal, or it is broken.
+    each. trust: as for `load_case`. Errors: InputError when there is no seal, or it is broken.
     """
     folder = Path(folder)
     answer = opened_answer(folder / SEAL)
-    case = load_case(config_in(folder))
+    case = load_case(config_in(folder), trust)
     there = Path(runs) / case.name
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
     lines = guess_in_words(answer, diagnosis)
