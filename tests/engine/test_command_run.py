@@ -60,6 +60,7 @@ def test_a_run_that_ends_badly_says_why(tmp_path: Path, program: str, reason: st
         ("station,prediction\n", "no prediction of station 0 and 1 more"),
         ("station,prediction\n0,1\n1,nan\n", "row 3: expected a station and a finite number, got '1,nan'"),
         ("station,prediction\n0,1\n1,inf\n", "row 3: expected a station and a finite number, got '1,inf'"),
+        ("station,prediction\n0,1\n1,-1e300\n", "row 3: expected a prediction of at most 1e+09, got -1e+300"),
         ("station,prediction\n0,1\n1,wet\n", "row 3: expected a station and a finite number, got '1,wet'"),
         ("station,prediction\n0,1\n1,\n", "row 3: expected a station and a finite number, got '1,'"),
         ("station,prediction\n0,1\n1\n", "row 3: expected a station and a finite number, got '1'"),

@@ -20,6 +20,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.observations import LARGEST_READING
 from vegglue.site.channel_geometry import patches_present
 
 PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"
@@ -93,6 +94,10 @@ def _row(row: int, line: str, stations: int) -> tuple[int, float]:
     if not sound:
         raise BadPredictionsError(
             f"{PREDICTIONS_FILE}, row {row}: expected a station and a finite number, got {line[:40]!r}"
+        )
+    if abs(value) > LARGEST_READING:
+        raise BadPredictionsError(
+            f"{PREDICTIONS_FILE}, row {row}: expected a prediction of at most {LARGEST_READING:g}, got {value:g}"
         )
     if not 0 <= number < stations:
         raise BadPredictionsError(
