@@ -27,7 +27,7 @@ from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.screening.places import EFFECT_AT_PLACE
-from vegglue.workflow.extend import in_words, write_child
+from vegglue.workflow.extend import extend, in_words, write_child
 
 ROOT = Path(__file__).parents[2]
 
@@ -41,6 +41,13 @@ def test_a_child_says_what_it_adds_and_reads_back(tmp_path: Path) -> None:
     assert child.effects["discharge_error_high"].experiments == ("high",)
     assert set(child.parameters) - set(case.parameters) == {"discharge_error_high_relative_error"}
     assert child.observations == case.observations
+
+
+def test_a_name_that_is_given_twice_is_added_once(tmp_path: Path) -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    added = ("streamlining", ["streamlining"], ["streamlining", "streamlining"])
+    names = [extend(case, one, to=tmp_path / f"{number}.yaml").name for number, one in enumerate(added)]
+    assert names == ["twin-streamlining"] * 3
 
 
 def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:

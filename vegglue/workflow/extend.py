@@ -66,7 +66,7 @@ class StepwiseExtension:
 
 def extend(
     case: Case,
-    add: Sequence[str],
+    add: str | Sequence[str],
     *,
     shapes: Mapping[str, float] | None = None,
     to: Path | str | None = None,
@@ -74,11 +74,12 @@ def extend(
 ) -> Case:
     """Write a config that extends the case by effects, each with a prior for its amplitude, and read it.
 
-    add: names such as `streamlining` or `discharge_error[high]`; shapes: values of their shapes by name; to: the config
-    to write, beside the parent if not given; force: replace a file there that vegglue did not write, too. Errors:
-    InputError for an unknown effect, place or shape, or a file that would be replaced.
+    add: one name or several, such as `streamlining` or `discharge_error[high]`; shapes: values of their shapes by name;
+    to: the config to write, beside the parent if not given; force: replace a file there that vegglue did not write,
+    too. Errors: InputError for an unknown effect, place or shape, or a file that would be replaced.
     """
-    added = named_candidates(case, add, shapes or {})
+    names = [add] if isinstance(add, str) else list(dict.fromkeys(add))
+    added = named_candidates(case, names, shapes or {})
     target = child_path(case.source, [one for one, _ in added]) if to is None else Path(to)
     return write_child(case, target, added, force)
 
