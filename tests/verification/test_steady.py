@@ -389,6 +389,5 @@ def test_what_cannot_be_solved_says_so():
     x = centres(30.0, 60)
     problem = over(0.4 * (x < 15.0) - 0.002 * x)
     settled = march_to_rest(problem, backwater(problem), 1e-8, USUAL_FALL_BACK)
-    assert settled.steady or "of marching" in settled.sentence or "still changing" in settled.sentence
-    if settled.steady:
-        assert discharge(problem, settled.state) == pytest.approx(3.0, rel=1e-6)
+    assert not settled.steady
+    assert "not finite within 600 s of marching" in settled.sentence

@@ -54,8 +54,9 @@ NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
 # one of them on a perfect site: what two codes differ by looks like a probe or a gauge that is a little off.
 CLEARLY_OFF = 4.5
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
+ABSURD = 4.0
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
-ABSURD, FAR_OFF = 4.0, 4.0
+FAR_OFF = 4.0
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = 0.01
