@@ -71,7 +71,7 @@ class Ensemble:
     @property
     def by_command(self) -> bool:
         """Whether its members are runs of a command, of which no mass error is known."""
-        return bool((self.status == RUN_BY_COMMAND).any())
+        return bool((self.status == RUN_BY_COMMAND).any()) or "\nengine:" in f"\n{self.config}"
 
     def __repr__(self) -> str:
         newton, marched, failed, run = (
