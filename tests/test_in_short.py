@@ -1,5 +1,6 @@
 """How values show themselves in a notebook: a few lines, with units and the sentence that matters."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from vegglue.diagnosis.excluded_stations import MEASUREMENT
 from vegglue.diagnosis.next_measurement import MeasurementPlan, MeasurementWorth
 from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import KINDS, errors_in_short
+from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.extend import StepwiseExtension
@@ -63,6 +65,15 @@ def test_an_ensemble_counts_its_members(tmp_path: Path) -> None:
     assert shown[0] == "Ensemble of 12 members: 4 solved by Newton's method, 4 by marching, 4 failed"
     assert "  2 stations, in use 1 of velocity, 0 of level" in shown
     assert "  largest mass error 1e-05 of the discharge" in shown
+
+
+def test_members_that_all_failed_were_run_by_a_command_only_where_there_is_one(tmp_path: Path) -> None:
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header())
+    found = read_ensemble(tmp_path / "ensemble.h5")
+    nothing = replace(found, status=np.full(12, FAILED, np.int8), mass_error=np.full(12, np.nan))
+    assert repr(nothing).startswith("Ensemble of 12 members: 0 solved by Newton's method, 0 by marching, 12 failed\n")
+    by_command = replace(nothing, config="name: brook\nengine:\n  command: own\n")
+    assert repr(by_command).startswith("Ensemble of 12 members: 0 run by the command, 12 failed\n")
 
 
 @pytest.mark.parametrize("found", [a_diagnosis(), NOTHING])
