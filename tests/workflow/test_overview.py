@@ -16,7 +16,9 @@ from vegglue.workflow.overview import overview
 def with_a_law_as_child(folder: Path) -> None:
     """small.yaml, its child with an effect file, and the ladder that `run` keeps of both."""
     (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
-    (folder / "own.py").write_text("EFFECTS = ()\n", encoding="utf-8")
+    own = "from dataclasses import replace\nfrom vegglue.effects.force import EFFECTS as KNOWN\n"
+    own += "EFFECTS = (replace(KNOWN[0], name='own_force'),)\n"
+    (folder / "own.py").write_text(own, encoding="utf-8")
     (folder / "child.yaml").write_text("extends: small.yaml\nname: child\neffect_file: own.py\n", encoding="utf-8")
     wanted = case_hash(load_case(folder / "small.yaml"))
     errors = (0.1, 0.1, 0.1, 0.1, 0.01)
