@@ -284,7 +284,7 @@ def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     one = "one more effect hide beside it" if something_named else "exactly one effect hide here"
     said = (
-        f"Should {one}, of about three standard errors, it is most likely one of these, "
+        f"Should {one}, of two to four standard errors, it is most likely one of these, "
         f"the likeliest first: {', '.join(names[:NAMES_SHOWN])}{more}; what is smaller may be any."
     )
     return [said] if names else []
