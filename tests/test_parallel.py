@@ -42,8 +42,9 @@ def test_what_is_found_stands_in_the_order_of_the_tasks() -> None:
         assert in_threads(late, [(number,) for number in range(5)]) == list(range(5))
 
 
-def test_no_jobs_at_all_are_refused() -> None:
-    with pytest.raises(InputError, match="got 0"), at_most(0):
+@pytest.mark.parametrize("jobs", [0, -5])
+def test_a_number_of_jobs_that_means_nothing_is_refused(jobs: int) -> None:
+    with pytest.raises(InputError, match=f"got {jobs}"), at_most(jobs):
         pass
 
 

@@ -96,9 +96,12 @@ def side_by_side(
 
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
-    """So many threads at once in all that is done within; -1 for one on every core. Errors: InputError for 0."""
-    if jobs == 0:
-        raise InputError("jobs: expected the number of cores to use, or -1 for all of them, got 0.")
+    """So many threads at once in all that is done within; -1 for one on every core.
+
+    Errors: InputError for any other that is not positive.
+    """
+    if jobs == 0 or jobs < -1:
+        raise InputError(f"jobs: expected the number of cores to use, or -1 for all of them, got {jobs}.")
     cores = int(cpu_count()) if jobs < 0 else jobs
     spare, allowed = _SPARE.set(Semaphore(cores - 1)), _CORES.set(cores)
     try:
