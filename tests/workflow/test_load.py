@@ -42,7 +42,8 @@ def test_everything_in_a_folder_is_loaded(run: Path) -> None:
 
 def test_a_loaded_run_says_what_it_holds(run: Path) -> None:
     shown = repr(vegglue.load(run))
-    for part in ("Run in", "ensemble: 12 member", "fields:", "posterior: n_b, phi", "Missing: eddies", "2 rows"):
+    sizes = ("ensemble: 12 members, 2 stations", "fields:", "2 rows")
+    for part in ("Run in", *sizes, "posterior: n_b, phi", "Missing: eddies"):
         assert part in shown
 
 

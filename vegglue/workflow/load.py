@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import pandas as pd
 
 from vegglue.errors import InputError
-from vegglue.in_short import in_short
+from vegglue.in_short import in_short, so_many
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.labelled_arrays import read_inference_data, read_labelled
 from vegglue.storage.result_files import read_diagnosis
@@ -43,7 +43,7 @@ class LoadedRun:
     def __repr__(self) -> str:
         sized = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
         lines = [
-            f"{name}: {', '.join(f'{size:,} {dim}' for dim, size in data.sizes.items())}"
+            f"{name}: {', '.join(so_many(size, str(dim)) for dim, size in data.sizes.items())}"
             for name, data in sized.items()
             if data is not None
         ]
