@@ -10,6 +10,7 @@ from vegglue.calibration.fit import chance_of_misfit, chi2, interval95
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
 from vegglue.diagnosis.tempered_chances import tempering
@@ -98,6 +99,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
+        stretch=stretch_in_words(last.base.model.case, last.base.model.station, [one.accepted for one in found.steps]),
     )
 
 

@@ -68,7 +68,7 @@ class Grounds:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
     neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
     far; between: errors between the sections that were measured, over those of the data [-], at most; laws: those that
-    stand out.
+    stand out; stretch: what is told of the part of the channel that was measured, '' for nothing.
     """
 
     errors: EstimatedErrors
@@ -82,6 +82,7 @@ class Grounds:
     strained: tuple[str, float]
     between: float = 1.0
     laws: LawsSuspected | None = None
+    stretch: str = ""
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
@@ -91,6 +92,8 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     kind, sentence = _sentence(grounds, suspects)
     law = grounds.laws is not None and law_in_words(grounds.laws) in sentence
     remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
+    if grounds.stretch:
+        remarks.append(grounds.stretch)
     if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."
