@@ -34,6 +34,7 @@ def measured_with(place: dict[str, float], drag: float) -> Screening:
     return screen(Baseline(model, noise, fit(model, noise, point), None, None))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag", [0.3, -0.2])
 def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None:
     screening = measured_with({"x": 14.3, "y": 0.2, "length": 0.5, "width": 0.45}, drag)

@@ -56,6 +56,7 @@ def test_the_ensemble_is_the_same(pair: Pair) -> None:
     assert "16 run by the command, 0 failed" in repr(command)
 
 
+@pytest.mark.slow
 def test_weighed_members_give_the_same_posterior(pair: Pair) -> None:
     inside, command = (
         vegglue.infer(case, runs=pair.runs, method="glue").marginals for case in (pair.inside, pair.command)

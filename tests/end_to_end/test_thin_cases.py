@@ -47,6 +47,7 @@ def test_check_remarks_that_there_is_nothing_to_calibrate(
     assert "There are no `parameters`" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [1, 5])
 def test_one_reading_and_one_section_are_diagnosed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lines: int

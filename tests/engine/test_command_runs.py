@@ -100,6 +100,7 @@ def test_all_folders_stay_where_the_config_says_so(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_so_many_run_at_once_as_jobs_allow(tmp_path: Path) -> None:
     slow = "import time; began = time.time(); time.sleep(0.4); open('span', 'w').write(f'{began} {time.time()}')\n"
     (tmp_path / "one").mkdir()

@@ -157,6 +157,7 @@ def test_the_angle_is_that_of_the_mouth(imported: Path) -> None:
     assert (side.side, side.range, side.angle) == ("south", (0.0, 0.15), 45.0)
 
 
+@pytest.mark.slow
 def test_water_flows_in_the_middle_of_the_priors(imported: Path) -> None:
     for bed in ("junction", "junction-flat"):
         model = model_in(load_case(imported.with_stem(bed)))

@@ -67,6 +67,7 @@ def both_ways(tmp_path_factory: pytest.TempPathFactory) -> tuple[Posterior, Post
         return refine(read_ensemble(folder / "ensemble.h5"), case, observations), refine(None, case, observations)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [0, 1], ids=["ensemble", "prior"])
 def test_both_modes_are_found_and_weigh_the_same(both_ways: tuple[Posterior, Posterior], way: int) -> None:
     found = both_ways[way]

@@ -281,6 +281,7 @@ def test_an_interval_of_a_share() -> None:
     assert interval(20, 20)[1] == 1.0
 
 
+@pytest.mark.slow
 def test_the_page(tmp_path: Path) -> None:
     out = {"key": "second/twin/listed6/9", "truth": "second", "case": "twin", "group": "listed6"}
     reason = "--hide sun: at no plausible size would it be as visible as --snr 6 in these data; ask for less."
@@ -306,6 +307,7 @@ def test_the_page(tmp_path: Path) -> None:
         assert (tmp_path / f"blind-{name}.svg").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
     objects = [pier("none-of-these" if j > 2 else "cannot-tell") | {"key": f"pier{j}"} for j in range(6)]
     lengths = {f"pier{j}": 2.0 + j for j in range(6)} | {"of no record": 1.0}
@@ -316,6 +318,7 @@ def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
     assert "0 of 2 of the shortest third (2.0 to 3.0), 1 of 2 of the middle third (4.0 to 5.0)" in page
 
 
+@pytest.mark.slow
 def test_how_far_errors_change_is_told(tmp_path: Path) -> None:
     def kept(errors: float) -> dict[str, Any]:
         return NAMED | {"held_out": {"noise": 1.0, "before": 1.0, "after": 1.0, "parent": 1.0, "kept": errors}}
@@ -327,12 +330,14 @@ def test_how_far_errors_change_is_told(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_page_without_records(tmp_path: Path) -> None:
     write_page([], tmp_path, {}, {}, {})
     assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert len(list(tmp_path.glob("blind-*.svg"))) == 4
 
 
+@pytest.mark.slow
 def test_sets_sized_in_the_truth_stand_by_themselves(tmp_path: Path) -> None:
     sized = [pier("none-of-these") | {"sized": "truth"}, pier("cannot-tell") | {"sized": "truth"}]
     write_page([pier("cannot-tell"), *sized], tmp_path, {}, {}, {})

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from reach import COARSE, write_reach
 
 import vegglue
@@ -16,6 +17,7 @@ def write_beside(folder: Path, name: str, line: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_ensemble_of_a_run_beside_is_shared(tmp_path: Path) -> None:
     runs, heard = tmp_path / "runs", list[Progress]()
     case = vegglue.load_case(write_reach(tmp_path, COARSE, ("members: 1024", "members: 8")))
