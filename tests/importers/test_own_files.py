@@ -234,12 +234,25 @@ def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
     assert table[["x", "value", "section"]].to_numpy().tolist() == [[6.0, 0.6096, "A"]]
 
 
+@pytest.mark.parametrize("heading", ["Geschw. (cm/s)", "Geschw. [cm/s]", "Geschw., cm/s", "Geschw_cm_s", "Geschw cm/s"])
+def test_the_unit_of_a_heading_counts_whatever_its_name_is(tmp_path: Path, heading: str) -> None:
+    entry = f"files: {{a.csv: {{columns: {{u: '{heading}', x: 'Ort (flach)'}}}}}}\n"
+    table = f"Ort (flach);y;{heading}\n4;0;10\n8;0;20\n"
+    case = vegglue.import_folder(
+        folder_of(tmp_path / "brook", CHANNEL + JUNE + entry, a__csv=table), tmp_path / "b.yaml"
+    )
+    assert case.imported is not None
+    assert (case.imported[0].units["u"], case.imported[0].units["x"]) == ("cm/s", "m")
+    assert read_observations(case).table["value"].tolist() == [0.1, 0.2]
+
+
 @pytest.mark.parametrize(
     ("site", "table", "said"),
     [
         ("files: {b.csv: {}}", "x,y,u\n1,2,3\n", "`files` names b.csv, which is not there"),
         ("files: {a.csv: {colums: {}}}", "x,y,u\n1,2,3\n", "does not know `colums`: did you mean `columns`?"),
         ("files: {a.csv: {columns: {u: V9}}}", "x,y,u\n1,2,3\n", "expected the column 'V9' for u, got x, y, u"),
+        ("files: {a.csv: {columns: {V9: u}}}", "x,y,V9\n1,2,3\n", "expected what is measured first, `u: V9`"),
         ("files: {a.csv: {units: {u: furlong}}}", "x,y,u\n1,2,3\n", "expected a unit of velocity, got 'furlong'"),
         ("", "x,y,u [m3]\n1,2,3\n", "is headed 'm3', which is no unit of velocity"),
         ("", "a,b\n1,2\n", "expected columns that can be told by their names, got a, b"),

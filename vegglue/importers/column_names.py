@@ -42,7 +42,8 @@ ROLES = {
                                    "mean speed")),
         Role("direction", "angle", ("direction", "dir", "flow direction", "velocity direction", "azimuth")),
         Role("level", "length", ("level", "water level", "wse", "water surface", "water surface elevation", "stage",
-                                 "ws", "wl", "wasserstand", "wasserspiegel", "z ws", "waterlevel", "gauge height")),
+                                 "ws", "wl", "wasserstand", "wasserspiegel", "pegel", "z ws", "waterlevel",
+                                 "gauge height")),
         Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q")),
         Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
                                   "standard error", "se", "verr")),
@@ -54,7 +55,7 @@ ROLES = {
         Role("duration_s", "time", ("duration", "duration s", "sampling time", "record length", "averaging time")),
         Role("tape", "length", ("loc", "location", "tape", "distance from bank", "distance", "dist")),
         Role("depth", "length", ("depth", "h", "water depth", "tiefe", "wassertiefe")),
-        Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil")),
+        Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil", "profil")),
         Role("experiment", "", ("experiment", "run", "test", "campaign", "versuch", "event")),
         Role("device", "", ("device", "instrument", "probe", "sensor")),
     )
@@ -73,6 +74,15 @@ def role_of(heading: str) -> tuple[str, str | None] | None:
         if found is not None and ROLES[found].quantity and (said := unit_named(word, ROLES[found].quantity)):
             return found, said
     return None
+
+
+def unit_stated(heading: str, quantity: str) -> str | None:
+    """The unit of a quantity that a heading states, whatever its name is: `cm/s` for `Geschw. (cm/s)`, `V, cm/s` and
+    `V_cm_s`; None where it states none.
+    """
+    bare, unit = _apart(heading)
+    words = [unit, *(word for _, word in _suffixed(bare))]
+    return next((said for word in words if (said := unit_named(word, quantity))), None)
 
 
 def _apart(heading: str) -> tuple[str, str]:

@@ -78,7 +78,9 @@ def file_words(given: Any, where: str) -> FileWords:
 def _by_role(given: Any, where: str) -> dict[str, str]:
     if not isinstance(given, Mapping):
         raise InputError(f"{where} expected entries such as `u: V_mean`, got {given!r}.")
-    for name in given:
+    for name, value in given.items():
+        if name not in ROLES and str(value) in ROLES:
+            raise InputError(f"{where} expected what is measured first, `{value}: {name}`, got `{name}: {value}`.")
         if name not in ROLES:
             raise InputError(f"{where} does not know `{name}`: {nearest(str(name), ROLES)}")
     return {str(name): str(value) for name, value in given.items()}

@@ -8,7 +8,7 @@ import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, role_of, words_of
+from vegglue.importers.column_names import ROLES, role_of, unit_stated, words_of
 from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
@@ -213,14 +213,16 @@ def _unit(path: Path, table: LooseTable, place: int, role: str, words: FileWords
     quantity = ROLES[role].quantity
     if role in words.units:
         return unit_named(words.units[role], quantity) or words.units[role]
-    known = role_of(table.headings[place])
-    stated = table.units[place].strip("[]() ") or (known[1] if known else None) or _bracketed(table.headings[place])
+    heading = table.headings[place]
+    known = role_of(heading)
+    stated = table.units[place].strip("[]() ") or (known[1] if known else None) or _bracketed(heading)
+    stated = stated or unit_stated(heading, quantity)
     if not stated:
         return next(iter(UNITS[quantity]))
     unit = unit_named(stated, quantity)
     if unit is None:
         raise InputError(
-            f"{shown_path(path)}: column {table.headings[place]!r} is headed {stated!r}, which is no unit of "
+            f"{shown_path(path)}: column {heading!r} is headed {stated!r}, which is no unit of "
             f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file."
         )
     return unit
