@@ -215,8 +215,8 @@ def _unit(path: Path, table: LooseTable, place: int, role: str, words: FileWords
         return unit_named(words.units[role], quantity) or words.units[role]
     heading = table.headings[place]
     known = role_of(heading)
-    stated = table.units[place].strip("[]() ") or (known[1] if known else None) or _bracketed(heading)
-    stated = stated or unit_stated(heading, quantity)
+    by_heading = (known[1] if known else None) or _bracketed(heading) or unit_stated(heading, quantity)
+    stated = table.units[place].strip("[]() ") or by_heading
     if not stated:
         return next(iter(UNITS[quantity]))
     unit = unit_named(stated, quantity)
