@@ -148,6 +148,15 @@ def test_many_stations_outside_are_one_sentence(tmp_path):
     assert of_grid == ["2 places of experiment low, the first at x = -1, y = 0 m, are outside the grid, and not used."]
 
 
+def test_exchanged_axes_are_said_first(tmp_path):
+    exchanged = "".join(f"low,A,{y},{x},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))
+    first, second, *_ = odd(tmp_path, rows=ROWS.splitlines()[0] + "\n" + exchanged)
+    assert first.startswith("All 4 velocities outside the grid, the first at x = -1, y = 12 m, would lie inside with x")
+    assert second.startswith("4 places of experiment low")
+    beyond = exchanged.replace(",20,", ",50,")  # which no exchange brings inside
+    assert not [one for one in odd(tmp_path, rows=ROWS.splitlines()[0] + "\n" + beyond) if "exchanged" in one]
+
+
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [

@@ -14,7 +14,12 @@ from vegglue.checks.channel_and_plants import (
 )
 from vegglue.checks.directions import remarks_on_directions
 from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
-from vegglue.checks.stations import remarks_on_absurd_values, remarks_on_patch_edges, remarks_on_stations
+from vegglue.checks.stations import (
+    remarks_on_absurd_values,
+    remarks_on_exchanged_axes,
+    remarks_on_patch_edges,
+    remarks_on_stations,
+)
 from vegglue.checks.steep_flow import remarks_on_steep_flow
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
@@ -22,13 +27,19 @@ from vegglue.site.gridded_site import Site
 
 def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
     """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values."""
-    return [*remarks_on_absurd_values(case, site, observations), *remarks_on_directions(case, observations)]
+    return [
+        *remarks_on_absurd_values(case, site, observations),
+        *remarks_on_exchanged_axes(case, observations),
+        *remarks_on_directions(case, observations),
+    ]
 
 
 def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
     remarks = (
         remarks_on_absurd_values(case, site, observations),
+        remarks_on_exchanged_axes(case, observations),
+        remarks_on_stations(case, site, observations),
         remarks_on_directions(case, observations),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
@@ -40,7 +51,6 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_steep_flow(case, site),
         remarks_on_canopies(case, site, observations),
         remarks_on_bank_law(case, site),
-        remarks_on_stations(case, site, observations),
         remarks_on_patch_edges(case, observations),
         remarks_on_discharges(case, observations),
     )

@@ -38,6 +38,20 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
             )
 
 
+def remarks_on_exchanged_axes(case: Case, observations: Observations) -> Iterator[str]:
+    """Velocities of which most are outside the grid, and would all lie inside, were x and y exchanged."""
+    table = observations.table[velocity_rows(observations.table)]
+    lost = table[(table["reason"] == OUTSIDE).to_numpy(bool)]
+    (west, east), (south, north) = case.grid.x, case.grid.y
+    turned = lost["y"].between(west, east) & lost["x"].between(south, north)
+    if 2 * len(lost) > len(table) and turned.all():
+        yield (
+            f"All {len(lost)} velocities outside the grid, the first at x = {lost['x'].iloc[0]:g}, y = "
+            f"{lost['y'].iloc[0]:g} m, would lie inside with x and y exchanged: x runs along the channel and y across; "
+            "check which column is which."
+        )
+
+
 def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[str]:
     """Stations of velocity so near to the edge of a patch that the model interpolates across it."""
     table = observations.table[velocity_rows(observations.table)]
