@@ -27,5 +27,13 @@ def test_models_of_other_measurements_are_refused(case: Case, tmp_path: Path) ->
 
 
 def test_models_of_one_name_are_refused(case: Case, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected models of different names, got brook twice"):
-        vegglue.compare([case, case], runs=tmp_path / "runs")
+    other = case.model_copy(update={"eddy_viscosity": 0.02})
+    with pytest.raises(InputError, match="expected models of different names, got two called brook"):
+        vegglue.compare([case, other], runs=tmp_path / "runs")
+
+
+@pytest.mark.slow
+def test_a_model_may_be_there_twice(case: Case, tmp_path: Path) -> None:
+    """Who extends by hand what `extend --auto` has extended has two files of one model."""
+    first, second = vegglue.compare([case, case], runs=tmp_path / "runs").rungs
+    assert first.in_sample.chi2 == second.in_sample.chi2

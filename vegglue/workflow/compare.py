@@ -43,7 +43,7 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     comparison.json in the folder of each.
 
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when models have
-    other measurements or one name, when one finds no flow, or a station has no standard error.
+    other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
     """
     _refuse_other_measurements(cases)
     hashes, aside = [case_hash(case) for case in cases], left_out(cases, runs)
@@ -59,11 +59,13 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
 
 
 def _refuse_other_measurements(cases: Sequence[Case]) -> None:
-    """Errors are compared station by station, and kept in a folder for each name."""
+    """Errors are compared station by station, and kept in a folder for each name; one model may be there twice."""
     first, *others = cases
     for number, case in enumerate(others, 1):
-        if case.name in {one.name for one in cases[:number]}:
-            raise InputError(f"compare: expected models of different names, got {case.name} twice; name one otherwise.")
+        if any(one.name == case.name and case_hash(one) != case_hash(case) for one in cases[:number]):
+            raise InputError(
+                f"compare: expected models of different names, got two called {case.name}; name one otherwise."
+            )
         if not _measured(case).equals(_measured(first)):
             raise InputError(
                 f"compare: expected {case.name} and {first.name} to be fitted to the same measurements, got others; "
