@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.child_config import candidate_at, candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
@@ -16,7 +16,7 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import LawsSuspected, LawSuspected
-from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.diagnosis import Diagnosis, Step, Suspect
 from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
 from vegglue.screening.candidates import Candidate
 from vegglue.storage.kept_words import write_questions
@@ -70,10 +70,10 @@ def next_measurement(
 ) -> list[Question]:
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
-    between: names of effects or laws, else those that the diagnosis could not tell apart, step by step; where a law
-    stands out, the laws that could be it; where it found nothing, the strongest of those it could not test, each by
-    itself at a plausible size. Only questions nobody chose are kept, in questions.json. Errors: InputError for a name
-    that is not in the diagnosis.
+    between: names of effects or laws, else those that the diagnosis could not tell apart, step by step, and a place
+    that is likelier than they are; where a law stands out, the laws that could be it; where it found nothing, the
+    strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept, in
+    questions.json. Errors: InputError for a name that is not in the diagnosis.
     """
     wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
@@ -111,7 +111,9 @@ def open_question(question: Question) -> OpenQuestion:
 def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     """What the diagnosis leaves open, in words, and the rivals of each question."""
     if found.steps:
-        return [one for step in found.steps if len(step.rivals) > 1 for one in _asked(case, found, step.rivals)]
+        return [
+            _between_rivals(case, found, step) for step in found.steps if len(step.rivals) > 1 or step.likelier_place
+        ]
     laws = laws_to_tell_apart(found.laws)
     if len(laws) > 1:
         return _asked(case, found, laws)
@@ -119,6 +121,17 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     hidden = [one for one in found.suspects if not one.detectability.testable]
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
     return [question for one in strongest for question in _asked(case, found, [one.name])]
+
+
+def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list[Rival]]:
+    """The question of a step: to tell its effects from each other, and from a place that is likelier than they are."""
+    names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
+    if step.likelier_place:
+        place = step.places[step.likelier_place]
+        unlisted = candidate_at(case, place)
+        names.append(unlisted.name)
+        rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
+    return " from ".join(names), rivals
 
 
 def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
