@@ -45,11 +45,21 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
 def nearest(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown word: the known word most like it, else all known ones."""
     known = list(known)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    if near:
-        return f"did you mean `{near[0]}`?"
+    if near := _most_like(word, known):
+        return f"did you mean `{near}`?"
     more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
     return f"known here are {', '.join(known[:MOST_NAMED]) or 'none'}{more}"
+
+
+def nearest_effect(word: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown effect: the known one most like it, else where they are listed."""
+    near = _most_like(word, list(known))
+    return f"did you mean `{near}`?" if near else "`vegglue effects` lists them."
+
+
+def _most_like(word: str, known: list[str]) -> str:
+    """The known word most like another, '' where none is."""
+    return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), "")
 
 
 def dotted(place: KeyPath) -> str:

@@ -34,14 +34,14 @@ def effects_command(
         _check(check, as_object, trust)
         return
     case = vegglue.load_case(config, trust) if config is not None else None
-    from vegglue.case.messages import nearest
+    from vegglue.case.messages import nearest_effect
     from vegglue.effects.library import library
 
     known = library(case.effect_file if case is not None else None)
     if name is None:
         _list(tuple(effect for effect in known.values() if "law" not in effect.tags), as_object)
     elif name not in known:
-        raise InputError(f"effects: there is no effect `{name}`: {nearest(name, known)}")
+        raise InputError(f"effects: there is no effect `{name}`: {nearest_effect(name, known)}")
     else:
         _show(known[name], case, as_object)
         if case is not None and case.observations and not as_object:

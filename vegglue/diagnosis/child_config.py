@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vegglue.case.messages import nearest
+from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LONGEST_NAME, case_name
@@ -38,7 +38,8 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
     found = re.fullmatch(r"(\w+)(?:\[([^\]]+)\])?", name)
     known = library(case.effect_file)
     if found is None or found[1] not in known:
-        raise InputError(f"--add: `{name}` is not an effect of the library: {nearest(name.split('[')[0], known)}")
+        ending = nearest_effect(name.split("[")[0], known)
+        raise InputError(f"--add: `{name}` is not an effect of the library: {ending}")
     effect = known[found[1]]
     where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
     if where and "search" in effect.tags:

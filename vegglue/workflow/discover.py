@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vegglue.case.config import load_case
 from vegglue.case.made_files import write_made
-from vegglue.case.messages import nearest
+from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
@@ -57,7 +57,7 @@ def discover(
     known = library(case.effect_file)
     for name in without:
         if name not in known:
-            raise InputError(f"--without: `{name}` is not an effect of the library: {nearest(name, known)}")
+            raise InputError(f"--without: `{name}` is not an effect of the library: {nearest_effect(name, known)}")
     with at_most(jobs):
         found = discover_laws(model_in(case), without, watch)
     laws = found.written
