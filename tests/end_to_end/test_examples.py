@@ -14,7 +14,7 @@ import vegglue
 PAGE = ROOT / "docs" / "python.md"
 EXAMPLES = ROOT / "docs" / "examples"
 MEMBERS = 64
-SMALL = ("members: 1024", f"members: {MEMBERS}")
+SMALL = ("members: 1024", f"members: {MEMBERS}, fields: {{x: [0, 30]}}")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 pytestmark = pytest.mark.slow
 
@@ -37,10 +37,11 @@ def run_code(text: str, name: str) -> dict[str, object]:
 
 def test_the_page_is_right(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
     blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     names = run_code("\n".join(blocks), PAGE.name)
     assert Path(str(names["page"])).exists()
     assert len(names["ensemble"].status) == MEMBERS
+    assert names["u"].shape == (MEMBERS, 1)
     said = capsys.readouterr().out
     for part in ("Posterior of n_b, phi", "Diagnosis of brook", "Run in runs/brook", "is the mean of phi"):
         assert part in said
