@@ -122,6 +122,13 @@ REFUSED = [
     ),
     ("bank_slope: 0.6667", "bank_slope: true", "(rise over run of the banks [-]) expected a valid number, got True"),
     ("bank_slope: 0.6667", "bank_slope: '0.6'", "got '0.6'; write numbers without quotes"),
+    ("bank_slope: 0.6667", "bank_slope: '0,6'", "got '0,6'; write decimals with a point"),
+    (
+        "name: small",
+        "name: small\nsimulate: {membrs: }",
+        "`simulate.membrs` is not a known key: did you mean `members`?",
+    ),
+    ("level: 0.9", "level: 0.9, plnts: ", "`experiments.low.plnts` is not a known key: did you mean `plants`?"),
     (
         "level: 0.9",
         "level: 0.9 m",

@@ -85,6 +85,12 @@ def test_aliases_and_merged_keys_of_common_size_are_read() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("text", ["{discharge: 2,66, level: 3}", "{a: 0,95 m}", "a: {b: {c: 7,3}}"])
+def test_a_decimal_comma_within_braces_cuts_no_number_short(text: str) -> None:
+    assert "has no value: write decimals with a point, not a comma; correct the YAML there" in refused(text)
+    assert safe_yaml("{a: 1, 2: '', 3: {}}") == {"a": 1, 2: "", 3: {}}
+
+
 def test_a_config_is_a_file_of_some_size() -> None:
     assert "expected at most 1,000,000 bytes, got more" in refused("#" * (LARGEST_CONFIG + 1))
     for place in ("/dev/zero", "."):

@@ -13,12 +13,12 @@ from vegglue.case.config import load_case
 from vegglue.case.frame import Frame
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import CentrelineShape
+from vegglue.errors import InputError
 from vegglue.importers.placement import Placement
 from vegglue.measurements.observations import read_observations
 from vegglue.site.centreline import centreline_of
 from vegglue.site.grid import build_grid, places_on_map
 from vegglue.site.gridded_site import build_site
-from vegglue.workflow.import_folder import assumptions_of
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0, crs="EPSG:2056")
 SAID = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"
@@ -252,11 +252,11 @@ def test_a_line_from_its_other_end(tmp_path: Path) -> None:
     assert "the last one first" in case.imported[0].taken
 
 
-def test_a_key_of_the_grid_that_nobody_reads_is_told(tmp_path: Path) -> None:
+def test_a_misspelt_key_of_the_grid_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "Brook"
     site = GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "grid: {centerline: [[0, 0], [1, 1]]}\n"
-    imported(folder, site, u__csv="x,y,u\n1,0,0.5\n")
-    assert "site.yaml: taken as notes, and not read: grid.centerline." in assumptions_of(folder)
+    with pytest.raises(InputError, match=r"`grid\.centerline` is not a known key: did you mean `centreline`"):
+        imported(folder, site, u__csv="x,y,u\n1,0,0.5\n")
 
 
 def test_without_a_line_the_length_and_the_frame_are_needed(

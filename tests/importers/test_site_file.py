@@ -99,6 +99,16 @@ def test_whatever_stands_of_a_bend_is_read_or_refused(tmp_path: Path, place: tup
             json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5]})),
             "expected `stems_per_m2` of every patch or of none, got none of `patches[0]`; add it there.",
         ),
+        (json.dumps(SITE | {"frmae": {}}), "`frmae` is not a known key: did you mean `frame`?"),
+        (json.dumps(SITE | {"eddy_viscosity": 0.02}), "`eddy_viscosity` is not a known key: did you mean `eddy_visco"),
+        (
+            json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5], "stems": 7})),
+            "`patches[0].stems` is not a known key: did you mean `stems_per_m2`?",
+        ),
+        (
+            json.dumps(put(SITE, ("experiments", "low"), {"discarge": 2, "level": 1})),
+            "`experiments.low.discarge` is not a known key: did you mean `discharge`?",
+        ),
         (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "a name without the sign '\\x00'"),
     ],
     ids=lambda text: text[:20],
@@ -129,10 +139,15 @@ def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
 
 
 def test_what_nobody_said_is_told(tmp_path: Path) -> None:
-    folder = field_folder(tmp_path / "site", eddy_viscosity=0.02, holdout={})
+    folder = field_folder(
+        tmp_path / "site",
+        weather="fine",
+        experiments=put(SITE["experiments"], ("low", "plants"), False),
+        holdout={},
+    )
     assert assumptions_of(folder) == [
         "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01, to within a factor of 2.",
-        "site.json: taken as notes, and not read: eddy_viscosity.",
+        "site.json: taken as notes, and not read: weather, experiments.low.plants.",
         "holdout.csv is not read: site.json names no experiment under `holdout`.",
     ]
     bare = field_folder(tmp_path / "bare", patches=[])

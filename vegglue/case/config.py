@@ -8,7 +8,7 @@ import yaml
 from pydantic import ValidationError
 
 from vegglue.case.consistency import disagreement
-from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal
+from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal, unknown_without_value
 from vegglue.case.resolved_config import Tree
 from vegglue.case.safe_yaml import safe_yaml
 from vegglue.case.schema import Case
@@ -35,6 +35,9 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     if not trust:
         _refuse_settings_of_folder()
     layers = _layers(path, ())
+    for file, layer in layers:
+        if (refusal := unknown_without_value(layer)) is not None:
+            raise _input_error([(file, layer)], refusal)
     tree: Tree = {}
     for _, layer in reversed(layers):
         tree = _merged(tree, layer)

@@ -1,6 +1,7 @@
 """Why the schema refuses a file, as one sentence: where, what was expected, what came, what to do."""
 
 import difflib
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -38,8 +39,28 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
         ("String should match pattern", "text like"),
     ):
         expected = expected.replace(said, meant)
-    quotes = "; write numbers without quotes" if isinstance(got, str) and "number" in expected else ""
-    return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{quotes}".lstrip())
+    advice = _how_numbers_are_written(got) if isinstance(got, str) and "number" in expected else ""
+    return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
+
+
+def unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> Refusal | None:
+    """The first key of a tree that has no value and that no part of a case knows; null only takes known keys away."""
+    known = None if _names_are_free(above) else _keys(above)
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            found = unknown_without_value(value, (*above, key))
+            if found is not None:
+                return found
+        elif value is None and known and key not in known:
+            return Refusal((*above, key), f"is not a known key: {nearest(str(key), known)}")
+    return None
+
+
+def _how_numbers_are_written(got: str) -> str:
+    """The end of a sentence about a text where a number was expected."""
+    if re.fullmatch(r"[-+]?\d+,\d+.*", got):
+        return "; write decimals with a point"
+    return "; write numbers without quotes" if re.fullmatch(r"[-+\d.eE]+", got) else ""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -101,11 +122,27 @@ def _fields(annotation: Any) -> dict[str, Any]:
     return {key: field for part in get_args(annotation) for key, field in _fields(part).items()}
 
 
-def _fields_at(place: KeyPath) -> dict[str, Any]:
+def _annotation_at(place: KeyPath) -> Any:
     annotation: Any = Case
     for key in place:
         annotation = _below(annotation, key)
-    return _fields(annotation)
+    return annotation
+
+
+def _fields_at(place: KeyPath) -> dict[str, Any]:
+    return _fields(_annotation_at(place))
+
+
+def _names_are_free(place: KeyPath) -> bool:
+    """Whether the keys there are names of the user's own, such as those of experiments."""
+    annotation = _annotation_at(place)
+    return any(get_origin(part) is dict for part in (annotation, *_alternatives(annotation)))
+
+
+def _alternatives(annotation: Any) -> list[Any]:
+    """All types within an annotation that is no mapping, such as the sides of a union."""
+    parts = [] if get_origin(annotation) is dict else [*get_args(annotation)]
+    return parts + [inner for part in parts for inner in _alternatives(part)]
 
 
 def _keys(place: KeyPath) -> list[str]:

@@ -1,7 +1,7 @@
 """YAML as a person means it, of bounded size: no tags, no recursion, no aliases that grow without end.
 
 Numbers are those of YAML 1.2: 1e-7 is one, 1:30 and 2024-05-01 are text; 010, which is 8 for some and 10 for others, is
-refused.
+refused, and so is the comma of {discharge: 2,66}, behind which YAML sees a key of its own.
 """
 
 import re
@@ -70,11 +70,19 @@ class _Loader(yaml.SafeLoader):
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys: set[Any] = set()
-        for key_node, _ in node.value:
+        for key_node, value_node in node.value:
             if isinstance(key_node, yaml.ScalarNode) and key_node.value in keys:
                 raise _refused(f"the key `{key_node.value}` stands twice", key_node)
+            if node.flow_style and _is_end_of_number(key_node, value_node):
+                raise _refused(f"`{key_node.value}` has no value: write decimals with a point, not a comma", key_node)
             keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
         return super().construct_mapping(node, deep)
+
+
+def _is_end_of_number(key: yaml.Node, value: yaml.Node) -> bool:
+    """Whether a key without a value is what follows a decimal comma, as 66 in {discharge: 2,66}."""
+    nothing = isinstance(value, yaml.ScalarNode) and value.style is None and not value.value
+    return nothing and isinstance(key, yaml.ScalarNode) and key.value[:1].isdigit()
 
 
 def _refused(problem: str, at: Any) -> ConstructorError:

@@ -4,14 +4,15 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from vegglue.case.config import read_tree
 from vegglue.case.messages import dotted
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.field_site import Channel, FieldSite, SiteFrame, SiteGrid
+from vegglue.importers.field_site import FieldSite
+from vegglue.importers.site_keys import misspelt_key, unread_keys
 
 # What the file of measurements is called that no calibration sees, whatever its ending.
 HELD_OUT = "holdout"
@@ -30,16 +31,14 @@ def held_out_file(folder: Path) -> Path | None:
 
 def read_site(path: Path) -> FieldSite:
     """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
+    given = _given(path)
+    if (misspelt := misspelt_key(given)) is not None:
+        place, known = misspelt
+        raise InputError(f"{shown_path(path)}: `{place}` is not a known key: did you mean `{known}`?")
     try:
-        site = FieldSite.model_validate(read_tree(path) if path.suffix == ".yaml" else _of_json(path))
-    except InputError:
-        raise
+        site = FieldSite.model_validate(given)
     except ValidationError as error:
         raise InputError(f"{shown_path(path)}: {_sentence(error)}") from None
-    except RecursionError:
-        raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
-    except ValueError as error:
-        raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
     _refuse_some_uncounted(path, site)
     return site
 
@@ -60,7 +59,7 @@ def left_open(folder: Path) -> list[str]:
     Errors: InputError as those of `read_site`.
     """
     path = site_file(folder)
-    site, given = read_site(path), read_tree(path) if path.suffix == ".yaml" else _of_json(path)
+    site, given = read_site(path), _given(path)
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         within = f", to within a factor of {site.viscosity_factor:g}" if site.viscosity_factor > 1 else ""
@@ -71,10 +70,7 @@ def left_open(folder: Path) -> list[str]:
         assumed.append("plants equally dense in all patches that have no file")
     if not site.patches:
         assumed.append("no plants")
-    unread = [str(key) for key in given if key not in FieldSite.model_fields]
-    parts: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame}
-    for name, part in parts.items():
-        unread += [f"{name}.{key}" for key in given.get(name) or {} if key not in part.model_fields]
+    unread = unread_keys(given)
     if site.walls is not None and site.channel is not None and site.channel.bank_slope_v_per_h is not None:
         unread.append("channel.bank_slope_v_per_h, as there are walls")
     told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
@@ -84,8 +80,18 @@ def left_open(folder: Path) -> list[str]:
     return told
 
 
-def _of_json(path: Path) -> Any:
-    return json.loads(read_text(path, LARGEST_CONFIG, "a folder to import has one"))
+def _given(path: Path) -> Any:
+    """What a site file says, not checked. Errors: InputError."""
+    if path.suffix == ".yaml":
+        return read_tree(path)
+    try:
+        return json.loads(read_text(path, LARGEST_CONFIG, "a folder to import has one"))
+    except InputError:
+        raise
+    except RecursionError:
+        raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
+    except ValueError as error:
+        raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
 
 
 def _sentence(error: ValidationError) -> str:

@@ -1,0 +1,69 @@
+"""Keys of a site file that nobody reads: notes, or slips of the pen."""
+
+import difflib
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+
+from vegglue.importers.field_site import (
+    Channel,
+    FieldSite,
+    FlumeWalls,
+    PlantedPatch,
+    SiteFrame,
+    SiteGrid,
+)
+
+SITE_PARTS: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls}
+# What an experiment may be described by, each by either name.
+OF_FLOW = (("discharge", "discharge_m3_s"), ("level", "downstream_level_m"))
+# How alike two words are that are one misspelt [-], and letters of a word cut short: `stems` for `stems_per_m2`.
+MISSPELT, CUT_SHORT = 0.8, 4
+
+
+def unread_keys(given: Any) -> list[str]:
+    """The keys of a site file that no reader knows, with where they stand, as in `channel.axis`."""
+    return [place + key for place, key, _ in _unread(given)]
+
+
+def misspelt_key(given: Any) -> tuple[str, str] | None:
+    """The first unknown key, with its place, that is all but a known one which is not given, and that one."""
+    for place, key, missing in _unread(given):
+        close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
+        if close is None and len(key) >= CUT_SHORT:
+            close = next((known for known in missing if known.startswith(key)), None)
+        if close is not None:
+            return place + key, close
+    return None
+
+
+def _unread(given: Any) -> Iterator[tuple[str, str, list[str]]]:
+    """Of each unknown key: the place it stands at, its name, and the known keys that are not given there."""
+    for place, part, known in _parts(given):
+        if isinstance(part, dict):
+            missing = [name for names in known if not set(names) & part.keys() for name in names]
+            names = {name for names in known for name in names}
+            yield from ((place, str(key), missing) for key in part if key not in names)
+
+
+def _parts(given: Any) -> Iterator[tuple[str, Any, list[tuple[str, ...]]]]:
+    """The parts of a site file: where each stands, what is given there, and its known keys, each by all its names."""
+    if not isinstance(given, dict):
+        return
+    yield "", given, _names(FieldSite)
+    for name, model in SITE_PARTS.items():
+        yield f"{name}.", given.get(name), _names(model)
+    for name in ("experiments", "holdout"):
+        flows = given.get(name)
+        for experiment, flow in flows.items() if isinstance(flows, dict) else ():
+            yield f"{name}.{experiment}.", flow, [*OF_FLOW]
+    patches = given.get("patches")
+    if isinstance(patches, dict):
+        yield "patches.", patches, _names(PlantedPatch)
+    for number, patch in enumerate(patches) if isinstance(patches, list) else ():
+        yield f"patches[{number}].", patch, _names(PlantedPatch)
+
+
+def _names(model: type[BaseModel]) -> list[tuple[str, ...]]:
+    return [(name,) for name in model.model_fields]
