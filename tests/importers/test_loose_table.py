@@ -86,3 +86,25 @@ def test_rows_left_out_are_counted(tmp_path: Path, row: str, told: list[str]) ->
     assert said.startswith("12 of velocity")
     for words in told:
         assert words in said
+
+
+def test_two_titles_above_two_rows_are_no_table(tmp_path: Path) -> None:
+    table = read_loosely(table_of(tmp_path, "Levels", "May", "experiment,x,level,note", "low,2.0,0.5,", "low,3.0,0.6,"))
+    assert table.headings == ("experiment", "x", "level")
+    assert len(table.rows) == 2
+
+
+def test_a_number_in_groups_is_no_heading(tmp_path: Path) -> None:
+    table = read_loosely(table_of(tmp_path, "run;x (m);level (m)", "low;1.236,00;0,5", "low;2,0;0,6"))
+    assert table.headings == ("run", "x (m)", "level (m)")
+    assert table.number(table.rows[0][1][1]) == 1236.0
+
+
+def test_text_with_decimal_commas_in_a_workbook_is_numbers(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["x", "y", "u"], ["1,5", 2, "0,25"], ["2,5", 2.5, "0,3"]):
+        book.active.append(row)
+    book.save(tmp_path / "v.xlsx")
+    table = read_loosely(tmp_path / "v.xlsx")
+    assert [[table.number(text) for text in row] for _, row in table.rows] == [[1.5, 2.0, 0.25], [2.5, 2.5, 0.3]]

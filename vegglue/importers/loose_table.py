@@ -1,7 +1,6 @@
 """A table as people have it: any separator, a decimal comma, comments, a title, a row of units; text or XLSX."""
 
 import csv
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
@@ -13,14 +12,13 @@ from zipfile import ZipFile
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.library_files import read_by_library, refuse_larger
+from vegglue.importers.number_words import has_decimal_comma, is_number, number_in
 from vegglue.importers.unit_words import is_unit
 from vegglue.in_short import so_many
 
 COMMENTS = ("#", "%", "//", "!", "$")
 # In the order of trust: a comma may also be decimal, and a space stand in a name.
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
-NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
-MISSING_WORDS = ("", "-", "--", "nan", "na", "n/a", "null", "none", "nodata", "#n/a", "inf", "-inf")
 # Lines from the end of a file by which its separator is told: titles stand at its head.
 LOOKED_AT = 200
 BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or not
@@ -40,11 +38,8 @@ class LooseTable:
     form: str
 
     def number(self, text: str) -> float | None:
-        """A field as a number; None where it says that there is none. Errors: ValueError for any other text."""
-        if text.strip().lower() in MISSING_WORDS:
-            return None
-        plain = text.strip().replace(",", ".") if self.decimal_comma else text.strip()
-        return float(re.sub("[dD]", "e", plain))
+        """A field as a number; None where it says that there is none. Errors: ValueError, with what to do."""
+        return number_in(text, self.decimal_comma)
 
 
 def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
@@ -57,7 +52,7 @@ def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
     lines, comments = _without_comments(readable_text(path))
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
-    comma = separator != "," and _has_decimal_comma(fields)
+    comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
     words = [
         SEPARATORS[separator],
         "decimal comma" if comma else "",
@@ -82,11 +77,6 @@ def readable_text(path: Path) -> str:
         return raw.decode("cp1252", errors="replace")
 
 
-def is_number(text: str) -> bool:
-    """Whether a field is a number, with a decimal point or comma."""
-    return NUMBER.fullmatch(text.strip()) is not None
-
-
 def _without_comments(text: str) -> tuple[list[tuple[int, str]], int]:
     there = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t;,")]
     kept = [(number, line) for number, line in there if not line.lstrip().startswith(COMMENTS)]
@@ -94,12 +84,12 @@ def _without_comments(text: str) -> tuple[list[tuple[int, str]], int]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """That which cuts most lines into equally many fields, two or more."""
+    """That which cuts most lines into equally many fields, two or more; titles are not cut."""
     found, best = " ", 0.0
     for separator in SEPARATORS:
-        counts = Counter(len(_filled(_fields(line, separator))) for line in lines[-LOOKED_AT:])
-        fields, lines_with = counts.most_common(1)[0] if counts else (0, 0)
-        share = lines_with / sum(counts.values()) if fields > 1 else 0.0
+        fields = [len(_filled(_fields(line, separator))) for line in lines[-LOOKED_AT:]]
+        counts = Counter(count for count in fields if count > 1)
+        share = max(counts.values(), default=0) / len(fields) if fields else 0.0
         if share > best + 0.2:
             found, best = separator, share
     return found
@@ -115,11 +105,6 @@ def _filled(fields: list[str]) -> list[str]:
     """The fields without empty ones behind them: lines may end in separators."""
     last = next((place for place in range(len(fields), 1, -1) if fields[place - 1]), 1)
     return fields[:last]
-
-
-def _has_decimal_comma(lines: Sequence[Line]) -> bool:
-    numbers = [field for _, fields in lines for field in fields if is_number(field)]
-    return any("," in field for field in numbers) and not any("." in field for field in numbers)
 
 
 def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool = False) -> LooseTable:
@@ -206,4 +191,10 @@ def _lines_of_sheet(path: Path, rows: Iterable[tuple[Any, ...]]) -> Iterator[Lin
         if any(cell is not None for cell in row):
             size += BYTES_OF_CELL * len(row)
             refuse_larger(path, size)
-            yield number, ["" if cell is None else str(cell).strip() for cell in row]
+            yield number, ["" if cell is None else _with_point(cell) for cell in row]
+
+
+def _with_point(cell: Any) -> str:
+    """A cell as text; a number that was typed as text with a decimal comma has a point then, as true numbers have."""
+    text = str(cell).strip()
+    return text.replace(",", ".") if isinstance(cell, str) and is_number(text) and "." not in text else text

@@ -238,10 +238,10 @@ def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]
     for i, (line, row) in enumerate(table.rows):
         try:
             number = table.number(row[place])
-        except ValueError:
+        except ValueError as error:
             raise InputError(
                 f"{shown_path(path)}, row {line}: expected a number in column {table.headings[place]}, got "
-                f"{row[place]!r}; mend or remove the row."
+                f"{row[place]!r}; {error}."
             ) from None
         values[i] = np.nan if number is None else number
     marked = (

@@ -14,8 +14,9 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.loose_table import LooseTable, is_number, readable_text
+from vegglue.importers.loose_table import LooseTable, readable_text
 from vegglue.importers.measured_rows import Taken, rows_of_table
+from vegglue.importers.number_words import is_number
 
 # How a file of each program says what it is; its columns of place, depth and mean velocity of the vertical.
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)

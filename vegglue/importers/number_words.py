@@ -1,0 +1,43 @@
+"""Numbers as people write them: with a decimal point or comma, in groups of thousands, or as a word for none."""
+
+import re
+from collections.abc import Iterable
+
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
+# Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
+GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
+MISSING_WORDS = ("", "-", "--", "nan", "na", "n/a", "null", "none", "nodata", "#n/a", "inf", "-inf")
+
+
+def is_number(text: str) -> bool:
+    """Whether a field is a number, however it is written."""
+    return NUMBER.fullmatch(text.strip()) is not None or GROUPED.fullmatch(text.strip()) is not None
+
+
+def has_decimal_comma(fields: Iterable[str]) -> bool:
+    """Whether more of these numbers are written with a decimal comma than with a point."""
+    signs = [sign for field in fields if (sign := _decimal_sign(field))]
+    return signs.count(",") > signs.count(".")
+
+
+def number_in(text: str, decimal_comma: bool) -> float | None:
+    """A field as a number; None where it says that there is none. Errors: ValueError, which says what to do."""
+    plain = text.strip()
+    if plain.lower() in MISSING_WORDS:
+        return None
+    sign = "," if decimal_comma else "."
+    if (written := _decimal_sign(plain)) and written != sign:
+        raise ValueError(f"write it with a decimal {'comma' if decimal_comma else 'point'}, as most numbers here")
+    if GROUPED.fullmatch(plain):
+        plain = re.sub(rf"[^-+\d{sign}]", "", plain)
+    try:
+        return float(re.sub("[dD]", "e", plain.replace(",", ".")))
+    except ValueError:
+        raise ValueError("mend or remove the row") from None
+
+
+def _decimal_sign(text: str) -> str:
+    """The sign before the decimals of a number, '' where there is none."""
+    if (grouped := GROUPED.fullmatch(text.strip())) is not None:
+        return grouped["decimal"]
+    return next((sign for sign in ",." if sign in text), "") if NUMBER.fullmatch(text.strip()) else ""
