@@ -41,6 +41,11 @@ def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
             {"experiments": {"low": {"discharge_m3_s": "much", "downstream_level_m": 1}}},
             "expected a number, got 'much'",
         ),
+        (
+            {"experiments": {"low": {"discharge_m3_s": 2.66, "downstream_level_m": 431.75}}},
+            "`experiments.low` expected a level in m above the floor at x = 0, got 431.75 m, which makes the outlet",
+        ),
+        ({"holdout": {"high": {"discharge": "2 m3/s", "level": "31.9 m"}}}, "`holdout.high` expected a level in m"),
     ],
 )
 def test_a_folder_that_says_too_little_is_refused(
@@ -54,4 +59,5 @@ def test_a_folder_that_says_too_little_is_refused(
     code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "site.yaml")
     assert code == 2
     assert said in error
+    assert not (tmp_path / "site-data").exists()
     assert len(error.strip().splitlines()) == 1

@@ -103,6 +103,10 @@ def test_what_a_flow_may_show_is_passed_in_silence(tmp_path: Path, change: Chang
             lambda table: table.assign(value=table["value"].where(table["kind"] != "level", table["value"] + 12.0)),
             r"3 values of level \(all there are; .*: 12 m above the outlet level, .*; check the datum",
         ),
+        (
+            lambda table: table.assign(value=table["value"].where(table["kind"] != "level", table["value"] + 700.0)),
+            r"3 values of level \(all there are; .*: all about 700 m from the outlet level, as from another datum; c",
+        ),
         (scaled(1000, "discharge"), r"The discharge 2030 m3/s at x = 5 m .* 10\d\d times .* in l/s; check"),
         (scaled(1 / 0.3048**3, "discharge"), r"The discharge .* in ft3/s; check"),
         (scaled(1e-3, "discharge"), r"The discharge 0.00203 m3/s .*: 0.001 times the smallest stated"),
@@ -122,9 +126,11 @@ def test_what_no_flow_can_show_is_said_once(tmp_path: Path, change: Change, expe
 def test_a_wrong_outlet_or_discharge_is_said(tmp_path: Path) -> None:
     deep = said_of(tmp_path, scaled(1.0), ("level: 0.95}", "level: 95}"))
     assert deep == [
-        "The outlet level of experiment June, 95 m, makes the outlet 95 m deep on a grid 9 m wide; "
-        "check its unit and its datum."
+        "The outlet level of experiment June, 95 m, makes the outlet 95 m deep on a grid 9 m wide, where the water "
+        "moves at 0.0024 m/s; check its unit and its datum, and the unit of the discharge."
     ]
+    still = said_of(tmp_path, scaled(1.0), ("level: 0.95}", "level: 12}"), ("discharge: 2.0", "discharge: 0.2"))
+    assert [sentence[:40] for sentence in still] == ["The outlet level of experiment June, 12 "]
     litres = said_of(tmp_path, scaled(1.0), ("discharge: 2.0", "discharge: 2000"))
     assert [sentence.split(":")[0][:20] for sentence in litres] == ["15 values of velocit", "The discharge 2.03 m"]
 

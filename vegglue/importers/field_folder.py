@@ -35,6 +35,7 @@ from vegglue.importers.measured_files import MeasuredFiles, held_out_files, meas
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.site_file import read_site, site_file
+from vegglue.importers.standing_water import refuse_standing_water
 from vegglue.importers.surveyed_bed import surveyed_bed
 from vegglue.site.zones import BANK_SLOPE
 
@@ -57,6 +58,7 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     Errors: InputError when the site file or every file of measurements is missing or says too little.
     """
     site = read_site(site_file(folder))
+    refuse_standing_water(site_file(folder), site)
     frame = site.frame.frame if site.frame is not None else None
     given = site.grid.centreline if site.grid is not None else None
     drawn = drawn_centreline(folder, given, frame) if given is not None else None

@@ -19,6 +19,7 @@ CLAUSES = {
     "fast": ("on average {times} times the discharge over the wet area there{unit}", CHECK_ALL),
     "slow": ("at most {times} times the discharge over the wet area there", CHECK_ALL),
     "level": ("{times} m from the outlet level{unit}", CHECK_LEVEL),
+    "datum": ("all about {times} m from the outlet level, as from another datum", CHECK_LEVEL),
     "bed": ("{times} m below the lowest bed of the section", CHECK_LEVEL),
     "high": ("{times} m above the outlet level, more than the densest growth holds up", CHECK_LEVEL),
     "low": ("{times} m below the outlet level, more than half the depth there", CHECK_LEVEL),
@@ -48,10 +49,11 @@ def suspicions_in_words(judged: pd.DataFrame, used: pd.DataFrame) -> list[str]:
 
 
 def outlet_in_words(experiment: str, flow: PlausibleFlow) -> str:
-    """That the outlet of an experiment would be deeper than channels are."""
+    """That the outlet of an experiment would be deeper than channels are, or its water all but stand."""
     return (
         f"The outlet level of experiment {experiment}, {_rounded(0.5 * sum(flow.level))} m, makes the outlet "
-        f"{_rounded(flow.depth)} m deep on a grid {_rounded(flow.width)} m wide; check its unit and its datum."
+        f"{_rounded(flow.depth)} m deep on a grid {_rounded(flow.width)} m wide, where the water moves at "
+        f"{_rounded(float(flow.fastest[-1]))} m/s; check its unit and its datum, and the unit of the discharge."
     )
 
 

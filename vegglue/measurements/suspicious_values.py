@@ -39,6 +39,8 @@ LEVEL_UNITS = {"ft": 0.3048, TENFOLD: 0.1, "cm": 0.01, "mm": 0.001}  # m
 NEAR_THE_OUTLET = 0.25
 # Depth over width of the grid [-] that no channel has: flumes reach 1.
 DEEPEST_CHANNEL = 2.0
+# Q / A at the outlet [m/s] below which water stands: few probes tell less from nothing.
+STANDING_WATER = 3e-3
 # Numbers that loggers write for a missing value, beside those of nines only; and what is larger than any measurement.
 MISSING_MARKS, LARGEST_NUMBER = (7777.0, 8888.0, 32767.0, 32768.0), 1e6
 # Standard errors of a velocity over Q / A [-]. Smaller: the mean of an hour at 5 % turbulence is known to 0.2 %, and no
@@ -62,14 +64,14 @@ def absurd_values(case: Case, site: Site, station: pd.DataFrame) -> list[str]:
     sentences, judged = [], []
     for name, rows in used.groupby("experiment", sort=False):
         flow = plausible_flow(case, in_experiment(site, str(name)), case.experiments[str(name)])
-        if flow.depth > DEEPEST_CHANNEL * flow.width:
+        if flow.depth > DEEPEST_CHANNEL * flow.width or flow.fastest[-1] < STANDING_WATER:
             sentences.append(outlet_in_words(str(name), flow))
             continue
         for (kind, _), group in rows.groupby(["kind", "section"], sort=False):
-            wrong = _with_verdicts(group, _values_judge(str(kind))(flow, group))
+            wrong = _with_verdicts(group, _values_judge(str(kind))(flow, group)).assign(depth=flow.depth)
             sound = group[~group.index.isin(wrong.index)]  # elsewhere the scale of the errors is in doubt
             judged += [wrong, _with_verdicts(sound, _errors_judged(flow, sound))]
-    return sentences + (suspicions_in_words(pd.concat(judged), used) if judged else [])
+    return sentences + (suspicions_in_words(_of_one_datum(pd.concat(judged)), used) if judged else [])
 
 
 def _with_verdicts(group: pd.DataFrame, verdicts: list[Judged]) -> pd.DataFrame:
@@ -136,6 +138,20 @@ def _level_judged(flow: PlausibleFlow, column: int, level: float) -> Judged:
     if level < flow.floor[column]:
         return ("bed", float(flow.floor[column]) - level)
     return ("high" if above > 0 else "low", abs(above))
+
+
+def _of_one_datum(judged: pd.DataFrame) -> pd.DataFrame:
+    """Levels that a unit would move far from their outlets, and that all lie as far above them, have another datum.
+
+    |f z - z_out| beyond a quarter of the depth somewhere, and twice the range of z - z_out; f: the unit taken for it.
+    """
+    rows = judged[judged["problem"].str.startswith("level ")]
+    metres = rows["problem"].str.removeprefix("level ").map(LEVEL_UNITS)
+    left = (metres * rows["value"] - (rows["value"] - rows["times"])).abs()
+    alike = len(rows) > 1 and 2.0 * float(np.ptp(rows["times"])) < left.max()
+    if not alike or not (left > NEAR_THE_OUTLET * rows["depth"]).any():
+        return judged
+    return judged.assign(problem=judged["problem"].where(~judged.index.isin(rows.index), "datum"))
 
 
 def _discharges_judged(flow: PlausibleFlow, group: pd.DataFrame) -> list[Judged]:
