@@ -8,7 +8,7 @@ from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
-from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.next_measurement import Question
 
@@ -22,17 +22,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     console().print(found.verdict.sentence)
     for remark in found.verdict.remarks:
         console().print(f"- {remark}")
-    rows = []
-    for one in found.suspects[:10]:
-        share = f"{found.chances[one.name]:.0%}" if one.name in found.chances else ""
-        amplitude, test, detectability = one.amplitude, one.test, one.detectability
-        low, high = amplitude.interval95
-        p_family = f"< {test.p_family:.1g}" if test.p_family < 5e-4 else f"{test.p_family:.2g}"
-        unit = amplitude.unit.removesuffix("-")
-        rows.append((
-            one.name, share, f"{amplitude.value:.3g} {unit}".strip(), f"{low:.3g} .. {high:.3g}", f"{test.score:+.1f}",
-            p_family, f"{detectability.visibility:.2f}", f"{detectability.smallest:.2g}",
-        ))  # fmt: skip
+    rows = [_suspect_cells(found, one) for one in found.suspects[:10]]
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
     print_table(headings, rows, headings[1:5])
     for off in found.instruments:
@@ -43,6 +33,27 @@ def show_diagnosis(found: Diagnosis) -> None:
         station = found.predictions.station.iloc[row]
         place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
         console().print(f"- set aside: {place}, measured {station['value']:g}")
+
+
+def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
+    """An effect's row of the table. Its score before anything was accepted, and after; of what was refitted, only the
+    former, as its amplitude says the rest.
+    """
+    amplitude, detectability = one.amplitude, one.detectability
+    scores = (found.first_score(one), found.last_score(one))
+    p = found.p_of_score(one)
+    unit = amplitude.unit.removesuffix("-")
+    low, high = amplitude.interval95
+    return (
+        one.name,
+        f"{found.chances[one.name]:.0%}" if one.name in found.chances else "",
+        f"{amplitude.value:.3g} {unit}".strip(),
+        f"{low:.3g} .. {high:.3g}",
+        " -> ".join(f"{score:+.1f}" for score in scores if np.isfinite(score)),
+        "" if np.isnan(p) else f"< {p:.1g}" if p < 5e-4 else f"{p:.2g}",
+        f"{detectability.visibility:.2f}",
+        f"{detectability.smallest:.2g}",
+    )
 
 
 def show_ladder(found: Comparison) -> None:

@@ -99,7 +99,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
-        stretch=stretch_in_words(last.base.model.case, last.base.model.station, [one.accepted for one in found.steps]),
+        stretch=stretch_in_words(last.base.model.case, last.base.model.station),
     )
 
 

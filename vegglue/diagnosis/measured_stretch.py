@@ -1,12 +1,10 @@
 """Along which part of the channel velocities were measured, where that is a small part of it."""
 
-from collections.abc import Sequence
-
 import pandas as pd
 
+from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.effects.definition import Stage
-from vegglue.effects.library import library
 from vegglue.in_short import listed
 from vegglue.measurements.kinds import velocity_rows
 
@@ -16,14 +14,15 @@ SMALL_PART = 0.5
 ALONG_THE_CHANNEL: tuple[Stage, ...] = ("plants", "resistance", "exchange", "force")
 
 
-def stretch_in_words(case: Case, station: pd.DataFrame, accepted: Sequence[str]) -> str:
-    """What is told of effects that were accepted, by name, where velocities lie within SMALL_PART of the channel; ''
-    where they do not, or where none of the effects acts along it.
+def stretch_in_words(case: Case, station: pd.DataFrame) -> str:
+    """What is told of the effects of a case where velocities lie within SMALL_PART of the channel; '' where they do
+    not, or where none of the effects acts along it.
 
     An effect is one law for the whole channel: gauges see its sum, and velocities only what it is where they are.
     """
-    known = library(case.effect_file)
-    along = [name for name in accepted if known[name.split("[")[0]].stage in ALONG_THE_CHANNEL]
+    effects = [effect_of(case, name) for name in case.effects]
+    law = [one for one in effects if one.stage in ALONG_THE_CHANNEL and "search" not in one.tags]
+    along = [*dict.fromkeys(one.name for one in law)]
     used = station["x"][velocity_rows(station) & station["used"].to_numpy(bool)]
     whole = case.grid.x[1] - case.grid.x[0]
     if not along or used.empty or used.max() - used.min() >= SMALL_PART * whole:

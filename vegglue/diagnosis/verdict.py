@@ -278,7 +278,8 @@ def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> li
     hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
     if hidden:
         names = ", ".join(_untestable(suspect) for suspect in hidden)
-        remarks.append(f"Untestable with these data, neither present nor absent: {names}.")
+        also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
+        remarks.append(f"Untestable with these data{also}, neither present nor absent: {names}.")
     return remarks
 
 

@@ -21,8 +21,6 @@ from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report_page.cause_pictures import field_picture, outlines, place_picture, plan_marks
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.diagnosis_words import (
-    first_score,
-    last_score,
     ranked_suspects,
     rms_residual,
     suspect_status,
@@ -93,11 +91,11 @@ def _split(figure: FigureBase, rows: int, columns: int, **ratios: Any) -> list[S
 
 def _suspect_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """The strongest suspects and every one that is accepted or a rival, the strongest first."""
-    order = sorted(ranked_suspects(diagnosis), key=lambda one: -abs(np.nan_to_num(first_score(diagnosis, one))))
+    order = sorted(ranked_suspects(diagnosis), key=lambda one: -abs(np.nan_to_num(diagnosis.first_score(one))))
     drawn = [one for k, one in enumerate(order) if k < SUSPECTS_DRAWN or one.name in diagnosis.set]
     rows = [
-        {"name": one.name, "status": suspect_status(diagnosis, one), "first": first_score(diagnosis, one),
-         "left": last_score(diagnosis, one), "visibility": one.detectability.visibility}
+        {"name": one.name, "status": suspect_status(diagnosis, one), "first": diagnosis.first_score(one),
+         "left": diagnosis.last_score(one), "visibility": one.detectability.visibility}
         for one in drawn
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=["name", "status", "first", "left", "visibility"])
@@ -108,8 +106,8 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if table.empty:
         return
     threshold = diagnosis.first_screening.threshold
-    out = sum(abs(first_score(diagnosis, one)) > threshold for one in diagnosis.suspects)
-    left = [last_score(diagnosis, one) for one in diagnosis.suspects]
+    out = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.suspects)
+    left = [diagnosis.last_score(one) for one in diagnosis.suspects]
     caption = (
         f"<b>Suspects.</b> Of {count(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
         f"errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"

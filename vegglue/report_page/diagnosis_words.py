@@ -76,7 +76,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         numbers=numbers,
         suspects=first,
         other_suspects=others,
-        rescored=_changed(diagnosis),
+        rescored=diagnosis.changed,
         flagged=flagged,
         places=place_rows(diagnosis),
         instruments=instrument_rows(diagnosis),
@@ -92,22 +92,7 @@ def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
     if not suspect.detectability.testable:
         return "untestable"
     threshold = diagnosis.first_screening.threshold
-    return "less likely" if abs(first_score(diagnosis, suspect)) > threshold else "no sign"
-
-
-def first_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
-    """The score of an effect before any was accepted [standard errors]."""
-    return diagnosis.first_screening.scores.get(suspect.name, suspect.test.score)
-
-
-def last_score(diagnosis: Diagnosis, suspect: Suspect) -> float:
-    """The score of an effect in the last model [standard errors]; NaN where that is the first, or where refitted."""
-    return float("nan") if suspect.amplitude.refitted or not _changed(diagnosis) else suspect.test.score
-
-
-def _changed(diagnosis: Diagnosis) -> bool:
-    """Whether anything was taken into the model or set aside."""
-    return bool(diagnosis.steps or diagnosis.places or diagnosis.instruments)
+    return "less likely" if abs(diagnosis.first_score(suspect)) > threshold else "no sign"
 
 
 def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
@@ -115,7 +100,7 @@ def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
     order = ("accepted", "rival", "less likely", "no sign", "untestable")
     return sorted(
         diagnosis.suspects,
-        key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(first_score(diagnosis, one)))),
+        key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(diagnosis.first_score(one)))),
     )
 
 
@@ -138,7 +123,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     estimate, detectability = suspect.amplitude, suspect.detectability
     unit = unit_html(estimate.unit)
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
-    scores = first_score(diagnosis, suspect), last_score(diagnosis, suspect)
+    scores = diagnosis.first_score(suspect), diagnosis.last_score(suspect)
     parameter = detectability.confounder
     alike = abs(detectability.cosine) > LOOKS_LIKE_FROM and parameter in diagnosis.parameters.first
     return SuspectRow(
@@ -148,7 +133,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         chance=percent(diagnosis.chances[suspect.name]) if suspect.name in diagnosis.chances else "",
         amplitude=short(estimate.value, 3) + unit,
         interval=interval(*estimate.interval95),
-        p_family=p_value_html(suspect.test.p_family),
+        p_family=p_value_html(diagnosis.p_of_score(suspect)),
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(detectability.visibility, 2),
         detectable=short(detectability.smallest, 2) + unit,
@@ -157,8 +142,8 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
 
 
 def p_value_html(p: float) -> str:
-    """A p-value (HTML), no more precise than a bootstrap of some thousands can make it."""
-    return f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
+    """A p-value (HTML), no more precise than a bootstrap of some thousands can make it; '' for NaN."""
+    return "" if np.isnan(p) else f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
 
 
 def _flagged(diagnosis: Diagnosis, row: int) -> FlaggedRow:
@@ -182,7 +167,7 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     before, after = (
         rms_residual(diagnosis, each) for each in (diagnosis.predictions.first, diagnosis.predictions.last)
     )
-    fell = _changed(diagnosis)
+    fell = diagnosis.changed
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
     apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)

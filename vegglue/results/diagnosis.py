@@ -240,6 +240,24 @@ class Diagnosis:
         """Of effects that the data cannot tell apart, over all steps."""
         return [list(group) for step in self.steps for group in step.groups]
 
+    @property
+    def changed(self) -> bool:
+        """Whether anything was taken into the model or set aside."""
+        return bool(self.steps or self.places or self.instruments)
+
+    def first_score(self, suspect: Suspect) -> float:
+        """The score of an effect before any was accepted [standard errors]."""
+        return self.first_screening.scores.get(suspect.name, suspect.test.score)
+
+    def last_score(self, suspect: Suspect) -> float:
+        """The score of an effect in the last model [standard errors]; NaN where it is the first, or was refitted."""
+        return suspect.test.score if self.changed and not suspect.amplitude.refitted else float("nan")
+
+    def p_of_score(self, suspect: Suspect) -> float:
+        """The family-wise p [-] of the score that is told last; NaN where it is of another score, and a refit tells."""
+        told = self.last_score(suspect) if np.isfinite(self.last_score(suspect)) else self.first_score(suspect)
+        return suspect.test.p_family if suspect.test.score == told else float("nan")
+
     def suspect(self, name: str) -> Suspect:
         """The effect of that name; KeyError without."""
         return {one.name: one for one in self.suspects}[name]
