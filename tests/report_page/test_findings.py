@@ -8,8 +8,10 @@ import pytest
 from posteriors import changed
 from report_runs import MEMBERS
 
+from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
+from vegglue.report_page.posterior_words import off_its_prior
 from vegglue.report_page.run import Run
 from vegglue.report_page.tables import parameter_rows
 
@@ -52,6 +54,21 @@ def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:
     assert "presses against the upper bound of its prior, 100: 0.14 of the posterior lies within 2 %" in text
     assert "The data bound it from below only" in text
     assert doubt
+
+
+def test_says_that_a_parameter_lies_off_its_prior(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    own = run.posterior.marginals
+    levels = own.prior_quantiles | {"n_b": own.median["n_b"] * np.linspace(2.0, 3.0, own.quantiles["n_b"].size)}
+    free = {name: np.zeros(2, bool) for name in own.bound_hit}
+    off = changed(run.posterior, prior_quantiles=levels, bound_hit=free, effective_size=3000.0)
+    assert [name for name in off.parameters if off_its_prior(off, name)] == ["n_b"]
+    text, doubt = said(run, "parameter", prior_quantiles=levels, bound_hit=free, effective_size=3000.0)
+    assert "lies outside the range that its prior holds for 95 % likely" in text
+    assert doubt
+    assert "outside its prior's 95 %" in "\n".join(brief_posterior(off, "posterior.h5", "d3a.yaml"))
+    few = changed(off, effective_size=30.0)
+    assert not off_its_prior(few, "n_b"), "a first look says nothing of its prior"
 
 
 @pytest.mark.parametrize(("size", "provisional"), [(30.0, True), (3000.0, False)])

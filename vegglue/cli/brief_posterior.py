@@ -17,6 +17,7 @@ from vegglue.report_page.posterior_words import (
     correlated_pairs,
     errors_by_kind,
     fit_in_words,
+    off_its_prior,
     pressed_bounds,
 )
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
@@ -87,7 +88,8 @@ def _odd(posterior: Posterior, name: str) -> str:
     at = " and ".join(pressed_bounds(posterior, name))
     pressing = f"at its {at} bound" if at else ""
     unknown = "" if posterior.marginals.identified[name] or not posterior.claimed else "not identified"
-    return ", ".join(filter(None, (unknown, pressing)))
+    off = "outside its prior's 95 %" if off_its_prior(posterior, name) else ""
+    return ", ".join(filter(None, (unknown, pressing, off)))
 
 
 def _fit(posterior: Posterior) -> list[str]:

@@ -8,7 +8,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.diagnosis.next_measurement import MeasurementWorth
 from vegglue.discovery.discovered import LawFound
-from vegglue.report_page.posterior_words import describe, pressed_bounds
+from vegglue.report_page.posterior_words import describe, off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.results.ensemble import Ensemble
@@ -143,6 +143,7 @@ def _parameter(found: Posterior, name: str) -> Told:
         "share_of_prior": marginals.width_ratio[name],
         "identified": bool(marginals.identified[name]),
         "at_bounds": pressed_bounds(found, name),
+        "off_its_prior": off_its_prior(found, name),
     }
 
 

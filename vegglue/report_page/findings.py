@@ -32,6 +32,7 @@ from vegglue.report_page.posterior_words import (
     canopy_in_words,
     correlations_in_words,
     fit_in_words,
+    off_its_prior,
     parameter_in_words,
     pressed_bounds,
     search_in_words,
@@ -96,7 +97,7 @@ def _parameter(posterior: Posterior, name: str, notation: Notation) -> Finding:
     if len(pressed) == 1:
         side = "below" if pressed == ["upper"] else "above"
         sentences.append(f"The data bound it from {side} only, and the bound, not the data, ends the range.")
-    doubt = bool(pressed) or not posterior.marginals.identified[name]
+    doubt = bool(pressed) or off_its_prior(posterior, name) or not posterior.marginals.identified[name]
     return Finding("parameter", " ".join(sentences), doubt)
 
 

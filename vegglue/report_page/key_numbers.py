@@ -9,7 +9,7 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import UNBELIEVED, identification, pressed_bounds
+from vegglue.report_page.posterior_words import UNBELIEVED, identification, off_its_prior, pressed_bounds
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED
@@ -92,6 +92,8 @@ def _remark(posterior: Posterior, name: str) -> str:
     pressed = pressed_bounds(posterior, name)
     if pressed:
         return f"presses against its {' and '.join(pressed)} bound"
+    if off_its_prior(posterior, name):
+        return "outside the 95 % range of its prior"
     return identified_width(posterior, name)
 
 

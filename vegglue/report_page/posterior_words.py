@@ -100,6 +100,7 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
             f"{symbol} is not identified: its 95 % range, {low} to {high}{unit}, is still {ratio} (identified means "
             f"below {100 * IDENTIFIED_BELOW:g} %).",
             *_bounds(posterior, name, notation),
+            *_against_its_prior(posterior, name, notation),
         ]
     power = ""
     if name in marginals.log10_median:
@@ -108,6 +109,7 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
         f"{symbol}: median {number(marginals.median[name], 3)}{unit}{power}, standard deviation "
         f"{number(marginals.sd[name], 2)}, 95 % range {low} to {high}, {ratio}.",
         *_bounds(posterior, name, notation),
+        *_against_its_prior(posterior, name, notation),
     ]
 
 
@@ -115,6 +117,23 @@ def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
     """The bounds of its prior that a parameter presses against: 'lower', 'upper', both or none."""
     hit = posterior.marginals.bound_hit[name]
     return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
+
+
+def off_its_prior(posterior: Posterior, name: str) -> bool:
+    """Whether the median of a parameter lies outside the range that holds 95 % of its prior, and against no bound."""
+    low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
+    inside = low <= posterior.marginals.median[name] <= high
+    return posterior.claimed and not inside and not pressed_bounds(posterior, name)
+
+
+def _against_its_prior(posterior: Posterior, name: str, notation: Notation) -> list[str]:
+    if not off_its_prior(posterior, name):
+        return []
+    low, high = (notation.number(float(value), 3) for value in posterior.marginals.prior_quantiles[name][[0, -1]])
+    return [
+        f"{notation.parameter(name)} lies outside the range that its prior holds for 95 % likely, {low} to {high}: the "
+        "prior or a measurement is wrong, or it stands in for something that is missing."
+    ]
 
 
 def _bounds(posterior: Posterior, name: str, notation: Notation) -> list[str]:
