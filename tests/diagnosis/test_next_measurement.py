@@ -1,5 +1,6 @@
 """What could be measured next: where, for how many hours, and at which discharge."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,4 +43,5 @@ def test_small_discharges_have_names_of_their_own(model: Model) -> None:
     }
     case = model.case.model_copy(update={"experiments": small})
     further = [name for name in _with_other_discharges(case, (0.25, 0.5)).experiments if name not in small]
-    assert further == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
+    assert [name.split(" (")[0] for name in further] == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
+    assert re.fullmatch(r"at 0.001 m3/s \(level at the outlet about 0\.\d\d m\)", further[0]), further[0]

@@ -9,6 +9,7 @@ in squared standard errors, is the gain of the log-likelihood ratio (times two) 
 j may be the model without any effect: then D^2 says whether i would be seen at all.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -191,8 +192,10 @@ def _with_other_discharges(case: Case, lower: Sequence[float]) -> Case:
         one = case.experiments[name]
         depth = float(one.level) - floor
         level = floor + depth * factor**LEVEL_POWER
+        digits = max(1 - math.floor(math.log10(depth * factor**LEVEL_POWER)), 0) if depth > 0.0 else 2
         discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
-        more[f"at {factor * totals[name]:.3g} m3/s"] = one.model_copy(update={"discharge": discharge, "level": level})
+        plan = f"at {factor * totals[name]:.3g} m3/s (level at the outlet about {level:.{digits}f} m)"
+        more[plan] = one.model_copy(update={"discharge": discharge, "level": level})
     unseen = {name: one for name, one in more.items() if name not in case.experiments}
     return case.model_copy(update={"experiments": {**case.experiments, **unseen}})
 
