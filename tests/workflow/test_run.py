@@ -54,6 +54,8 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> N
     made = {path.name for path in (tmp_path / "runs" / child).iterdir()}
     assert made >= {"ensemble.h5", "posterior.h5", "report.html"}
     assert not (tmp_path / "runs" / "small" / "posterior.h5").exists(), "that model is known to be wrong"
+    parent = vegglue(tmp_path, "report", "hidden/small.yaml", succeed=False).stderr
+    assert f"the run went on to {child}, whose report is runs/{child}/report.html" in parent
     vegglue(tmp_path, "overview", "hidden/small.yaml")
     assert f"{child}/report.html" in (tmp_path / "runs" / "overview.html").read_text(encoding="utf-8")
     assert (tmp_path / "runs" / child / "ladder.png").exists()

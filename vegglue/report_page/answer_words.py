@@ -192,7 +192,9 @@ def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
     if judged is None:
         return "No velocities along x were measured, by which models are set side by side."
     before, after = getattr(first, judged), getattr(last, judged)
-    floor = f"; errors of measuring alone are {_speed(last.noise_floor)}" if math.isfinite(last.noise_floor) else ""
+    where = ", at what it was calibrated to," if judged == "unseen" else ""  # whose own errors are mostly not stated
+    measuring = f"; errors of measuring alone{where} are {_speed(last.noise_floor)}"
+    floor = measuring if math.isfinite(last.noise_floor) else ""
     if len(ladder.steps) == 1:
         why = f" {html.escape(ladder.reason)}" if ladder.reason else ""
         return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}.{why}"

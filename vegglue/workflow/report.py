@@ -5,6 +5,7 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.errors import InputError, shown_path
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
@@ -47,6 +48,8 @@ def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = 
     path, ensemble = folder / "ensemble.h5", None
     if begun_or_finished(path):
         ensemble = read_ensemble(path, simulation_hash(sized))
+    if not (folder / "posterior.h5").exists():
+        _refuse_if_the_run_went_on(case, runs)
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
     if ensemble is None and posterior.settings.ensemble_hash:
         read_ensemble(path)  # says that it is gone
@@ -54,6 +57,18 @@ def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = 
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
     loop = loop_results_of(case, runs, above)
     return Run(folder, sized, build_site(sized), observations, ensemble, posterior, {}, survey, diagnosis, loop)
+
+
+def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
+    """Errors: InputError when the loop extended the model, and the posterior is that of the last one only."""
+    ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
+    last = ladder.steps[-1].name if ladder is not None else case.name
+    page = Path(runs) / last / "report.html"
+    if last != case.name and page.exists():
+        raise InputError(
+            f"{shown_path(case.source)}: the run went on to {last}, whose report is {shown_path(page)}; for one of "
+            f"{case.name} itself run `vegglue infer {shown_path(case.source)}` first."
+        )
 
 
 def loop_results_of(case: Case, runs: Path | str = "runs", above: str = "../") -> LoopResults:
