@@ -148,6 +148,17 @@ def test_many_stations_outside_are_one_sentence(tmp_path):
     assert of_grid == ["2 places of experiment low, the first at x = -1, y = 0 m, are outside the grid, and not used."]
 
 
+def test_places_of_a_map_are_said_first(tmp_path):
+    heading, *rows = ROWS.splitlines()
+    on_map = "".join(f"low,A,{683_120 + x},{247_480 + y},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))
+    first, *_ = odd(tmp_path, rows=f"{heading}\n{on_map}")
+    assert first.startswith(
+        "All velocities lie more than the length of the grid away from it, the first at x = 683132, y"
+    )
+    one_inside = f"{heading}\n{on_map}{rows[0]}\n"
+    assert not [one for one in odd(tmp_path, rows=one_inside) if "on a map" in one]
+
+
 def test_exchanged_axes_are_said_first(tmp_path):
     exchanged = "".join(f"low,A,{y},{x},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))
     first, second, *_ = odd(tmp_path, rows=ROWS.splitlines()[0] + "\n" + exchanged)

@@ -95,6 +95,7 @@ def test_what_a_flow_may_show_is_passed_in_silence(tmp_path: Path, change: Chang
         (replaced(15, 9.5), r"The level 9.5 m at x = 8, .*: 8.6 m from .*, as if it were in dm, or mm taken for cm; c"),
         (scaled(10), r"15 values of velocity .*, as if it were in dm/s, or mm/s taken for cm/s; check"),
         (replaced(15, 970.0), r"The level 970 m .* in mm; check the datum"),
+        (scaled(0.01, "level"), r"3 values of level .*: 0.94 m from the .*, as if it were in m, taken for cm; check"),
         (scaled(1 / 0.3048, "level", x=20.0), r"The level 3.13\d* m at x = 20, y = 0 m .* in ft; check the datum"),
         (replaced(16, -9999.0), r"The level -9999 m at x = 14.5, y = 0 m .*marks a missing value"),
         (replaced(16, -0.4), r"The level -0.4 m .*: 0.39 m below the lowest bed"),

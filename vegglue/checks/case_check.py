@@ -17,6 +17,7 @@ from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_i
 from vegglue.checks.stations import (
     remarks_on_absurd_values,
     remarks_on_exchanged_axes,
+    remarks_on_map_places,
     remarks_on_patch_edges,
     remarks_on_stations,
 )
@@ -30,6 +31,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
     return [
         *remarks_on_absurd_values(case, site, observations),
         *remarks_on_exchanged_axes(case, observations),
+        *remarks_on_map_places(case, observations),
         *remarks_on_directions(case, observations),
     ]
 
@@ -39,6 +41,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     remarks = (
         remarks_on_absurd_values(case, site, observations),
         remarks_on_exchanged_axes(case, observations),
+        remarks_on_map_places(case, observations),
         remarks_on_stations(case, site, observations),
         remarks_on_directions(case, observations),
         remarks_on_ensemble(case, observations),

@@ -52,6 +52,20 @@ def remarks_on_exchanged_axes(case: Case, observations: Observations) -> Iterato
         )
 
 
+def remarks_on_map_places(case: Case, observations: Observations) -> Iterator[str]:
+    """Velocities all outside the grid, by more than its length: as if they lay on a map that no `frame` speaks of."""
+    table = observations.table[velocity_rows(observations.table)]
+    west, east = case.grid.x
+    beyond = np.maximum(west - table["x"], table["x"] - east) > east - west
+    if len(table) and case.frame is None and (table["reason"] == OUTSIDE).all() and beyond.all():
+        first = table.iloc[0]
+        yield (
+            f"All velocities lie more than the length of the grid away from it, the first at x = {first['x']:.10g}, "
+            f"y = {first['y']:.10g} m, as if on a map: say where the channel lies on it by `frame` in the site file, "
+            "and import again."
+        )
+
+
 def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[str]:
     """Stations of velocity so near to the edge of a patch that the model interpolates across it."""
     table = observations.table[velocity_rows(observations.table)]

@@ -85,8 +85,10 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     """Every row with an experiment and a section, and with a place; rows without a place are left out."""
     place = [role for role in ("x", "y") if role in taken.numbers]
     if "x" not in place:
+        headings = ", ".join([*taken.columns.values(), *taken.others])
         raise InputError(
-            f"{where} expected a column of x, got none; name it by `columns`, or give `line` or `position`."
+            f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
+            "`files` of the site file, or give `line` or `position` there."
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
     if "y" not in place:

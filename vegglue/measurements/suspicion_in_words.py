@@ -61,7 +61,7 @@ def _sentence(problem: str, rows: pd.DataFrame, of_kind: pd.DataFrame) -> str:
     word, _, unit = problem.partition(" ")
     clause, advice = CLAUSES[word]
     kind = kind_of(str(rows["kind"].iloc[0]))
-    times, as_if = _rounded(float(rows["times"].median())), f", as if it were in {unit}" if unit else ""
+    times, as_if = _rounded(abs(float(rows["times"].median()))), f", as if it were in {unit}" if unit else ""
     said = clause.format(times=times, unit=as_if, of_kind=kind.unit)
     first = rows.iloc[0]
     at = f"x = {first['x']:g}, y = {first['y']:g} m" if kind.at_point else f"x = {first['x']:g} m"
