@@ -108,7 +108,7 @@ def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy
 def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
     said = plain(ladder_in_words(LADDER))
     assert said.startswith("With eddies, the error at measurements no calibration has seen falls from 0.039 to 0.0033")
-    assert "errors of measuring alone are 0.012 m/s" in said
+    assert "errors of measuring alone, at what it was calibrated to, are 0.012 m/s" in said
     unseen = replace(LADDER, steps=tuple(replace(step, unseen=float("nan")) for step in LADDER.steps))
     assert "at sections left out in turn falls from 0.041 to 0.013" in plain(ladder_in_words(unseen))
     assert "rises from 0.0033 to 0.039" in plain(ladder_in_words(replace(LADDER, steps=(LAST, FIRST))))

@@ -11,7 +11,7 @@ from vegglue.case.resolved_config import dumped
 from vegglue.errors import InputError
 from vegglue.flow.problem_setup import build_problem
 from vegglue.site.channel_geometry import channel_geometry
-from vegglue.site.gridded_site import build_site, in_experiment
+from vegglue.site.gridded_site import build_site, cells_at, in_experiment
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CHANNEL = {"axis": 0.0, "bottom_width": 3.0, "top_width": 7.0, "bank_slope": 0.5, "bed_slope": 0.01, "level": 2.0}
@@ -207,3 +207,17 @@ def test_an_experiment_may_have_a_bed_of_its_own(tmp_path):
         assert np.array_equal(channel_geometry(case, built, name).bed[..., 0], now.bed)
     assert site(tmp_path, experiments={"one": experiments["one"]}).own == {}
     assert "bed" not in dumped(load_case(tmp_path / "small.yaml"))["experiments"]["one"]
+
+
+def test_a_place_on_an_edge_is_in_its_lowest_cell() -> None:
+    """The toes of both banks are on the floor, whichever way an edge would be rounded."""
+    site = build_site(load_case(CONFIGS / "twin.yaml"))
+    grid, middle = site.grid, len(site.grid.x) // 2
+    edges = grid.y[:-1] + 0.5 * grid.dy
+    i, j = cells_at(site, np.full(edges.size, grid.x[middle]), edges)
+    assert (i == middle).all()
+    assert (site.bed[i, j] == np.minimum(site.bed[middle, :-1], site.bed[middle, 1:])).all()
+    outermost = cells_at(site, np.array([-1e3, 1e3]), np.array([-1e3, 1e3]))
+    assert [one.tolist() for one in outermost] == [[0, grid.x.size - 1], [0, grid.y.size - 1]]
+    at_centres = cells_at(site, grid.x[[2, 5]], grid.y[[3, 4]])
+    assert [one.tolist() for one in at_centres] == [[2, 5], [3, 4]]

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise, covariance_of_data
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.engine.interface import Model, Point
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of
 from vegglue.site.channel_geometry import channel_geometry
+from vegglue.site.gridded_site import cells_at
 
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
 AT_EDGE = 0.2
@@ -56,8 +56,8 @@ def _section(kind: Kind, section: str) -> str:
 
 
 def _zones(model: Model, used: pd.DataFrame, kinds: Sequence[Kind]) -> list[str]:
-    grid, x, y = model.site.grid, used["x"].to_numpy(float), used["y"].to_numpy(float)
-    cells = zip(_cell(x, grid.x, grid.dx), _cell(y, grid.y, grid.dy), strict=True)
+    x, y = used["x"].to_numpy(float), used["y"].to_numpy(float)
+    cells = zip(*cells_at(model.site, x, y), strict=True)
     return [
         _named(kind, channel_geometry(model.case, model.site, str(experiment)), *cell)
         for experiment, kind, cell in zip(used["experiment"], kinds, cells, strict=True)
@@ -69,11 +69,6 @@ def _named(kind: Kind, ground: ChannelGeometry, i: int, j: int) -> str:
         return kind.name
     zone = _zone(ground, i, j)
     return zone if kind.name == STREAMWISE else f"{zone} ({kind.column})"
-
-
-def _cell(points: Array, centres: Array, step: float) -> np.ndarray:
-    """The cell each point lies in, the outermost beyond."""
-    return np.clip(np.rint((points - centres[0]) / step), 0, centres.size - 1).astype(np.int64)
 
 
 def _zone(geometry: ChannelGeometry, i: int, j: int) -> str:

@@ -22,7 +22,7 @@ from vegglue.results.ladder import Ladder
 from vegglue.results.open_questions import OpenQuestion
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import patches_present
-from vegglue.site.gridded_site import Site
+from vegglue.site.gridded_site import Site, cells_at
 from vegglue.whole_files import folder_within
 
 SYNTHETIC = "synthetic record"  # stamped on every figure of one
@@ -129,9 +129,8 @@ def station_zones(run: Run) -> list[str]:
     """Where each station stands: 'plants' in a patch that is present, else its friction class; 'section' where a whole
     cross-section is measured.
     """
-    table, grid = run.observations.table, run.site.grid
-    column = np.clip(np.searchsorted(grid.x + 0.5 * grid.dx, table["x"]), 0, len(grid.x) - 1)
-    row = np.clip(np.searchsorted(grid.y + 0.5 * grid.dy, table["y"]), 0, len(grid.y) - 1)
+    table = run.observations.table
+    column, row = cells_at(run.site, table["x"].to_numpy(float), table["y"].to_numpy(float))
     names = np.array(run.site.class_names)[run.site.friction_class[column, row]]
     cells = {experiment: planted_cells(run, experiment) for experiment in table["experiment"].unique()}
     among = [cells[experiment][i, j] for experiment, i, j in zip(table["experiment"], column, row, strict=True)]

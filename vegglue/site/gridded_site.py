@@ -12,6 +12,9 @@ from vegglue.site.bed import bed_levels
 from vegglue.site.grid import Grid, build_grid
 from vegglue.site.zones import cells_of_patch, friction_classes
 
+# Nearer to an edge of its cell than this share of it [-], a place is on that edge: rounding errors are far smaller.
+ON_AN_EDGE = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Site:
@@ -51,3 +54,22 @@ def _with_bed(case: Case, grid: Grid, patch: NDArray[np.int64], experiment: str 
     """The site with the bed of the case or of an experiment, and the friction classes that follow from its slopes."""
     bed = bed_levels(case, grid, experiment)
     return Site(grid, bed, friction_classes(case, grid, bed), tuple(case.friction.classes), patch)
+
+
+def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices (n,) each of the cells that places [m] lie in, the outermost beyond; on an edge, of its lowest cell.
+
+    A station at the toe of a bank stands on the floor, on either side of the channel.
+    """
+    grid = site.grid
+    sides = [(_index(x, grid.x, grid.dx, a), _index(y, grid.y, grid.dy, b)) for a in (-1, 1) for b in (-1, 1)]
+    lowest = np.argmin([site.bed[i, j] for i, j in sides], axis=0)
+    i, j = np.array(sides).transpose(1, 0, 2)
+    every = np.arange(lowest.size)
+    return i[lowest, every], j[lowest, every]
+
+
+def _index(at: Array, centres: Array, step: float, side: int) -> NDArray[np.int64]:
+    """The cell a hair's breadth to one side (-1 or 1) of each point."""
+    nearest = np.rint((at - centres[0]) / step + side * ON_AN_EDGE)
+    return np.clip(nearest, 0, centres.size - 1).astype(np.int64)
