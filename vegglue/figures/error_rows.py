@@ -21,12 +21,10 @@ from vegglue.figures.typography import short
 
 # The picture [px], its letters legible on a telephone of 360 px, too; the height of a row, and of the foot.
 ROWS_WIDTH, ROWS_LETTERS, ROW_HEIGHT, ROWS_FOOT = 460.0, 13.0, 54.0, 50.0
-ROWS_START, ROWS_END = 10.0, 430.0
+ROWS_START, ROWS_END = 24.0, 430.0
 DOT_RADIUS = 6.5
-# Errors closer than this [px] have their numbers on both sides of the dots.
-CROWDED = 46.0
-# Width of a digit of a number [px], bold; and the height of the dots in a row.
-DIGIT, DOTS_IN_ROW = 8.0, 38.0
+# Width of a digit of a number [px], bold; from the middle of a dot to its number; and the height of the dots in a row.
+DIGIT, ASIDE, DOTS_IN_ROW = 8.0, 11.0, 38.0
 # The axis ends this much beyond the largest error: room for its number.
 BEYOND = 1.12
 # Numbers stand out from what lies under them.
@@ -70,7 +68,7 @@ def _crossed(scale: Scale, values: Sequence[float], floor: float) -> bool:
     """Whether a number of a row stands where the errors of measuring lie."""
     at = float(scale(floor))
     for place, value, to_the_left in _numbered(scale, values):
-        start, anchor = _beside(place, to_the_left)
+        start, anchor = _beside(place, value, to_the_left)
         width = DIGIT * len(short(value, 2))
         left = start - width if anchor == "end" else start
         if left - 2 <= at <= left + width + 2:
@@ -120,10 +118,11 @@ def _dot(at: float, height: float, face: str, colour: str) -> str:
 
 
 def _number(at: float, value: float, height: float, colour: str, to_the_left: bool) -> str:
-    place, anchor = _beside(at, to_the_left)
+    place, anchor = _beside(at, value, to_the_left)
     return svg_words(place, height + 5, short(value, 2), colour, text_anchor=anchor, font_weight="bold", **NUMBER_HALO)
 
 
-def _beside(at: float, to_the_left: bool) -> tuple[float, str]:
+def _beside(at: float, value: float, to_the_left: bool) -> tuple[float, str]:
     """Where a number begins or ends beside its dot, away from the other; to the right where there is no room."""
-    return (at - 11, "end") if to_the_left and at > CROWDED + ROWS_START else (at + 11, "start")
+    room = at - ASIDE >= DIGIT * len(short(value, 2))
+    return (at - ASIDE, "end") if to_the_left and room else (at + ASIDE, "start")

@@ -21,6 +21,7 @@ from vegglue.report_page.cause_words import (
 )
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
+from vegglue.report_page.page_file import set_as_code
 from vegglue.report_page.posterior_words import UNBELIEVED
 from vegglue.report_page.run import Run
 from vegglue.results.diagnosis import AmplitudeEstimate, Diagnosis, Step
@@ -75,7 +76,13 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
         return f"Something {tense} missing from {model} that is in no list: {_law_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
         return _what_is_missing(found, model, tense)
-    return html.escape(found.verdict.sentence)
+    if kind == "cannot-tell" and found.laws is not None and not (found.steps or found.places):
+        chance = percent(found.laws.laws[0].chance)
+        return (
+            f"Whether anything {tense} missing from {model}, these data cannot tell; the likeliest, with a chance of "
+            f"{chance}, is a law that is in no list: {_law_in_words(found)}."
+        )
+    return set_as_code(html.escape(found.verdict.sentence))
 
 
 def _only_suspects_a_law(found: Diagnosis) -> bool:

@@ -4,7 +4,6 @@ The facts that the terminal prints too are written in posterior_words.py and hom
 """
 
 import html
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -27,6 +26,7 @@ from vegglue.report_page.key_numbers import (
     unexplained_error,
     with_unit,
 )
+from vegglue.report_page.page_file import set_as_code
 from vegglue.report_page.posterior_words import (
     UNBELIEVED,
     canopy_in_words,
@@ -84,11 +84,7 @@ def findings(run: Run) -> list[Finding]:
 
 def _html(sentences: Iterable[str]) -> str:
     """Plain sentences as one piece of HTML, commands in `backticks` set as code."""
-    return _code(html.escape(" ".join(sentences)))
-
-
-def _code(text: str) -> str:
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
+    return set_as_code(html.escape(" ".join(sentences)))
 
 
 def _parameter(posterior: Posterior, name: str, notation: Notation) -> Finding:
@@ -215,7 +211,7 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
 
 def _weights(posterior: Posterior, notation: Notation) -> Finding:
     doubt = not posterior.claimed or posterior.weighting.pareto_k > TRUSTED_K_HAT
-    return Finding("weights", _code(" ".join(weights_in_words(posterior, notation))), doubt)
+    return Finding("weights", set_as_code(" ".join(weights_in_words(posterior, notation))), doubt)
 
 
 def _members(ensemble: Ensemble) -> Finding:

@@ -66,7 +66,7 @@ def against_measurement_error(posterior: Posterior, kind: str, miss: float) -> s
 def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
     """Four to six numbers for the first screen."""
     parameters = [
-        KeyNumber(symbol(case, name), estimate(posterior, name), _remark(posterior, name))
+        KeyNumber(symbol(case, name).replace("_", "_<wbr>"), estimate(posterior, name), _remark(posterior, name))
         for name in _first_read(case, posterior)[:PARAMETERS_SHOWN]
     ]
     kind = next(iter(posterior.fit.sigma))

@@ -1,5 +1,7 @@
 """A page as a file: one self-contained HTML file that needs no network, filled from a template beside this file."""
 
+import html
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,15 +31,22 @@ def rendered(template: str, **values: Any) -> str:
     return _environment().get_template(template).render(**shared, **values)
 
 
+def set_as_code(text: str) -> str:
+    """HTML with commands in `backticks` set as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
+
+
 def _beside(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def _environment() -> jinja2.Environment:
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["set_as_code"] = lambda text: set_as_code(html.escape(text))
+    return environment

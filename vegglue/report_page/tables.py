@@ -232,6 +232,8 @@ def health_facts(run: Run) -> Iterator[tuple[str, str]]:
         yield from _work_done(run.ensemble)
     for name in posterior.parameters:
         low, high = posterior.marginals.bound_mass[name]
+        if np.isnan([low, high]).all():  # its prior has no bounds
+            continue
         yield f"weight of {name} near its lower and upper bound", f"{percent(low)} and {percent(high)}"
 
 
