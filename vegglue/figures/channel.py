@@ -21,6 +21,8 @@ from vegglue.site.polygons import corners_of
 CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
 # Drawn upstream and downstream of patches and stations [m]: room to see the bed around them.
 REACH_OF_INTEREST_MARGIN = 12.0
+# Share of the grid [-] from which that reach is all but the whole, and is not drawn again.
+ALL_BUT_WHOLE = 0.8
 
 
 def save_channel_figure(case: Case, site: Site, observations: Observations, path: Path) -> None:
@@ -30,32 +32,37 @@ def save_channel_figure(case: Case, site: Site, observations: Observations, path
 
 @styled
 def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
-    """Above the whole grid (not to scale), in the middle the reach of interest, below the bed across its middle."""
-    figure, (whole, reach, across) = canvas(9.4, 7.2, nrows=3, height_ratios=[1, 1.6, 1.4])
-    low, high = _reach_of_interest(case, observations)
-    for axes in (whole, reach):
-        _draw_classes(axes, site)
-        _draw_waterlines(axes, case, site)
-        _draw_patches(axes, case, site)
-        _draw_stations(axes, observations)
-        axes.set(ylabel="y [m]", ylim=case.grid.y)
+    """Above the whole grid (not to scale), below it the reach of interest where that is a part of it, last the bed
+    across its middle.
+    """
+    reach = _reach_of_interest(case, observations)
+    (west, east), (low, high) = case.grid.x, reach
+    apart = high - low < ALL_BUT_WHOLE * (east - west)
+    heights = [1.0, 1.6, 1.4] if apart else [1.6, 1.4]
+    figure, (whole, *between, across) = canvas(9.4, 7.2 if apart else 5.6, nrows=len(heights), height_ratios=heights)
+    for axes in (whole, *between):
+        _draw_plan(axes, case, site, observations)
     _draw_boundaries(whole, case)
-    whole.axvspan(low, high, fill=False, edgecolor=COLOUR["ink"], linewidth=0.8, linestyle=":")
     whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: classes, boundaries and stations (not to scale)")
-    reach.set(xlim=(low, high), xlabel="x [m], flow to the right", title="The reach between the dotted lines")
+    for axes in between:
+        whole.axvspan(low, high, fill=False, edgecolor=COLOUR["ink"], linewidth=0.8, linestyle=":")
+        axes.set(xlim=reach, title="The reach between the dotted lines")
+    nearest = between[0] if between else whole
+    nearest.set(xlabel="x [m], flow to the right")
     for patch in case.plants.patches:
         x, y = corners_of(case, patch).mean(axis=0)
-        label(reach, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
-    reach.legend(
-        handles=_legend(case, site, observations),
-        loc="lower left",
-        ncols=7,
-        fontsize=SMALL,
-        framealpha=1,
-        facecolor=COLOUR["paper"],
-    )
+        label(nearest, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
+    figure.legend(handles=_legend(case, site, observations), loc="outside lower left", ncols=6, fontsize=SMALL)
     _draw_section(across, case, site, 0.5 * (low + high))
     return figure
+
+
+def _draw_plan(axes: Axes, case: Case, site: Site, observations: Observations) -> None:
+    _draw_classes(axes, site)
+    _draw_waterlines(axes, case, site)
+    _draw_patches(axes, case, site)
+    _draw_stations(axes, observations)
+    axes.set(ylabel="y [m]", ylim=case.grid.y)
 
 
 def _reach_of_interest(case: Case, observations: Observations) -> tuple[float, float]:
