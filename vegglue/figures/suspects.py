@@ -18,6 +18,7 @@ from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, canvas, formula_labels, label, styled
 from vegglue.figures.typography import fixed, no_formula, unit_math
 from vegglue.measurements.kinds import KINDS, Kind
+from vegglue.measurements.sections import section_in_words
 from vegglue.screening.score_test import ALIKE, alike_groups
 
 # How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
@@ -166,7 +167,7 @@ def _parts_of(kind: Kind, rows: pd.DataFrame) -> list[tuple[pd.DataFrame, str, K
         return [(rows, f"{kind.instrument}s", kind)] if len(rows) else []
     sections = rows.groupby("section")["x"].mean().sort_values().index
     parts = [(str(name), rows[rows["section"] == name]) for name in sections]
-    return [(part, f"{name}, x = {part['x'].mean():g} m", kind) for name, part in parts]
+    return [(part, section_in_words(name, float(part["x"].mean())), kind) for name, part in parts]
 
 
 def _panels(number: int) -> tuple[Figure, list[Axes]]:

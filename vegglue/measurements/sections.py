@@ -1,5 +1,7 @@
 """Sections: stations that were measured together across the channel, though a boat does not keep its line."""
 
+import re
+
 import pandas as pd
 
 
@@ -13,3 +15,9 @@ def section_places(station: pd.DataFrame) -> pd.Series:
     across = group["y"].transform("max") - group["y"].transform("min")
     together = (station["section"].astype(str) != "") & (along <= across)
     return group["x"].transform("median").where(together, station["x"])
+
+
+def section_in_words(name: str, x: float) -> str:
+    """`D3, x = 42 m`; `x = 42 m` alone of a section that was only named after its place. x [m], to centimetres."""
+    place = f"x = {round(x, 2):g} m"
+    return place if re.fullmatch(r"x[-+]?\d+\.\d\d", name) else f"{name}, {place}"

@@ -15,6 +15,7 @@ from vegglue.figures.section_panels import DrawnPanel, Edges, PanelGround, Secti
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import as_given, count, short
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
+from vegglue.measurements.sections import section_in_words
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.run import Run, file_name, planted_cells, published_svg, stamp
 from vegglue.site.gridded_site import in_experiment
@@ -131,7 +132,7 @@ def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> Sectio
         for low, high in zip(EDGES[::2], EDGES[1::2], strict=True)
     )
     return SectionPanel(
-        title=f"{rows['section'].iloc[0]}, x = {round(x, CENTIMETRES):g} m",
+        title=section_in_words(str(rows["section"].iloc[0]), x),
         y=values["y"],
         measured=values["value"],
         error=1.96 * rows["standard_error"].to_numpy(float),
