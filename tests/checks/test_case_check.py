@@ -148,6 +148,13 @@ def test_many_stations_outside_are_one_sentence(tmp_path):
     assert of_grid == ["2 places of experiment low, the first at x = -1, y = 0 m, are outside the grid, and not used."]
 
 
+def test_a_prior_in_another_unit_than_its_effect_is_said(tmp_path):
+    prior = "  d: {distribution: uniform, low: -0.1, high: 0.1, unit: cm/s}\n"
+    text = SOUND.replace("observations:", prior + "effects:\n  zero_offset: {values: {offset: d}}\nobservations:")
+    assert [one for one in odd(tmp_path, text) if "`parameters.d` states cm/s, and `effects.zero_offset" in one]
+    assert odd(tmp_path, text.replace("cm/s", "m/s")) == []
+
+
 def test_places_of_a_map_are_said_first(tmp_path):
     heading, *rows = ROWS.splitlines()
     on_map = "".join(f"low,A,{683_120 + x},{247_480 + y},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))

@@ -13,7 +13,12 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_unnamed_banks,
 )
 from vegglue.checks.directions import remarks_on_directions
-from vegglue.checks.ensemble_and_priors import remarks_on_ensemble, remarks_on_idle_parameters, remarks_on_kept_fields
+from vegglue.checks.ensemble_and_priors import (
+    remarks_on_ensemble,
+    remarks_on_idle_parameters,
+    remarks_on_kept_fields,
+    remarks_on_units_of_effects,
+)
 from vegglue.checks.stations import (
     remarks_on_absurd_values,
     remarks_on_exchanged_axes,
@@ -50,6 +55,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_friction_classes(case, site),
         remarks_on_unnamed_banks(case, site),
         remarks_on_idle_parameters(case, site),
+        remarks_on_units_of_effects(case),
         remarks_on_boundaries(case, site),
         remarks_on_steep_flow(case, site),
         remarks_on_canopies(case, site, observations),

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vegglue.case.case_effects import effect_of
 from vegglue.case.consistency import values
 from vegglue.case.messages import KeyPath
 from vegglue.case.parameter_space import Bounds
@@ -67,6 +68,19 @@ def remarks_on_idle_parameters(case: Case, site: Site) -> Iterator[str]:
             yield f"Parameter {name} acts in the command of `engine` only: what effects would change ignores it."
         elif name not in acting:
             yield f"Parameter {name} acts in no cell of any experiment: its posterior will be its prior."
+
+
+def remarks_on_units_of_effects(case: Case) -> Iterator[str]:
+    """Parameters of effects whose prior states another unit than the effect takes: nothing is converted."""
+    for key, entry in case.effects.items():
+        taken = {one.name: one.unit for one in effect_of(case, key).parameters}
+        for name, value in entry.values.items():
+            said = case.parameters[value].unit if isinstance(value, str) else taken[name]
+            if said.replace(" ", "") != taken[name].replace(" ", ""):
+                yield (
+                    f"`parameters.{value}` states {said}, and `effects.{key}` takes {name} in {taken[name]}: its "
+                    "numbers are used as they stand; correct the unit or the numbers."
+                )
 
 
 def _acts(place: KeyPath, classes: set[str], growing: set[str]) -> bool:
