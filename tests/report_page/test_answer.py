@@ -11,14 +11,9 @@ from posteriors import changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
-from vegglue.report_page.answer_words import (
-    causes_of,
-    headline,
-    ladder_in_words,
-    next_steps,
-    of_which_model,
-    why_not_to_rely,
-)
+from vegglue.report_page.answer_words import headline, of_which_model, why_not_to_rely
+from vegglue.report_page.ladder_words import causes_of, ladder_in_words
+from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
 from vegglue.results.diagnosis import Step

@@ -11,7 +11,7 @@ from report_runs import MEMBERS
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
-from vegglue.report_page.posterior_words import off_its_prior
+from vegglue.report_page.prior_words import off_its_prior
 from vegglue.report_page.run import Run
 from vegglue.report_page.tables import parameter_rows
 

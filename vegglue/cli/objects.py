@@ -8,7 +8,8 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.diagnosis.next_measurement import MeasurementWorth
 from vegglue.discovery.discovered import LawFound
-from vegglue.report_page.posterior_words import describe, off_its_prior, pressed_bounds
+from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.results.ensemble import Ensemble

@@ -7,17 +7,10 @@ from dataclasses import dataclass
 
 from vegglue.figures.error_rows import draw_error_rows
 from vegglue.figures.style import Picture
-from vegglue.report_page.answer_words import (
-    causes_of,
-    headline,
-    ladder_in_words,
-    ladder_rows,
-    next_steps,
-    of_which_model,
-    where_it_fails,
-    why_not_to_rely,
-)
+from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
 from vegglue.report_page.cause_words import accepted_causes
+from vegglue.report_page.ladder_words import causes_of, ladder_in_words, ladder_rows
+from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import Run, published_svg
 from vegglue.report_page.section_pictures import SectionPanels, section_panels
 

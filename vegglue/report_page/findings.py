@@ -32,13 +32,12 @@ from vegglue.report_page.posterior_words import (
     canopy_in_words,
     correlations_in_words,
     fit_in_words,
-    off_its_prior,
     parameter_in_words,
-    pressed_bounds,
     search_in_words,
     validation_in_words,
     weights_in_words,
 )
+from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.run import Run, median_plants
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

@@ -9,7 +9,8 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import UNBELIEVED, identification, off_its_prior, pressed_bounds
+from vegglue.report_page.posterior_words import UNBELIEVED, identification
+from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED

@@ -11,7 +11,8 @@ from vegglue.inference.likelihood import sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
-from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior
+from vegglue.report_page.prior_words import against_prior_in_words
+from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, Posterior
 from vegglue.results.refinement import ErrorModel, GroupsLeftOut, LeaveOneOut, MisfitTest, PosteriorModes, Refinement
 
 # |r| [-] above which a pair is told of: the other parameter then explains half the variance of each (r² = 0.49).
@@ -99,8 +100,7 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
         return [
             f"{symbol} is not identified: its 95 % range, {low} to {high}{unit}, is still {ratio} (identified means "
             f"below {100 * IDENTIFIED_BELOW:g} %).",
-            *_bounds(posterior, name, notation),
-            *_against_its_prior(posterior, name, notation),
+            *against_prior_in_words(posterior, name, notation),
         ]
     power = ""
     if name in marginals.log10_median:
@@ -108,43 +108,7 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
     return [
         f"{symbol}: median {number(marginals.median[name], 3)}{unit}{power}, standard deviation "
         f"{number(marginals.sd[name], 2)}, 95 % range {low} to {high}, {ratio}.",
-        *_bounds(posterior, name, notation),
-        *_against_its_prior(posterior, name, notation),
-    ]
-
-
-def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
-    """The bounds of its prior that a parameter presses against: 'lower', 'upper', both or none."""
-    hit = posterior.marginals.bound_hit[name]
-    return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
-
-
-def off_its_prior(posterior: Posterior, name: str) -> bool:
-    """Whether the median of a parameter lies outside the range that holds 95 % of its prior, and against no bound."""
-    low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
-    inside = low <= posterior.marginals.median[name] <= high
-    return posterior.claimed and not inside and not pressed_bounds(posterior, name)
-
-
-def _against_its_prior(posterior: Posterior, name: str, notation: Notation) -> list[str]:
-    if not off_its_prior(posterior, name):
-        return []
-    low, high = (notation.number(float(value), 3) for value in posterior.marginals.prior_quantiles[name][[0, -1]])
-    return [
-        f"{notation.parameter(name)} lies outside the range that its prior holds for 95 % likely, {low} to {high}: the "
-        "prior or a measurement is wrong, or it stands in for something that is missing."
-    ]
-
-
-def _bounds(posterior: Posterior, name: str, notation: Notation) -> list[str]:
-    marginals = posterior.marginals
-    bound = dict(zip(("lower", "upper"), marginals.bounds[name], strict=True))
-    mass = dict(zip(("lower", "upper"), marginals.bound_mass[name], strict=True))
-    return [
-        f"{notation.parameter(name)} presses against the {side} bound of its prior, {notation.number(bound[side], 3)}: "
-        f"{notation.number(mass[side], 2)} of the posterior lies within {100 * NEAR_BOUND:g} % of the prior's range of "
-        f"it ({NEAR_BOUND:g} if the data said nothing)."
-        for side in pressed_bounds(posterior, name)
+        *against_prior_in_words(posterior, name, notation),
     ]
 
 

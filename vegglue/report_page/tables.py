@@ -14,7 +14,8 @@ from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, 
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
-from vegglue.report_page.posterior_words import identification, off_its_prior, pressed_bounds
+from vegglue.report_page.posterior_words import identification
+from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.run import Run, station_zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import CorrectedCanopy

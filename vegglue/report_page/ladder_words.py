@@ -1,0 +1,72 @@
+"""How far the error falls, in words (HTML), and what was added for it."""
+
+import html
+import math
+
+from vegglue.figures.typography import NARROW, short, unit_html
+from vegglue.in_short import listed
+from vegglue.report_page.cause_words import accepted_causes
+from vegglue.report_page.run import Run
+from vegglue.results.ladder import Ladder
+from vegglue.screening.candidates import key_of
+
+# Ways of judging a model, the most telling first: field of a step, and the measurements it is about.
+JUDGED_ON = {
+    "unseen": "measurements no calibration has seen",
+    "held_out_sections": "sections left out in turn",
+    "held_out_experiments": "experiments left out in turn",
+    "in_sample": "measurements it was calibrated to",
+}
+
+
+def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
+    """How far the error falls from the first model to the last, by the most telling way of judging.
+
+    causes: what was added, in words (text), where that is known.
+    """
+    first, last = ladder.steps[0], ladder.steps[-1]
+    judged = next((name for name in JUDGED_ON if math.isfinite(getattr(last, name))), None)
+    if judged is None:
+        return "No velocities along x were measured, by which models are set side by side."
+    before, after = getattr(first, judged), getattr(last, judged)
+    where = ", at what it was calibrated to," if judged == "unseen" else ""  # whose own errors are mostly not stated
+    measuring = f"; errors of measuring alone{where} are {_speed(last.noise_floor)}"
+    floor = measuring if math.isfinite(last.noise_floor) else ""
+    if len(ladder.steps) == 1:
+        why = f" {html.escape(ladder.reason)}" if ladder.reason else ""
+        return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}.{why}"
+    falls = "falls" if after < before else "rises"
+    with_it = listed([f"<code>{html.escape(name)}</code>" for name in _all_added(ladder)])
+    model = html.escape(causes) or with_it or html.escape(last.name)
+    from_to = f"{falls} from {short(before, 2)} to {_speed(after)}"
+    return f"With {model}, the error at {JUDGED_ON[judged]} {from_to}{floor}."
+
+
+def _all_added(ladder: Ladder) -> list[str]:
+    last = [name for step in ladder.steps[1:] for name in step.added]
+    return list(dict.fromkeys(last))
+
+
+def _speed(value: float) -> str:
+    return f"{short(value, 2)}{NARROW}{unit_html('m/s')}"
+
+
+def causes_of(run: Run) -> str:
+    """What the diagnosis of the ladder's first model accepted, in words (text), where the ladder adds all of it and
+    nothing else; '' else.
+    """
+    ladder = run.loop.ladder
+    known = [one for one in (run.loop.behind, run.diagnosis) if one is not None]
+    found = next((one for one in known if ladder and one.name == ladder.steps[0].name), None)
+    if ladder is None or found is None:
+        return ""
+    effects = [key_of(step.accepted) for step in found.steps]
+    places, added = sorted(one.effect for one in found.places), _all_added(ladder)
+    others = sorted(name.partition("_x")[0] for name in added if name not in effects)
+    return accepted_causes(found) if set(effects) <= set(added) and others == places else ""
+
+
+def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
+    """Errors of each model in turn [m/s], by what they are judged on, without what nothing is known of."""
+    rows = {words: [float(getattr(step, name)) for step in ladder.steps] for name, words in JUDGED_ON.items()}
+    return {words: values for words, values in rows.items() if any(map(math.isfinite, values))}

@@ -1,0 +1,92 @@
+"""What to do next, in words (HTML): the command, the page, the measurement that leads on."""
+
+import html
+from collections.abc import Iterator
+
+from vegglue.effects.library import library
+from vegglue.figures.typography import NARROW, count, short
+from vegglue.report_page.cause_words import OF_KIND, where
+from vegglue.report_page.run import Run
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.ladder import LadderStep
+from vegglue.results.open_questions import OpenQuestion
+
+# How a question names an effect that calibration hides.
+HIDDEN_BEHIND = " from a change of "
+# Measurements named beside the answer: more are a list that nobody acts on.
+QUESTIONS_SHOWN = 3
+
+
+def next_steps(run: Run) -> list[str]:
+    """What to do next, the first thing first."""
+    command = html.escape(run.case.source.name)
+    if run.behind is None:
+        return [f"<code>vegglue diagnose {command}</code> tells which physical effect this model lacks, if any."]
+    return [*_better_model(run), *_measurements(run, command), *_of_instruments(run.behind)]
+
+
+def _of_instruments(found: Diagnosis) -> Iterator[str]:
+    for one in found.instruments:
+        yield f"Look at the instrument again: {OF_KIND[one.kind]}, at {where(one.x, one.y)}. Its readings are left out."
+
+
+def _better_model(run: Run) -> Iterator[str]:
+    ladder, found = run.loop.ladder, run.behind
+    assert found is not None
+    if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
+        command = html.escape(run.case.source.name)
+        yield f"<code>vegglue discover {command}</code> calibrates laws that are in no list, and writes the best."
+    if ladder is None:
+        if found.steps or found.places:
+            command = html.escape(run.case.source.name)
+            yield f"<code>vegglue extend {command} --auto</code> adds what is missing, and shows the error fall."
+        return
+    if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:
+        yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
+    elif len(ladder.steps) > 1 and ladder.steps[0].name in run.loop.pages:
+        yield f"Compare with the model without it: {_page_of(run, ladder.steps[0])}."
+
+
+def _page_of(run: Run, step: LadderStep) -> str:
+    config = f"<code>{html.escape(step.config)}</code>"
+    if step.name not in run.loop.pages:
+        return config
+    return f'{config} (<a href="{html.escape(run.loop.pages[step.name])}">its report</a>)'
+
+
+def _measurements(run: Run, command: str) -> Iterator[str]:
+    """What to measure, and what no single measurement would settle."""
+    questions = run.loop.questions
+    if questions is None:
+        yield f"<code>vegglue next {command}</code> says what to measure next."
+        return
+    if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
+        yield "What was found needs no further measurement. What that model leaves open stands in its report."
+    elif not questions:
+        yield "No further measurement is needed."
+    settled = [one for one in questions if one.measurements and one.measurements[0].enough]
+    measurements = {one.measurements[0].name: one.measurements[0] for one in reversed(settled)}
+    for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
+        purposes = [_to_see(one) for one in settled if one.measurements[0].name == best.name]
+        yield (
+            f"Measure <b>{html.escape(best.name)}</b>, {' and '.join(purposes)}: {count(best.stations, 'station')}, "
+            f"some {short(best.hours, 2)}{NARROW}hours of field work."
+        )
+    left = [_to_see(one) for one in questions if one not in settled]
+    if left:
+        yield f"No single measurement would do {'; nor '.join(left)}."
+
+
+def _to_see(question: OpenQuestion) -> str:
+    """What a question asks, as a purpose."""
+    one, hidden, other = question.tells_apart.partition(HIDDEN_BEHIND)
+    if hidden:
+        return f"to test {_told(one)}, which a change of <code>{html.escape(other)}</code> hides"
+    return f"to tell {html.escape(question.tells_apart)}"
+
+
+def _told(name: str) -> str:
+    """'“Steep banks touch more water than their width says” (steep_bank)': an effect of the library by its title."""
+    known = library().get(name.partition("[")[0])
+    code = f"<code>{html.escape(name)}</code>"
+    return f"“{html.escape(known.title)}” ({code})" if known is not None else code

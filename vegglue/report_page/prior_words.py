@@ -1,0 +1,44 @@
+"""Where a posterior disagrees with its prior: it presses against a bound, or lies off its middle."""
+
+from vegglue.figures.typography import Notation
+from vegglue.results.posterior import NEAR_BOUND, Posterior
+
+
+def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
+    """The bounds of its prior that a parameter presses against: 'lower', 'upper', both or none."""
+    hit = posterior.marginals.bound_hit[name]
+    return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
+
+
+def off_its_prior(posterior: Posterior, name: str) -> bool:
+    """Whether the median of a parameter lies outside the range that holds 95 % of its prior, and against no bound."""
+    low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
+    inside = low <= posterior.marginals.median[name] <= high
+    return posterior.claimed and not inside and not pressed_bounds(posterior, name)
+
+
+def _off_in_words(posterior: Posterior, name: str, notation: Notation) -> list[str]:
+    if not off_its_prior(posterior, name):
+        return []
+    low, high = (notation.number(float(value), 3) for value in posterior.marginals.prior_quantiles[name][[0, -1]])
+    return [
+        f"{notation.parameter(name)} lies outside the range that its prior holds for 95 % likely, {low} to {high}: the "
+        "prior or a measurement is wrong, or it stands in for something that is missing."
+    ]
+
+
+def _bounds(posterior: Posterior, name: str, notation: Notation) -> list[str]:
+    marginals = posterior.marginals
+    bound = dict(zip(("lower", "upper"), marginals.bounds[name], strict=True))
+    mass = dict(zip(("lower", "upper"), marginals.bound_mass[name], strict=True))
+    return [
+        f"{notation.parameter(name)} presses against the {side} bound of its prior, {notation.number(bound[side], 3)}: "
+        f"{notation.number(mass[side], 2)} of the posterior lies within {100 * NEAR_BOUND:g} % of the prior's range of "
+        f"it ({NEAR_BOUND:g} if the data said nothing)."
+        for side in pressed_bounds(posterior, name)
+    ]
+
+
+def against_prior_in_words(posterior: Posterior, name: str, notation: Notation) -> list[str]:
+    """The bounds it presses against, and that it lies off its prior; nothing where it agrees with it."""
+    return [*_bounds(posterior, name, notation), *_off_in_words(posterior, name, notation)]
