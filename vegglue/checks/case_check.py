@@ -32,7 +32,12 @@ from vegglue.site.gridded_site import Site
 
 
 def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
-    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values."""
+    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values.
+
+    Nothing where none of them is in use: every command refuses that, with the reason of the first.
+    """
+    if not observations.table["used"].any():
+        return []
     return [
         *remarks_on_absurd_values(case, site, observations),
         *remarks_on_exchanged_axes(case, observations),
