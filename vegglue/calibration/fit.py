@@ -16,6 +16,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.case.parameter_space import FURTHEST, theta_at
 from vegglue.engine.interface import Model, Point, linearise
+from vegglue.normal_range import NORMAL95
 
 # Predicted decrease of the objective [-] below which the search ends: the point is then within sqrt(0.02) = 0.14
 # standard errors of the minimum. Chosen, not measured: a smaller one costs more runs of the model.
@@ -111,7 +112,7 @@ def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, flo
     """theta(z_j) and theta(z_j -/+ 1.96 s_j) of a parameter, in its unit, s_j^2 the variance of z_j."""
     j = model.names.index(name)
     z = np.repeat(fitted.point.z[None], 3, axis=0)
-    z[:, j] += 1.96 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
+    z[:, j] += NORMAL95 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
     middle, low, high = theta_at(model.case, z)[name]
     return float(middle), float(low), float(high)
 

@@ -11,6 +11,7 @@ from vegglue.calibration.fit import chi2
 from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.refits import Refit
 from vegglue.measurements.kinds import kind_of
+from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 from vegglue.screening import score_test
 from vegglue.screening.evidence import prior_shrinkage
@@ -24,8 +25,6 @@ IN_SET, HARDLY = 0.95, 0.05
 POINTS_AT_IT = 0.1
 # Odds beyond e^this are told as this: larger numbers say no more.
 LARGEST_LOG_ODDS = 100.0
-# Standard errors on either side of a 95 % interval.
-NORMAL95 = 1.96
 
 
 def step_found(

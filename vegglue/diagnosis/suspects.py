@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 from vegglue.screening import score_test
 from vegglue.screening.residual_screening import Screening
@@ -62,7 +63,7 @@ def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimat
     gain = float(score) / length
     return AmplitudeEstimate(
         value=amplitude.at(gain),
-        interval95=(amplitude.at(gain - 1.96 / length), amplitude.at(gain + 1.96 / length)),
+        interval95=(amplitude.at(gain - NORMAL95 / length), amplitude.at(gain + NORMAL95 / length)),
         unit=amplitude.unit,
         off=amplitude.off,
         scale=amplitude.scale,

@@ -19,6 +19,7 @@ from vegglue.diagnosis.causes_in_words import (
 )
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
+from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import (
     EstimatedErrors,
@@ -227,7 +228,7 @@ def _unsure_between(grounds: Grounds) -> tuple[VerdictKind, str]:
 def _is_clear(instrument: FaultyInstrument) -> bool:
     """Whether an instrument is off by CLEARLY_OFF of its standard errors."""
     low, high = instrument.interval95
-    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / 3.92
+    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / (2.0 * NORMAL95)
 
 
 def _told_of(instrument: FaultyInstrument) -> str:

@@ -15,6 +15,7 @@ from scipy.special import ndtri
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, HEIGHT, SMALL, WIDTH, canvas, formula_labels, label, styled
 from vegglue.figures.typography import plus_minus
+from vegglue.normal_range import NORMAL95
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def draw_discharge(rows: Sequence[tuple[str, float, float]], spread: tuple[float
     axes.axvline(middle, color=COLOUR["model"], linewidth=1.3)
     for place, (_, value, error) in enumerate(rows):
         axes.errorbar(
-            value, place, xerr=1.96 * error, fmt="o", markersize=4.2, color=COLOUR["measured"], elinewidth=0.9
+            value, place, xerr=NORMAL95 * error, fmt="o", markersize=4.2, color=COLOUR["measured"], elinewidth=0.9
         )
     label(axes, middle, -0.6, "model", "model", xytext=(4, -8))
     axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])

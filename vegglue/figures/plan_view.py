@@ -22,6 +22,7 @@ from vegglue.figures.field_map import (
 from vegglue.figures.style import COLOUR
 from vegglue.figures.svg_text import area_between, line_through, svg_document, svg_element, svg_words
 from vegglue.flow.sensor import FlowFields
+from vegglue.normal_range import NORMAL95
 
 PlanWindow = tuple[float, float, float, float]
 # Parts of equal discharge [-] between drawn streamlines; captions say a tenth.
@@ -145,7 +146,7 @@ def _levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, float
 
 
 def _gauge_marks(frame: MapFrame, gauges: Gauges) -> list[str]:
-    parts, error = [], 1.96 * np.nan_to_num(gauges.standard_error)
+    parts, error = [], NORMAL95 * np.nan_to_num(gauges.standard_error)
     for k, at in enumerate(frame.across(gauges.x)):
         if not np.isfinite(gauges.value[k]):
             continue

@@ -16,6 +16,7 @@ from vegglue.figures.style import Picture
 from vegglue.figures.typography import as_given, count, short
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.sections import section_in_words
+from vegglue.normal_range import NORMAL95
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.run import Run, file_name, planted_cells, published_svg, stamp
 from vegglue.site.gridded_site import in_experiment
@@ -135,7 +136,7 @@ def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> Sectio
         title=section_in_words(str(rows["section"].iloc[0]), x),
         y=values["y"],
         measured=values["value"],
-        error=1.96 * rows["standard_error"].to_numpy(float),
+        error=NORMAL95 * rows["standard_error"].to_numpy(float),
         aside=rows["aside"].to_numpy(bool),
         before=values["before"] if added else None,
         after=values["after"],
