@@ -78,7 +78,7 @@ def show_ladder(found: Comparison) -> None:
     if rungs:
         console().print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
-            f"{rungs[-1].in_sample.noise_floor:.4f} m/s; chi2 is to be compared within this table only."
+            f"{rungs[-1].in_sample.noise_floor:.4f} m/s; compare chi2 here only."
         )
     if note:
         console().print(note)
