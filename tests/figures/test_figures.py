@@ -9,7 +9,7 @@ import pytest
 from drawings import off_the_sheet, points, texts
 
 from vegglue.figures.measured import Vertical, draw_quantiles, draw_residuals, draw_verticals
-from vegglue.figures.plan_view import draw_reach, stream_function, wet_window
+from vegglue.figures.plan_view import draw_reach, stream_function, stretch_of, wet_window
 from vegglue.figures.posterior import (
     POSTERIOR_MEMBERS,
     DrawnParameter,
@@ -192,6 +192,16 @@ def test_published_picture_stands_alone(tmp_path: Path) -> None:
     assert len(ids) == len(set(ids))
     assert set(used) <= set(ids)
     assert all(name.startswith("reach-") for name in ids)
+
+
+def test_a_long_reach_is_stretched_until_its_streamlines_part() -> None:
+    wide, long = (0.0, 40.0, 0.0, 6.0), (0.0, 400.0, 0.0, 6.0)
+    assert stretch_of(wide) == 1.0
+    ten = stretch_of((0.0, 4000.0, 0.0, 6.0)) / stretch_of(long)
+    assert ten == pytest.approx(10.0)
+    heights = [float(re.search(r'height="(\d+)', draw_reach(uniform_flow(), one, [], np.zeros((0, 2))))[1])
+               for one in (long, (0.0, 4000.0, 0.0, 6.0))]  # fmt: skip
+    assert heights[0] == heights[1]
 
 
 def test_the_same_figure_is_the_same_file(tmp_path: Path) -> None:

@@ -29,6 +29,8 @@ PlanWindow = tuple[float, float, float, float]
 STREAM_TUBES = 10
 # Heights of the maps and of the profile of the whole channel, and what lies between them [px].
 STRETCHED, PROFILE, GAP, HEAD, BELOW = 96.0, 150.0, 34.0, 24.0, 44.0
+# Height of a reach [px] below which its streamlines run into one another: it is stretched to that.
+LEAST_HEIGHT = 84.0
 
 
 @dataclass(frozen=True)
@@ -66,15 +68,24 @@ def stream_function(flow: FlowFields) -> Array:
     return edge[:, None] + (np.cumsum(along, axis=1) - 0.5 * along) * dy
 
 
+def stretch_of(window: PlanWindow) -> float:
+    """How many times wider than at true scale a reach is drawn [-], so that it has LEAST_HEIGHT; 1 where it is wide."""
+    return max(1.0, LEAST_HEIGHT / _true_height(window))
+
+
+def _true_height(window: PlanWindow) -> float:
+    x0, x1, y0, y1 = window
+    return (MAP_RIGHT - MAP_LEFT) * (y1 - y0) / (x1 - x0)
+
+
 def draw_reach(
     flow: FlowFields, window: PlanWindow, patches: Sequence[Outline], stations: Array, note: str = ""
 ) -> str:
-    """SVG text: depth and velocity of a reach at true scale; between two streamlines flows a tenth of the discharge.
+    """SVG text: depth and velocity of a reach; between two streamlines flows a tenth of the water. See `stretch_of`.
 
     stations: x, y (station, 2) [m]; note: in the corner.
     """
-    x0, x1, y0, y1 = window
-    tall = (MAP_RIGHT - MAP_LEFT) * (y1 - y0) / (x1 - x0)
+    tall = stretch_of(window) * _true_height(window)
     upper, lower = MapFrame(window, HEAD, HEAD + tall), MapFrame(window, HEAD + tall + GAP, HEAD + 2 * tall + GAP)
     parts = [*_depth(upper, flow), *_velocity(lower, flow)]
     for frame in (upper, lower):

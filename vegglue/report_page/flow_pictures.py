@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from vegglue.figures.plan_view import Gauges, Outline, draw_plan, draw_reach, wet_window
+from vegglue.figures.plan_view import Gauges, Outline, PlanWindow, draw_plan, draw_reach, stretch_of, wet_window
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
@@ -19,7 +19,7 @@ REACH_MARGIN = 8.0
 
 
 def plans(run: Run, experiment: str) -> Iterator[Picture]:
-    """The reach of patches and stations at true scale, and the whole channel."""
+    """The reach of patches and stations, and the whole channel."""
     flow, table = run.flow[experiment], run.observations.table
     rows = table[table["experiment"] == experiment]
     stations = rows[["x", "y"]].drop_duplicates().to_numpy(float)
@@ -28,9 +28,10 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     if len(places):
         start, end = places.min() - REACH_MARGIN, places.max() + REACH_MARGIN
         reach = max(float(flow.x[0]), start), min(float(flow.x[-1]), end)
-        drawn = draw_reach(flow, wet_window(flow, reach), patches, stations, stamp(run.case))
+        window = wet_window(flow, reach)
+        drawn = draw_reach(flow, window, patches, stations, stamp(run.case))
         alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
-        yield published_svg(run, drawn, f"reach-{experiment}", _reach_caption(run, experiment, reach), alt)
+        yield published_svg(run, drawn, f"reach-{experiment}", _reach_caption(run, experiment, window), alt)
     gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
     drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
@@ -44,10 +45,10 @@ def _outlines(run: Run, experiment: str) -> list[Outline]:
     return [Outline(patch.name, corners_of(run.case, patch)) for patch in patches]
 
 
-def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str:
+def _reach_caption(run: Run, experiment: str, window: PlanWindow) -> str:
     flow, plants = run.flow[experiment], planted_cells(run, experiment)
     speed = np.hypot(flow.u, flow.v)
-    inside = ((flow.x >= reach[0]) & (flow.x <= reach[1]))[:, None] & np.isfinite(speed)
+    inside = ((flow.x >= window[0]) & (flow.x <= window[1]))[:, None] & np.isfinite(speed)
     moves = ""
     ground = np.isin(run.site.friction_class, np.unique(run.site.friction_class[plants]))
     if (plants & inside).any():
@@ -55,8 +56,10 @@ def _reach_caption(run: Run, experiment: str, reach: tuple[float, float]) -> str
         moves = (
             f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
         )
+    stretch = stretch_of(window)
+    scale = "at true scale" if stretch == 1.0 else f"y stretched {stretch:.2g} times"
     return (
-        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, at true scale, "
+        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, {scale}, "
         f"median parameters{_of_engine(run)}.{moves} Between two streamlines flows a tenth of the discharge; dots are "
         "stations."
     )

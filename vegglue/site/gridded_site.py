@@ -57,16 +57,15 @@ def _with_bed(case: Case, grid: Grid, patch: NDArray[np.int64], experiment: str 
 
 
 def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Indices (n,) each of the cells that places [m] lie in, the outermost beyond; on an edge, of its lowest cell.
+    """Indices (n,) each of the cells that places [m] lie in, the outermost beyond.
 
-    A station at the toe of a bank stands on the floor, on either side of the channel.
+    On the edge of two cells across, that of the lower one: a station at the toe of a bank stands on the floor, on
+    either side of the channel. On one along, that of the upstream one.
     """
     grid = site.grid
-    sides = [(_index(x, grid.x, grid.dx, a), _index(y, grid.y, grid.dy, b)) for a in (-1, 1) for b in (-1, 1)]
-    lowest = np.argmin([site.bed[i, j] for i, j in sides], axis=0)
-    i, j = np.array(sides).transpose(1, 0, 2)
-    every = np.arange(lowest.size)
-    return i[lowest, every], j[lowest, every]
+    column = _index(x, grid.x, grid.dx, -1)
+    south, north = (_index(y, grid.y, grid.dy, side) for side in (-1, 1))
+    return column, np.where(site.bed[column, north] < site.bed[column, south], north, south)
 
 
 def _index(at: Array, centres: Array, step: float, side: int) -> NDArray[np.int64]:
