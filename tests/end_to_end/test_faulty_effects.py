@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 from reach import COARSE, said_to, write_reach
 
+from vegglue.checks.effect_contract import breaches
+from vegglue.effects.library import effects_of
+
 EFFECT = '''from vegglue.effects.definition import Amplitude, Effect
 
 
@@ -29,6 +32,7 @@ ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.01}")
         ("raise KeyError('x')", "The effect `slow_stones` fails when it acts, in line 6: KeyError: 'x'; mend it."),
         ("return {'rate': cells.rate * float('nan')}", "The effect `slow_stones` gives what is no finite number"),
         ("return {'rate': cells.rate[:2, :2] * excess}", "The effect `slow_stones` gives `rate`; expected the shape"),
+        ("return {'rate': cells.rate * (1 + 0j)}", "gives `rate`; expected real numbers, got complex128."),
         ("return {'ratte': cells.rate}", "The effect `slow_stones` gives `ratte`; expected a dict with `rate`."),
         ("cells.rate * (1 + excess)", "The effect `slow_stones` gives NoneType; expected a dict with `rate`."),
     ],
@@ -54,14 +58,30 @@ def test_an_effect_at_work_that_fails_ends_a_simulation(
     assert (code, "fails when it acts, in line 6" in told) == (2, True), told
 
 
+def test_a_function_of_other_names_fails_in_no_line(tmp_path: Path) -> None:
+    """A line of ours was told, which the user's file did not have."""
+    text = EFFECT.format(body="return {'rate': cells.rate * (1 + more)}").replace("(cells, excess)", "(cells, more)")
+    (tmp_path / "stones.py").write_text(text, encoding="utf-8")
+    effect = effects_of(tmp_path / "stones.py")[0]
+    [said] = breaches(effect)
+    assert said.startswith("The effect `slow_stones` fails when it acts: TypeError: act() got an unexpected keyword")
+
+
 @pytest.mark.parametrize(
     ("changed", "to", "said"),
     [
         ('"slow_stones"', '"slow stones"', "expected letters, digits and underscores, got `slow stones`"),
         ('"resistance"', '"resitance"', "expected one of site, boundary, plants, resistance"),
+        ('Amplitude("excess", "-", "relative excess of friction", scale=0.5, low=-0.9, high=5.0)', "None",
+         "`amplitude` of the effect 'slow_stones' expected an Amplitude(...), got NoneType"),
+        ("scale=0.5", "scale='big'", "`scale` of 'excess' of the effect 'slow_stones' expected a number, got 'big'"),
+        ("low=-0.9", "low=None", "`low` of 'excess' of the effect 'slow_stones' expected a number, got None"),
+        ('title="Stones hold back slow water"', "title=7", "`title` of the effect 'slow_stones' expected text, got 7"),
+        ("act=act", "act='act'", "`act` of the effect 'slow_stones' expected a function, got str"),
+        ("source=", "shapes=[1], source=", "`shapes` of the effect 'slow_stones' expected a tuple (Shape(...), ...)"),
         ("EFFECTS = (Effect(", "EFFECTS = ()\nOTHERS = (Effect(", "got none in it"),
     ],
-)
+)  # fmt: skip
 def test_what_no_command_could_use_is_refused(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

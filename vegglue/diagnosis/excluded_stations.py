@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 
 from vegglue.engine.interface import Model
+from vegglue.measurements.observations import SET_ASIDE
 from vegglue.results.diagnosis import Diagnosis
 
 # What makes a measurement the same in a case and in those that extend it.
@@ -21,11 +23,15 @@ def excluded_by(*found: Diagnosis) -> pd.DataFrame:
 
 def excluding(model: Model, aside: pd.DataFrame) -> Model:
     """The model, with these measurements not used."""
+    return replace(model, station=without_stations(model.station, aside))
+
+
+def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame:
+    """A table of stations, with these measurements not used."""
     known = set(aside.itertuples(index=False, name=None))
-    there = [row in known for row in model.station[MEASUREMENT].itertuples(index=False, name=None)]
-    station = model.station.copy()
-    station.loc[there, "used"] = False
-    return replace(model, station=station)
+    there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
+    there &= station["used"].to_numpy(bool)
+    return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, SET_ASIDE))
 
 
 def exclusion_in_words(aside: pd.DataFrame) -> str:

@@ -69,13 +69,18 @@ def _change(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -
     except Exception as error:
         if act.__module__.startswith("vegglue."):
             raise
-        line = traceback.extract_tb(error.__traceback__)[-1].lineno
-        what = f"{type(error).__name__}: {error}"
-        name = active.effect.name
-        raise InputError(f"The effect `{name}` fails when it acts, in line {line}: {what}; mend it.") from None
+        what, name = f"{type(error).__name__}: {error}", active.effect.name
+        raise InputError(f"The effect `{name}` fails when it acts{_in_line(act, error)}: {what}; mend it.") from None
     if not act.__module__.startswith("vegglue."):
         _refuse_misfits(active.effect, change, now)
     return change
+
+
+def _in_line(act: Any, error: Exception) -> str:
+    """`, in line 7` of the file of a function; '' where it never began, as one that takes other names."""
+    file = getattr(getattr(act, "__code__", None), "co_filename", None)
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    return f", in line {lines[-1]}" if lines else ""
 
 
 def _refuse_misfits(effect: Effect, change: Any, now: Mapping[str, Array]) -> None:
@@ -86,6 +91,9 @@ def _refuse_misfits(effect: Effect, change: Any, now: Mapping[str, Array]) -> No
     for name, value in change.items():
         if name not in now:
             raise InputError(f"The effect `{effect.name}` gives `{name}`; {expected}.")
+        if np.asarray(value).dtype.kind not in "fiub":
+            got = np.asarray(value).dtype
+            raise InputError(f"The effect `{effect.name}` gives `{name}`; expected real numbers, got {got}.")
         try:
             np.broadcast_shapes(np.shape(value), np.shape(now[name]))
         except ValueError:

@@ -2,12 +2,15 @@
 
 import importlib.util
 from collections.abc import Mapping
+from dataclasses import fields
 from functools import lru_cache
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
+from typing import get_type_hints
 
 from vegglue.effects import boundary, exchange, force, grammar, plants, resistance, sensor, site, unlisted
-from vegglue.effects.definition import STAGES, Effect
+from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
 from vegglue.errors import InputError, shown_path
 
 SHIPPED: tuple[Effect, ...] = (
@@ -56,8 +59,38 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
     if not found:
         raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got none in it; add one.")
     for effect in found:
+        _refuse_wrong_kinds(effect, shown)
         _refuse_unusable(effect, shown)
     return found
+
+
+def _refuse_wrong_kinds(effect: Effect, shown: str) -> None:
+    """Errors: InputError for a declaration whose parts are not of their kind, such as a number that is text."""
+    whole = isinstance(effect.shapes, tuple) and all(isinstance(one, Shape) for one in effect.shapes)
+    for name, right, wanted in (
+        ("amplitude", isinstance(effect.amplitude, Amplitude), "an Amplitude(...)"),
+        ("shapes", whole, "a tuple (Shape(...), ...)"),
+        ("act", callable(effect.act), "a function"),
+    ):
+        if not right:
+            got = type(getattr(effect, name)).__name__
+            said = f"`{name}` of the effect {effect.name!r} expected {wanted}, got {got}"
+            raise InputError(f"{shown}: {said}; correct it.")
+    parts: tuple[Effect | Amplitude | Shape, ...] = (effect, effect.amplitude, *effect.shapes)
+    for part in parts:
+        kinds = get_type_hints(type(part))
+        for one in fields(part):
+            value, kind = getattr(part, one.name), kinds[one.name]
+            right = _is_number(value) if kind in (float, int) else isinstance(value, str) if kind is str else True
+            if not right:
+                wanted = "text" if kind is str else "a number"
+                of = "" if part is effect else f"{part.name!r} of "
+                said = f"`{one.name}` of {of}the effect {effect.name!r} expected {wanted}, got {value!r}"
+                raise InputError(f"{shown}: {said}; correct it.")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _refuse_unusable(effect: Effect, shown: str) -> None:

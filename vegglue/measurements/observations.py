@@ -32,6 +32,7 @@ STATION_COLUMNS = (
     "device",
 )
 OUTSIDE = "it is outside the grid"
+SET_ASIDE = "the diagnosis set it aside"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
 # the squares of such numbers leave no digits of the others.
 SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9

@@ -73,6 +73,7 @@ def findings(run: Run) -> list[Finding]:
         *_refinement(posterior),
         *_homogeneity(case, posterior),
         *_flagged(observations),
+        *_set_aside_since(run),
         *_discharge(case, observations),
         _weights(posterior, notation),
         *([] if run.ensemble is None else [_members(run.ensemble), *_mass(run.ensemble)]),
@@ -176,6 +177,14 @@ def _homogeneity(case: Case, posterior: Posterior) -> Iterator[Finding]:
     if posterior.transfer is not None:
         sentences = homogeneity_in_words(posterior, posterior.transfer, case.reference.table if case.reference else {})
         yield Finding("homogeneity", _html(sentences), doubt=homogeneity_rejected(posterior.transfer))
+
+
+def _set_aside_since(run: Run) -> Iterator[Finding]:
+    """Readings of the posterior that a diagnosis made after it set aside."""
+    if many := run.set_aside_since:
+        of = f"{count(many, 'reading')} that the diagnosis set aside {'is' if many == 1 else 'are'}"
+        again = f"<code>vegglue infer {html.escape(run.case.source.name)}</code> makes one without"
+        yield Finding("stations", f"{of} still in this posterior; {again}.", doubt=True)
 
 
 def _flagged(observations: Observations) -> Iterator[Finding]:

@@ -7,9 +7,11 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.figures.typography import PLAIN_TEXT, Notation
+from vegglue.in_short import so_many
 from vegglue.inference.likelihood import sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.observations import SET_ASIDE
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
 from vegglue.report_page.prior_words import against_prior_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, Posterior
@@ -144,6 +146,11 @@ def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[
         f"{int(np.sum(outside & used))} of {fit.used} measurements lie outside the total 95 % band, "
         f"{0.05 * fit.used:.1f} are expected to."
     ]
+    if aside := int((posterior.station["reason"].astype(str) == SET_ASIDE).sum()):
+        sentences.append(
+            f"{so_many(aside, 'measurement')} of {len(posterior.station)} "
+            f"{'is' if aside == 1 else 'are'} left out, as the diagnosis set {'it' if aside == 1 else 'them'} aside."
+        )
     if math.isfinite(fit.chi2) and posterior.refinement is None:
         sentences.append(
             "Against the standard errors of the data, the best member has chi2 = "

@@ -47,7 +47,7 @@ class LoopResults:
 class Run:
     """Everything a report may show. ensemble: None where the posterior needed none; flow: the flow of the median
     parameters, by experiment; cylinder: if surveyed; diagnosis: if there is one of this case; loop: what else is known
-    of what it lacks.
+    of what it lacks; set_aside_since: readings of the posterior that the diagnosis has set aside after it was made.
     """
 
     folder: Path
@@ -60,6 +60,7 @@ class Run:
     cylinder: RigidCylinder | None
     diagnosis: Diagnosis | None
     loop: LoopResults = LoopResults()
+    set_aside_since: int = 0
 
     @property
     def behind(self) -> Diagnosis | None:

@@ -9,7 +9,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
-from vegglue.diagnosis.excluded_stations import excluded_by, exclusion_in_words
+from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.in_short import in_short, so_many
@@ -19,8 +19,8 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.storage.kept_words import write_ladder
-from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
+from vegglue.workflow.set_aside import left_out
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,6 @@ def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = si
     """The case where it predicts best, without the measurements set aside."""
     folder = folder_of(runs, case)
     return rung(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
-
-
-def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
-    """The measurements that the diagnosis of any of the cases has set aside, where it fits the case."""
-    found = (diagnosis_that_fits(Path(runs) / case.name / "diagnosis.h5", case_hash(case)) for case in cases)
-    return excluded_by(*(one for one in found if one is not None))
 
 
 def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:

@@ -1,10 +1,14 @@
 """case, ensemble -> posterior: by draws around the best members, or by the members weighed as they are (GLUE)."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.glue import glue
@@ -14,11 +18,12 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.storage.result_files import read_ensemble, write_posterior
+from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash, write_posterior
 from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.command_model import with_command
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size
+from vegglue.workflow.set_aside import set_aside_of
 
 Method = Literal["refine", "glue"]
 
@@ -37,6 +42,8 @@ def infer(
     """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
     runs/<name>/posterior.h5, and the flow of their medians in flow.h5.
 
+    Measurements that its diagnosis has set aside are left out, see `set_aside_of`; the posterior says so.
+
     ensemble: the one of this case, whose size counts then; read from the folder if not given. Where none is there,
     `refine` begins with points of the prior. method: `refine` or `glue` instead of the case's. members: size of the
     ensemble instead of the case's.
@@ -44,20 +51,17 @@ def infer(
     Errors: InputError when there is none and it is needed, or it is of another state of the case, or the likelihood
     cannot be refined.
     """
+    aside = set_aside_of(case, runs)
     case = of_size(case, members if ensemble is None else len(ensemble.status))
     wanted = case_hash(case)  # before anything is read: what changes meanwhile then makes the result out of date
     observations = read_observations(case)
+    observations = replace(observations, table=without_stations(observations.table, aside))
     if not observations.table["used"].any():
         raise InputError(
             f"{case.name}: expected a station in use, got none: nothing can be inferred; `vegglue check` says why."
         )
-    folder = folder_of(runs, case)
-    chosen = chosen_method(case, method)
-    if ensemble is None:
-        if members is not None or needs_ensemble(case, chosen) or begun_or_finished(folder / "ensemble.h5"):
-            ensemble = read_ensemble(folder / "ensemble.h5", simulation_hash(case))
-    elif ensemble.config_hash != simulation_hash(case):
-        raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
+    folder, chosen = folder_of(runs, case), chosen_method(case, method)
+    ensemble = _own_ensemble(case, ensemble, folder, members is not None or needs_ensemble(case, chosen))
     if chosen == "glue":
         assert ensemble is not None
         posterior = glue(ensemble, case, observations)
@@ -69,6 +73,28 @@ def infer(
     with at_most(jobs):
         median_flow(case, posterior, folder)  # for the page, which shall not have to wait for it
     return posterior
+
+
+def is_inferred(case: Case, runs: Path | str, members: int | None = None) -> bool:
+    """Whether the posterior that is kept is of exactly this case, or of this size, and without what is set aside."""
+    path = folder_of(runs, case) / "posterior.h5"
+    if stored_hash(path) != case_hash(of_size(case, members)):
+        return False
+    now = without_stations(read_observations(case).table, set_aside_of(case, runs))
+    return bool(np.array_equal(read_posterior(path).station["used"].astype(bool), now["used"].astype(bool)))
+
+
+def _own_ensemble(case: Case, given: Ensemble | None, folder: Path, needed: bool) -> Ensemble | None:
+    """The ensemble that was given, else the one in the folder; None where there is none and it is not needed.
+
+    Errors: InputError for one of another state of the case, or where none is there and it is needed.
+    """
+    if given is None:
+        there = needed or begun_or_finished(folder / "ensemble.h5")
+        return read_ensemble(folder / "ensemble.h5", simulation_hash(case)) if there else None
+    if given.config_hash != simulation_hash(case):
+        raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
+    return given
 
 
 def needs_ensemble(case: Case, method: Method) -> bool:

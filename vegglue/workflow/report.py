@@ -3,21 +3,26 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
+from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.observations import read_observations
+from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report_page.page import write_report
 from vegglue.report_page.run import LoopResults, Run
+from vegglue.results.posterior import Posterior
 from vegglue.site.gridded_site import build_site
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import as_solved, folder_of, of_size
+from vegglue.workflow.set_aside import set_aside_of
 
 
 @one_thread()
@@ -51,12 +56,21 @@ def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = 
     if not (folder / "posterior.h5").exists():
         _refuse_if_the_run_went_on(case, runs)
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
+    observations, since = _as_inferred(observations, posterior, set_aside_of(case, runs))
     if ensemble is None and posterior.settings.ensemble_hash:
         read_ensemble(path)  # says that it is gone
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
     loop = loop_results_of(case, runs, above)
-    return Run(folder, sized, build_site(sized), observations, ensemble, posterior, {}, survey, diagnosis, loop)
+    return Run(folder, sized, build_site(sized), observations, ensemble, posterior, {}, survey, diagnosis, loop, since)
+
+
+def _as_inferred(observations: Observations, posterior: Posterior, aside: pd.DataFrame) -> tuple[Observations, int]:
+    """The observations with what the posterior left out, and how many of it are set aside by now."""
+    kept = posterior.station[["used", "reason"]].set_axis(observations.table.index)
+    table = observations.table.assign(**kept)
+    still = table["used"].astype(bool) & ~without_stations(table, aside)["used"].astype(bool)
+    return replace(observations, table=table), int(still.sum())
 
 
 def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:

@@ -11,13 +11,12 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.result_files import stored_hash
 from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover
 from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
-from vegglue.workflow.infer import chosen_method, infer, needs_ensemble
+from vegglue.workflow.infer import chosen_method, infer, is_inferred, needs_ensemble
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of, of_size
 from vegglue.workflow.simulate import is_simulated, refuse_to_shrink, simulate
@@ -67,7 +66,7 @@ def run(
     # A posterior of the case without what it lacks would be of a model that is known to be wrong. What the diagnosis
     # said is of the case, whatever its size.
     wanted = members is not None or _is_wanted(last, runs)
-    if _has_posterior(of_size(last, members), wanted, runs, jobs, watch, show, force):
+    if _has_posterior(last, members, wanted, runs, jobs, watch, show, force):
         from vegglue.workflow.report import report
 
         show(last, report(last, runs=runs, members=members, watch=watch))
@@ -108,17 +107,18 @@ def _is_wanted(case: Case, runs: Path | str) -> bool:
 
 
 def _has_posterior(
-    case: Case, wanted: bool, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
+    case: Case, members: int | None, wanted: bool, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
 ) -> bool:
     """Makes the ensemble, if `wanted`, and the posterior of a case where they are not up to date; False where it has no
     posterior.
     """
     folder, ensemble = folder_of(runs, case), None
     if wanted:
-        current = is_simulated(case, runs)
-        ensemble = simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
+        sized = of_size(case, members)
+        current = is_simulated(sized, runs)
+        ensemble = simulate(sized, runs=runs, jobs=jobs, watch=watch, force=force)
         show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
-    if stored_hash(folder / "posterior.h5") == case_hash(case):
+    if is_inferred(case, runs, members):
         show(case, f"{folder / 'posterior.h5'} is up to date.")
     else:
         try:

@@ -1,0 +1,30 @@
+"""Which measurements the diagnoses kept in the folder of runs have set aside: no model is judged by them afterwards."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.storage.result_files import diagnosis_that_fits
+
+
+def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
+    """The measurements that the diagnosis of any of the cases has set aside, where it fits the case."""
+    return _set_aside({case.name: case_hash(case) for case in cases}, Path(runs))
+
+
+def set_aside_of(case: Case, runs: Path | str) -> pd.DataFrame:
+    """Those that the diagnosis of a case has set aside, or that of the model which its ladder begins with."""
+    wanted, runs = case_hash(case), Path(runs)
+    ladder = ladder_that_fits(runs / case.name, wanted)
+    first = {} if ladder is None else {ladder.steps[0].name: ladder.steps[0].config_hash}
+    return _set_aside({**first, case.name: wanted}, runs)
+
+
+def _set_aside(hashes: dict[str, str], runs: Path) -> pd.DataFrame:
+    found = (diagnosis_that_fits(runs / name / "diagnosis.h5", wanted) for name, wanted in hashes.items())
+    return excluded_by(*(one for one in found if one is not None))
