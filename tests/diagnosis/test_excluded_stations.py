@@ -20,8 +20,8 @@ from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.result_files import write_diagnosis
 from vegglue.workflow import run_folder
-from vegglue.workflow.compare import left_out
 from vegglue.workflow.extend import write_child
+from vegglue.workflow.set_aside import left_out
 
 pytestmark = pytest.mark.slow
 

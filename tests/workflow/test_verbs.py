@@ -7,14 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnoses import a_diagnosis
 from reach import COARSE, ROOT, write_reach
 
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
+from vegglue.measurements.observations import SET_ASIDE, read_observations
 from vegglue.progress import Progress
+from vegglue.report_page.posterior_words import describe
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
-from vegglue.storage.result_files import stored_hash
+from vegglue.storage.result_files import stored_hash, write_diagnosis
+from vegglue.workflow.infer import is_inferred
+from vegglue.workflow.report import results_of
 
 MEMBERS = 16
 HEAVY = ("numpy", "numba", "pandas", "scipy", "h5py", "matplotlib", "pydantic", "yaml", "typer", "joblib")
@@ -124,3 +129,27 @@ def test_an_ensemble_of_another_case_is_refused(tmp_path: Path) -> None:
     other = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, ("level: 0.95", "level: 0.96")))
     with pytest.raises(vegglue.InputError, match="brook: expected its own ensemble"):
         vegglue.infer(other, ensemble, runs=tmp_path / "runs")
+
+
+@pytest.mark.slow
+def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> None:
+    """It held twelve readings of a probe that the verdict on open-j had called off."""
+    runs = tmp_path / "runs"
+    case = vegglue.load_case(str(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)))
+    table = read_observations(case).table
+    ensemble = vegglue.simulate(case, runs=runs, jobs=1)
+    before = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
+    assert before.fit.used == 15
+    assert is_inferred(case, runs)
+    nothing = np.full(len(table), np.nan)
+    predictions = {"station": table, "first": nothing, "last": nothing, "error": nothing}
+    found = a_diagnosis(predictions=predictions, errors={"flagged": (3, 7)})
+    write_diagnosis(runs / "brook" / "diagnosis.h5", found, "", case_hash(case))
+    assert not is_inferred(case, runs), "it still holds them"
+    assert results_of(case, case, runs).set_aside_since == 2
+    after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
+    assert after.fit.used == 13
+    assert after.station.index[after.station["reason"] == SET_ASIDE].tolist() == [3, 7]
+    assert "2 measurements of 15 are left out, as the diagnosis set them aside." in describe(after)
+    assert is_inferred(case, runs)
+    assert results_of(case, case, runs).set_aside_since == 0
