@@ -110,4 +110,6 @@ def test_a_question_names_its_best_measurements() -> None:
         *(f"- section {n}: 9, 3 station(s), 1.5 h" for n in range(4)),
     ]
     useless = Question("wind from waves", (MeasurementWorth(plans[0], 2.0, 2.1),))
-    assert repr(useless).endswith("none of 1 measurements would by itself (D2 at most 2.1: section 0).")
+    assert repr(useless).endswith(
+        "none of 1 measurements would by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
+    )

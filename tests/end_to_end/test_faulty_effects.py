@@ -63,7 +63,7 @@ def test_a_function_of_other_names_fails_in_no_line(tmp_path: Path) -> None:
     text = EFFECT.format(body="return {'rate': cells.rate * (1 + more)}").replace("(cells, excess)", "(cells, more)")
     (tmp_path / "stones.py").write_text(text, encoding="utf-8")
     effect = effects_of(tmp_path / "stones.py")[0]
-    [said] = breaches(effect)
+    [said] = breaches(effect, tmp_path / "stones.py")
     assert said.startswith("The effect `slow_stones` fails when it acts: TypeError: act() got an unexpected keyword")
 
 

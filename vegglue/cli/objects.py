@@ -52,15 +52,17 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
 
 
 def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
-    """What `run` found, in the order it came: diagnosis, extension, discovery and comparison with its law, questions;
-    then, of each case by name, its ensemble, posterior and report, and what was up to date in `notes`.
+    """What `run` found of the case it was given: diagnosis, extension, discovery, comparison with its law, questions;
+    then, of each case by name, its own diagnosis and questions, its ensemble, posterior and report, and what was up to
+    date in `notes`.
     """
     told: Told = {"cases": {}}
     for case, result in results:
         of_case = told["cases"].setdefault(case.name, {"config": case.source, "notes": []})
         match result:
             case Diagnosis():
-                told["diagnosis"] = object_of(case, runs, result)
+                of_case["diagnosis"] = object_of(case, runs, result)
+                told.setdefault("diagnosis", of_case["diagnosis"])
             case StepwiseExtension():
                 told["extension"] = object_of(case, runs, result)
             case DiscoveredCase():
@@ -68,7 +70,8 @@ def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
             case Comparison():
                 told["comparison"] = object_of(case, runs, result)
             case list():
-                told |= object_of(case, runs, result)
+                of_case |= object_of(case, runs, result)
+                told.setdefault("questions", of_case["questions"])
             case Ensemble():
                 of_case["ensemble"] = object_of(case, runs, result)
             case Posterior():

@@ -12,6 +12,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
+from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.first_use import with_compilation
 from vegglue.ensemble.solve_ensemble import solve_flow
 from vegglue.errors import InputError, shown_path
@@ -29,6 +30,7 @@ from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import as_solved, folder_of, known_place
+from vegglue.workflow.set_aside import set_aside_of
 
 Form = Literal["csv", "geotiff", "netcdf"]
 # Libraries that each form needs, all of the extra `field`.
@@ -86,7 +88,7 @@ def _flow(case: Case, folder: Path) -> tuple[dict[str, FlowFields], Array | None
 
 def _csv(case: Case, flows: dict[str, FlowFields], predicted: Array | None, into: Path, words: str) -> list[Path]:
     stations = into / "stations.csv"
-    table = read_observations(case).table
+    table = without_stations(read_observations(case).table, set_aside_of(case, into.parents[1]))
     write_station_table(
         stations, {name: table[name].to_numpy() for name in table}, predicted, build_grid(case), case.frame
     )

@@ -53,10 +53,20 @@ class Question:
 
     def __repr__(self) -> str:
         if not self.useful:
-            most = "".join(f" (D2 at most {best.then:.2g}: {best.plan.name})" for best in self.nearest)
-            return f"To tell {self.tells_apart}: none of {len(self.measurements)} measurements would by itself{most}."
+            return f"To tell {self.tells_apart}: {self._why_none()}."
         heading = f"To tell {self.tells_apart} (D2 now {self.useful[0].now:.2g} squared standard errors):"
         return "\n".join([heading, *(f"- {_worth_in_short(one)}" for one in self.useful)])
+
+    def _why_none(self) -> str:
+        """Why no measurement is proposed: they add little to what is known, or are not enough."""
+        many = f"none of {len(self.measurements)} measurements"
+        if not self.nearest:
+            return f"{many} would by itself"
+        best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
+        most = f"D2 at most {best.then:.2g}: {best.plan.name}"
+        if best.then >= SEPARATES:
+            return f"D2 is {best.now:.2g} already, where {enough}, and {many} adds a tenth to it ({most})"
+        return f"{many} would by itself, where {enough} ({most})"
 
 
 def _worth_in_short(one: MeasurementWorth) -> str:
