@@ -77,8 +77,12 @@ def test_where_all_fail_it_is_said_why(
         "brook.yaml: the command of `engine` failed at the medians of the priors: the command ended with exit" in said
     )
     assert "and said: no licence; its files lie in runs/brook/engine." in said
-    printed = shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
-    assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in printed
+    done = shell(tmp_path, "simulate", "brook.yaml", "--trust", succeed=False)
+    assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in done.stdout
+    assert done.returncode == 2
+    assert (
+        "brook.yaml: expected members with a solution, got none of 8; 8 of them say: the command ended" in done.stderr
+    )
     for command in ("infer", "diagnose"):
         code, said = said_to(monkeypatch, capsys, command, "brook.yaml", "--trust", "--quiet")
         assert code == 2

@@ -1,5 +1,6 @@
 """The shell of the ensemble: check, simulate, infer, report; and run, which goes the whole way."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -37,7 +38,7 @@ def simulate_command(
     """Solve every member of the ensemble; a run that was stopped goes on where it was."""
     case = opened_case(config, trust)
     from vegglue.workflow.run_folder import of_size
-    from vegglue.workflow.simulate import is_simulated
+    from vegglue.workflow.simulate import is_simulated, refuse_all_failed
 
     case = of_size(case, members)
     current = is_simulated(case, runs)
@@ -51,6 +52,7 @@ def simulate_command(
         print(f"{runs / case.name / 'ensemble.h5'} is up to date.")
     else:
         tell(case, runs, ensemble, as_object)
+    refuse_all_failed(case, ensemble)
 
 
 def infer_command(
@@ -100,7 +102,7 @@ def run_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report before and after."""
+    """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report of the last model."""
     case, results = opened_case(config, trust), list[tuple[Any, Any]]()
 
     def show(of: Any, result: Any) -> None:
@@ -118,4 +120,12 @@ def run_command(
         from vegglue.workflow.discover import DiscoveredCase
 
         laws = [result.found.sentence for _, result in results if isinstance(result, DiscoveredCase)]
-        print(" ".join(["In short:", extension.sentence, extension.reason, *laws]))
+        print(" ".join(["In short:", extension.sentence, extension.reason, *laws, *_of_the_last(results)]))
+
+
+def _of_the_last(results: Sequence[tuple[Any, Any]]) -> list[str]:
+    """The verdict on the last model that was diagnosed, where it is another than the first."""
+    from vegglue.results.diagnosis import Diagnosis
+
+    (first, _), *_, (last, found) = [pair for pair in results if isinstance(pair[1], Diagnosis)] * 2
+    return [] if last.name == first.name else [f"With that: {found.verdict.sentence}"]

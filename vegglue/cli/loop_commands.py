@@ -71,7 +71,11 @@ def diagnose_command(
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
     if not (quiet or as_object):
-        following = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
+        from vegglue.diagnosis.verdict import TO_DISCOVER
+
+        of_law = found.laws is not None and TO_DISCOVER in found.verdict.sentence
+        found_something = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
+        following = ("discover", config) if of_law else found_something
         print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
 
 

@@ -65,6 +65,8 @@ def linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Po
     sloping = dict(zip(model.case.experiments, in_threads(_with_slopes, tasks), strict=True))
     for experiment, (_, slopes) in sloping.items():
         slope[model.rows[experiment]] = slopes
+    if np.isnan(slope[np.isfinite(prediction)]).any():  # an effect of the user's gives no numbers beside this flow
+        return None
     return Point(z, prediction, slope, {experiment: flow for experiment, (flow, _) in sloping.items()})
 
 

@@ -28,6 +28,8 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED, members_with
 
+# Rivals that the headline names, the likeliest: more are in the table.
+RIVALS_NAMED = 2
 NUMBERS = ("", "One", "Two", "Three", "Four", "Five", "Six")
 
 
@@ -62,10 +64,11 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
     if kind in ("identified", "one-of", "none-of-these"):
         return _what_is_missing(found, model, tense)
     if kind == "cannot-tell" and found.laws is not None and not (found.steps or found.places):
-        chance = percent(found.laws.laws[0].chance)
+        best, chance = found.laws.laws[0], percent(sum(one.chance for one in found.laws.alike))
+        law = html.escape(f"a law of {best.quantity} in {best.term}")
         return (
             f"Whether anything {tense} missing from {model}, these data cannot tell; the likeliest, with a chance of "
-            f"{chance}, is a law that is in no list: {_law_in_words(found)}."
+            f"{chance}, is {law}, which is in no list."
         )
     return set_as_code(html.escape(found.verdict.sentence))
 
@@ -105,8 +108,11 @@ def _effect_in_words(found: Diagnosis, step: Step) -> str:
     doubt = f"most likely {chance}" if chance and not likelier else chance
     explained = f", {more}" if more else ""
     size = f", {_amplitude_in_words(suspect.amplitude)}"
+    others = sorted((one for one in step.rivals if one != name), key=lambda one: -step.chance[one])[:RIVALS_NAMED]
+    or_else = "".join(f", or <code>{html.escape(one)}</code> ({percent(step.chance[one])})" for one in others)
     return (
         f"{doubt}<b>{short_title[:1].lower()}{short_title[1:]}</b> (<code>{html.escape(name)}</code>{explained}{size})"
+        f"{or_else}"
     )
 
 

@@ -62,6 +62,7 @@ def chosen_effect(
         shapes = _shapes(base.model, candidate, listed, random)
         label = candidate.name if listed else UNLISTED + candidate.effect.name
         if size is not None:
+            _refuse_beyond_support(candidate, size)
             one = Hidden(label, size, shapes, 0.0)
             return candidate, replace(one, signal=_signal(base, errors, candidate, one))
         found = _sized(base, errors, candidate, Hidden(label, 0.0, shapes, 0.0), snr, random)
@@ -73,10 +74,21 @@ def chosen_effect(
     )
 
 
+def _refuse_beyond_support(candidate: Candidate, size: float) -> None:
+    """Errors: InputError for a size that the effect cannot have."""
+    amplitude = candidate.amplitude
+    if not amplitude.low <= size <= amplitude.high:
+        bounds = f"{amplitude.low:g} to {amplitude.high:g} {amplitude.unit}".removesuffix(" -")
+        raise InputError(f"--hide {candidate.name}: expected a size within {bounds}, got {size:g}; give another.")
+
+
 def candidate_of(model: Model, name: str) -> Candidate:
     """The effect that a name stands for, listed or `unlisted:NAME`. Errors: InputError."""
     if not name.startswith(UNLISTED):
-        return candidate_named(model.case, model.station, name)
+        try:
+            return candidate_named(model.case, model.station, name)
+        except InputError as error:
+            raise InputError(str(error).replace("--add:", "--hide:", 1)) from None
     known = {UNLISTED + effect.name: effect for effect in unlisted_objects.EFFECTS}
     if name not in known:
         raise InputError(f"--hide: `{name}` is unknown: {nearest(name, known)}")

@@ -23,13 +23,16 @@ from vegglue.in_short import so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import kind_of
 from vegglue.progress import Watch, silent
-from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.diagnosis import Diagnosis, Verdict
 from vegglue.whole_files import MAKE_ROOM
 
 PLACE_FILE = "place.json"
 # Share of a standard error [-] by which the command may differ from what was reckoned with before it is a doubt.
 # Chosen, not measured: half an error hardly moves a score.
 CLOSE_ENOUGH = 0.5
+# Standard errors by which it may differ before no verdict is believed: larger than what names rest on. Chosen after a
+# command that gave the same numbers for all parameters was told as water that enters the channel.
+BEYOND_BELIEF = 3.0
 
 
 def with_command(model: Model, folder: Path, watch: Watch = silent) -> Model:
@@ -68,6 +71,7 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         "or a place would change, and how the flow bends away from these slopes, is what the built-in engine says "
         "of the same site."
     ]
+    off = 0.0
     if reasons[0] or reckoned is None:
         said.append(f"At the parameters found last the command gives nothing to compare ({reasons[0]}).")
     else:
@@ -83,8 +87,18 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         )
     if not place.settled:
         said.append("The search for its best place did not settle: its predictions may be rough.")
-    verdict = replace(found.verdict, remarks=(" ".join(said), *found.verdict.remarks))
-    return replace(found, verdict=verdict)
+    told = found.verdict if off <= BEYOND_BELIEF else _disbelieved(found.verdict, off)
+    return replace(found, verdict=replace(told, remarks=(" ".join(said), *told.remarks)))
+
+
+def _disbelieved(verdict: Verdict, off: float) -> Verdict:
+    """The verdict on numbers that the command does not give."""
+    sentence = (
+        "These data cannot tell: at the parameters found last the command of `engine` differs from what was reckoned "
+        f"with by {off:.1f} errors; see whether it reads its parameters, and comes to rest. What was found with it: "
+        f"{verdict.sentence}"
+    )
+    return replace(verdict, kind="cannot-tell", sentence=sentence)
 
 
 def command_tried(model: Model, folder: Path) -> str:

@@ -82,7 +82,7 @@ def _flow(case: Case, folder: Path) -> tuple[dict[str, FlowFields], Array | None
     best = known_place(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
-    words = "the middle of the priors" if best is None else "the best fit of the diagnosis"
+    words = "the middle of the priors" if best is None else "the best fit that was found"
     return solve_flow(case, theta), None, words
 
 

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections import Counter
 from pathlib import Path
 
 from vegglue.case.resolved_config import simulation_hash
@@ -9,11 +10,12 @@ from vegglue.case.schema import Case
 from vegglue.engine.command_runs import command_runs
 from vegglue.ensemble.command_ensemble import run_ensemble
 from vegglue.ensemble.solve_ensemble import solve_ensemble
-from vegglue.errors import InputError, StorageError
+from vegglue.errors import InputError, StorageError, shown_path
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
+from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import remove_left_over_fields
 from vegglue.workflow.run_folder import folder_of, of_size
@@ -106,3 +108,14 @@ def _share(there: Path, here: Path) -> None:
         os.replace(new, here)
     except OSError as error:
         raise StorageError(f"{here}: cannot be shared with {there} ({error}); make room and run it again.") from error
+
+
+def refuse_all_failed(case: Case, ensemble: Ensemble) -> None:
+    """Errors: InputError for an ensemble of which nothing can be inferred; it is kept all the same."""
+    failed = ensemble.status == FAILED
+    if failed.all():
+        reason, many = Counter(map(str, ensemble.reason[failed])).most_common(1)[0]
+        raise InputError(
+            f"{shown_path(case.source)}: expected members with a solution, got none of {failed.size:,}; {many:,} of "
+            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again with --force."
+        )
