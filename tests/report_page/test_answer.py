@@ -48,7 +48,7 @@ def plain(words: str) -> str:
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m"),
         (replace(EVERY_KIND, steps=(), field=None, places=(), verdict=replace(EVERY_KIND.verdict, kind="cannot-tell")),
-         "these data cannot tell; the likeliest, with a chance of 75 %, is a law of the speed in friction of the banks, which"),
+         "these data cannot tell; the likeliest, with a chance of 75 %, is a law of the speed in friction of the"),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "Say `this`."}), "Say this."),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "I cannot tell <it>."}), "cannot tell &lt;it&gt;."),
         (replace(EVERY_KIND, field=a_field()), "over some 15 m along"),

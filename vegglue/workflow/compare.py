@@ -40,7 +40,7 @@ class Comparison:
 @one_thread()
 def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each.
+    comparison.json in the folder of each, unless one model is there twice.
 
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when models have
     other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
@@ -54,7 +54,8 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
             rungs.append(rung_of(case, runs, aside, watch))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
-    keep_ladder(found, cases, hashes, runs)
+    if len({case.name for case in cases}) == len(cases):  # a model beside itself is no ladder
+        keep_ladder(found, cases, hashes, runs)
     return found
 
 
