@@ -32,10 +32,10 @@ def overview(cases: Sequence[Case], *, runs: Path | str = "runs", trust: bool = 
 
 
 def _with_posterior(case: Case, runs: Path | str, trust: bool) -> Case:
-    """The case, or the last child of its ladder that has a posterior, where the case has none."""
+    """The case; where it has no posterior the last child of its ladder that has one, else the last of all."""
     ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
     if ladder is None or (folder_of(runs, case) / "posterior.h5").exists():
         return case
     made = [one for one in ladder.steps if (Path(runs) / one.name / "posterior.h5").exists()]
-    child = case.source.with_name(made[-1].config) if made else case.source
-    return load_case(child, trust) if made and child.exists() else case
+    child = case.source.with_name((made or ladder.steps)[-1].config)
+    return load_case(child, trust) if child.exists() else case
