@@ -42,11 +42,16 @@ def plain(words: str) -> str:
     [
         (NOTHING, "Nothing is missing from this model that these data could show."),
         (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.300 m2/s"),
-        (LIKELIER, "(60 %) more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m, which is in no list, or else (30 %)"),
+        (LIKELIER, "(60 %) more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m, which is in no list, or else (30 %)"),
+        (LIKELIER, "Something is missing from this model: most likely (60 %)"),
+        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "Something is missing from this model that is in no"),
+        (replace(a_diagnosis(steps=()), places=(a_location(amplitude=-0.56, x_error=6.7),),
+                 verdict=replace(NOTHING.verdict, kind="none-of-these")),
+         "less drag by 0.56 1/m at x = 33.0 ± 6.7 m, y = −0.6 m"),
         (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
          "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
-        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag of 0.40 1/m at x = 33.0 m, y = −0.6 m"),
+        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m"),
         (replace(EVERY_KIND, steps=(), field=None, places=(), verdict=replace(EVERY_KIND.verdict, kind="cannot-tell")),
          "these data cannot tell; the likeliest, with a chance of 75 %, is a law of the speed in friction of the"),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "Say `this`."}), "Say this."),
@@ -85,7 +90,7 @@ def test_a_law_suspected_of_a_child_hides_nothing_of_what_was_found(toy: Run) ->
     child = replace(toy, diagnosis=suspected, loop=LoopResults(behind=first, ladder=_ending_with(toy)))
     said = plain(headline(child))
     assert said.startswith(
-        f"Something was missing from {first.name} that is in no list: more drag of 0.40 1/m at x = 33.0"
+        f"Something was missing from {first.name} that is in no list: more drag by 0.40 1/m at x = 33.0"
     )
     assert "What is left looks like a law that is in no list: friction of the banks changes" in said
     assert child.behind is first

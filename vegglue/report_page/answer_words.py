@@ -13,9 +13,8 @@ from vegglue.report_page.cause_words import (
     OF_KIND,
     accepted_causes,
     field_in_words,
+    found_in_words,
     likelier_place_in_words,
-    size_of,
-    what_at,
     where,
 )
 from vegglue.report_page.findings import FAILED_TOLERATED
@@ -87,13 +86,15 @@ def _law_in_words(found: Diagnosis) -> str:
 def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
     """Effects by their titles, places by what they do; tense: is or was."""
     effects = [f"{likelier_place_in_words(step)}{_effect_in_words(found, step)}" for step in found.steps]
-    places = [f"{what_at(one)} of {size_of(one)} at {where(one.x, one.y)}" for one in found.places]
+    places = [found_in_words(one) for one in found.places]
     parts = []
     if effects:
-        subject = f"physical effect {tense}"
-        if len(effects) > 1:
-            subject = f"physical effects {'are' if tense == 'is' else 'were'}"
-        parts.append(f"{NUMBERS[min(len(effects), 6)]} {subject} missing from {model}: {', and '.join(effects)}")
+        many = NUMBERS[min(len(effects), 6)]
+        plural = f"{many} physical effects {'are' if tense == 'is' else 'were'}"
+        subject = plural if len(effects) > 1 else f"{many} physical effect {tense}"
+        if any(step.likelier_place for step in found.steps):  # which may be no effect at all
+            subject = f"Something {tense}"
+        parts.append(f"{subject} missing from {model}: {', and '.join(effects)}")
     if places:
         what = "something else" if parts else "Something"
         parts.append(f"{what} {tense} missing from {model} that is in no list: {' and '.join(places)}")

@@ -25,6 +25,8 @@ OF_KIND = {
 }
 # Rivals of a place whose odds are told: the nearest ones; and odds above which the figure no longer says more.
 RIVALS_TOLD, TOLD_ODDS = 2, 1000.0
+# Standard error of a place [m] below which one decimal says enough.
+LEAST_ERROR_TOLD = 0.05
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,16 @@ def size_of(place: Location) -> str:
     return f"{short(place.amplitude, 2)}{NARROW}{unit_html(place.unit)}"
 
 
+def found_in_words(place: Location) -> str:
+    """'a lower bed by 0.19 m at x = 47.3 ± 0.4 m, y = −0.3 ± 0.1 m' (HTML); the word says the sign."""
+    amount = f"{short(abs(place.amplitude), 2)}{NARROW}{unit_html(place.unit)}"
+    at = ", ".join(
+        f"{name} = {fixed(value, 1)}{f' ± {fixed(error, 1)}' if error >= LEAST_ERROR_TOLD else ''} m"
+        for name, value, error in (("x", place.x, place.x_error), ("y", place.y, place.y_error))
+    )
+    return f"{what_at(place)} by {amount} at {at}"
+
+
 def place_in_words(place: Location) -> str:
     """What, where, how large, and the odds (HTML)."""
     told = against_rivals(place)
@@ -107,8 +119,7 @@ def likelier_place_in_words(step: Step) -> str:
     if not name:
         return ""
     place = step.places[name]
-    what = f"{what_at(place)} of {size_of(place)} at {where(place.x, place.y)}"
-    return f"most likely ({percent(step.others[name])}) {what}, which is in no list, or else "
+    return f"most likely ({percent(step.others[name])}) {found_in_words(place)}, which is in no list, or else "
 
 
 def instrument_in_words(one: FaultyInstrument) -> str:

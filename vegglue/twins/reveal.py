@@ -6,6 +6,7 @@ import numpy as np
 
 from vegglue.effects.grammar import LAWS
 from vegglue.effects.law import Law
+from vegglue.in_short import listed, so_many
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.twins.sealed_answer import BAD_PROBE, Answer, Hidden
 
@@ -71,6 +72,12 @@ def groups_of(diagnosis: Diagnosis) -> list[int]:
     return [len(step.groups) for step in diagnosis.steps]
 
 
+def _groups_in_words(diagnosis: Diagnosis) -> str:
+    """`3 groups`, and with more than one step of how many each."""
+    counts = [so_many(number, "group") for number in groups_of(diagnosis)]
+    return counts[0] if len(counts) == 1 else f"{listed(counts)}, step by step"
+
+
 def guess_in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
     """The truth, and what the diagnosis made of it, one line each."""
     errors = "errors as stated" if answer.scale == 1.0 else f"errors {answer.scale:g} times those stated"
@@ -112,7 +119,7 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
     if not mark.inside:
         said = f"{diagnosis.verdict.kind} {', '.join(diagnosis.set)}".rstrip()
         return f"{truth}The diagnosis missed it; it said {said}."
-    alone = "It was named alone" if mark.named else f"It is in the set, one of {groups_of(diagnosis)} group(s) by step"
+    alone = "It was named alone" if mark.named else f"It is in the set, which holds {_groups_in_words(diagnosis)}"
     told = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size."
     others = _other_shapes(mark.hidden, diagnosis)
     return f"{told} It was found with {others}, on which sizes depend." if others else told
