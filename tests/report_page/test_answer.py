@@ -44,7 +44,7 @@ def plain(words: str) -> str:
         (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.300 m2/s"),
         (LIKELIER, "(60 %) more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m, which is in no list, or else (30 %)"),
         (LIKELIER, "Something is missing from this model: most likely (60 %)"),
-        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "Something is missing from this model that is in no"),
+        (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "Something is missing from this model that is in"),
         (replace(a_diagnosis(steps=()), places=(a_location(amplitude=-0.56, x_error=6.7),),
                  verdict=replace(NOTHING.verdict, kind="none-of-these")),
          "less drag by 0.56 1/m at x = 33.0 ± 6.7 m, y = −0.6 m"),
