@@ -119,7 +119,7 @@ def _paint_parameter(axes: Axes, rungs: Sequence[Rung], name: str) -> None:
         for set_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             set_formatter(LogFormatter())  # plain numbers: the usual one writes formulae
     moving = [rung.homogeneity[name] for _, rung in known if name in rung.homogeneity]
-    homogeneity = f"\nsame everywhere: p = {fixed(moving[-1], 2)}" if moving else ""
+    homogeneity = f"\none value fits: p = {fixed(moving[-1], 2)}" if moving else ""
     broken = "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), TITLE_LETTERS))
     axes.set_title(f"{broken}{homogeneity}", fontsize=SMALL + 0.5, fontweight="normal")
     axes.set(xlim=(0.5, len(rungs) + 0.5))

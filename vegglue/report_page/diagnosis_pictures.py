@@ -51,7 +51,7 @@ ZONE_WIDTH = 0.72
 # What the parts of the picture of a diagnosis show.
 TITLES = (
     "What would improve the fit, alone", "What leaves a like trace",
-    "Where the model misses, in standard errors", "Where a spot would help",
+    "Where the model misses, in standard errors (grey: the mean)", "Where a spot would help",
 )  # fmt: skip
 
 
