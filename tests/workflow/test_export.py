@@ -153,6 +153,15 @@ def test_only_some_forms_and_a_case_without_a_frame(tmp_path: Path) -> None:
     assert "east [m]" not in pd.read_csv(found.files[0]).columns
 
 
+def test_a_posterior_of_another_state_is_told(tmp_path: Path) -> None:
+    """It was passed over in silence, and what came out was written over the export of before."""
+    case = load_case(write_reach(tmp_path, COARSE))
+    (tmp_path / "runs" / "brook").mkdir(parents=True)
+    (tmp_path / "runs" / "brook" / "posterior.h5").write_bytes(b"of another state")
+    found = export(case, runs=tmp_path / "runs", forms=("csv",))
+    assert found.parameters.startswith("the middle of the priors, as the posterior that is kept is of another state")
+
+
 def test_an_unknown_form_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

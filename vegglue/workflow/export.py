@@ -83,6 +83,8 @@ def _flow(case: Case, folder: Path) -> tuple[dict[str, FlowFields], Array | None
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
     words = "the middle of the priors" if best is None else "the best fit that was found"
+    if (folder / "posterior.h5").exists():
+        words += ", as the posterior that is kept is of another state of the config or its data"
     return solve_flow(case, theta), None, words
 
 
