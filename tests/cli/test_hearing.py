@@ -47,6 +47,7 @@ def test_a_progress_says_what_failed_and_what_was_there() -> None:
         (20, 600.0, ", 2.0 a minute, 40 min left"),
         (1, 3600.0, ", 1.0 an hour, 80.0 h left"),
         (3, 2.0, ", 1.5 a second, 53 s left"),
+        (1, 12.0, ", 5.0 a minute"),  # too early to tell
     ],
 )
 def test_rate_and_time_left(done: int, seconds: float, expected: str) -> None:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Seconds between two lines about one phase in a file or a pipe, at least: a log of an hour stays readable.
 BETWEEN_LINES = 10.0
+# Share [-] that is done, or seconds gone, before the time left is told: an inference begins with few draws a minute.
+TOLD_FROM, TOLD_AFTER = 0.02, 60.0
 # Terminals that cannot take a line back.
 PLAIN_TERMINALS = ("dumb", "unknown")
 
@@ -96,9 +98,9 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
     """', 53 a second, 12 s left' after so many were done in so many seconds; nothing where that tells nothing."""
     if progress.total is None or done <= 0 or seconds <= 0.0:
         return ""
-    rate = done / seconds
-    left = (progress.total - progress.done) / rate
-    return f", {_rate(rate)}, {_duration(left)} left" if left > 0.0 else f", {_rate(rate)}"
+    rate, waiting = done / seconds, progress.total - progress.done
+    told = waiting > 0 and (done >= TOLD_FROM * (done + waiting) or seconds >= TOLD_AFTER)
+    return f", {_rate(rate)}, {_duration(waiting / rate)} left" if told else f", {_rate(rate)}"
 
 
 def _rate(each_second: float) -> str:
