@@ -74,7 +74,7 @@ def test_the_page_of_a_child_tells_what_was_missing(toy: Run) -> None:
     said = plain(headline(child))
     assert f"was missing from {first.name}: most likely (70 %) störung" in said
     assert said.endswith("Nothing is missing from this model that these data could show.")
-    assert of_which_model(child).startswith(f"This page is about the model made of {FIRST.name} by adding")
+    assert of_which_model(child).startswith(f"What follows is of the model made of {FIRST.name} by adding")
     assert child.behind is first, "of which both models are drawn"
     more = replace(child, diagnosis=replace(first, name="child"))
     assert re.search(f"was missing from {first.name}: .* is missing from this model: ", plain(headline(more)))

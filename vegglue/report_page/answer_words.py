@@ -133,7 +133,7 @@ def of_which_model(run: Run) -> str:
         return ""
     added = [name for step in ladder.steps for name in step.added if name in run.case.effects]
     return (
-        f"This page is about the model made of {html.escape(ladder.steps[0].name)} by adding "
+        f"What follows is of the model made of {html.escape(ladder.steps[0].name)} by adding "
         f"{listed([f'<code>{html.escape(name)}</code>' for name in added]) or 'what was missing'}."
     )
 
