@@ -153,3 +153,27 @@ def test_a_cluster_is_refused_in_a_sentence(tmp_path: Path) -> None:
     done = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--cluster", "local:1", succeed=False)
     assert done.returncode == 2
     assert "--cluster: brook runs the command of its `engine`, on this machine only" in done.stderr
+
+
+CONSTANT = """
+import csv
+with open("stations.csv") as file:
+    rows = list(csv.DictReader(file))
+with open("predictions.csv", "w") as file:
+    file.write("station,prediction\\n")
+    for row in rows:
+        file.write(f"{row['station']},{0.8 if float(row['x']) < 15 else 0.1}\\n")
+"""
+
+
+@pytest.mark.slow
+def test_a_command_that_ignores_its_parameters_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was told as water that enters the channel, beside a remark that nothing was as reckoned."""
+    error = ("experiment: June}", "experiment: June, standard_error: 0.01}")
+    commanded(tmp_path, CONSTANT, "", COARSE, SMALL, error)
+    monkeypatch.chdir(tmp_path)
+    code, said = said_to(monkeypatch, capsys, "diagnose", "brook.yaml", "--trust", "--quiet", "--jobs", 1)
+    assert (code, said.count("\n")) == (2, 1)
+    assert "expected a command of `engine` whose predictions change with n_b or phi, got the same ones" in said

@@ -50,6 +50,10 @@ class Correction:
     rough: tuple[str, ...] = ()
 
 
+class DeafCommandError(InputError):
+    """A command that predicts the same whatever its parameters are."""
+
+
 def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) -> Engine:
     """The engine; its predictions at many points are runs of the command."""
     return Engine(
@@ -86,8 +90,13 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch = sile
     value = found[0] - own.prediction
     if not slopes:
         return Correction(names, here, model.station, value, np.zeros_like(own.slope))
-    slope = _differences(model.case.name, names, points, found, reasons) - own.slope
-    return Correction(names, here, model.station, value, slope, _rough(names, found))
+    differences = _differences(model.case.name, names, points, found, reasons)
+    if names and not differences.any():
+        raise DeafCommandError(
+            f"{model.case.name}: expected a command of `engine` whose predictions change with {' or '.join(names)}, "
+            "got the same ones at either side of each; see whether it reads parameters.json."
+        )
+    return Correction(names, here, model.station, value, differences - own.slope, _rough(names, found))
 
 
 def without_effects(model: Model) -> Model:
