@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # Seconds between two lines about one phase in a file or a pipe, at least: a log of an hour stays readable.
 BETWEEN_LINES = 10.0
 # Share [-] that is done, or seconds gone, before the time left is told: an inference begins with few draws a minute.
-TOLD_FROM, TOLD_AFTER = 0.02, 60.0
+LEFT_TOLD_FROM, LEFT_TOLD_AFTER = 0.02, 60.0
 # Terminals that cannot take a line back.
 PLAIN_TERMINALS = ("dumb", "unknown")
 
@@ -99,7 +99,7 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
     if progress.total is None or done <= 0 or seconds <= 0.0:
         return ""
     rate, waiting = done / seconds, progress.total - progress.done
-    told = waiting > 0 and (done >= TOLD_FROM * (done + waiting) or seconds >= TOLD_AFTER)
+    told = waiting > 0 and (done >= LEFT_TOLD_FROM * (done + waiting) or seconds >= LEFT_TOLD_AFTER)
     return f", {_rate(rate)}, {_duration(waiting / rate)} left" if told else f", {_rate(rate)}"
 
 
