@@ -1,6 +1,7 @@
 """A command as the engine of a case when something goes wrong: members that fail, kills, Ctrl-C, what is refused."""
 
 import os
+import re
 import signal
 import subprocess
 import time
@@ -16,6 +17,7 @@ import vegglue
 from vegglue.errors import InputError
 from vegglue.solver.status import FAILED, RUN_BY_COMMAND
 from vegglue.storage.result_files import read_ensemble
+from vegglue.workflow import command_model
 
 MEMBERS = 8
 SMALL = ("members: 1024", f"members: {MEMBERS}")
@@ -155,15 +157,8 @@ def test_a_cluster_is_refused_in_a_sentence(tmp_path: Path) -> None:
     assert "--cluster: brook runs the command of its `engine`, on this machine only" in done.stderr
 
 
-CONSTANT = """
-import csv
-with open("stations.csv") as file:
-    rows = list(csv.DictReader(file))
-with open("predictions.csv", "w") as file:
-    file.write("station,prediction\\n")
-    for row in rows:
-        file.write(f"{row['station']},{0.8 if float(row['x']) < 15 else 0.1}\\n")
-"""
+# The same at every station, whatever the parameters are.
+CONSTANT = re.sub(r"\{0\.2 / .*!r\}", "0.4", SMOOTH)
 
 
 @pytest.mark.slow
@@ -177,3 +172,20 @@ def test_a_command_that_ignores_its_parameters_is_refused(
     code, said = said_to(monkeypatch, capsys, "diagnose", "brook.yaml", "--trust", "--quiet", "--jobs", 1)
     assert (code, said.count("\n")) == (2, 1)
     assert "expected a command of `engine` whose predictions change with n_b or phi, got the same ones" in said
+
+
+@pytest.mark.slow
+def test_a_command_far_from_what_was_reckoned_with_gets_no_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same command is believed where it may differ by as much as it does."""
+    error = ("experiment: June}", "experiment: June, standard_error: 0.05}")
+    case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL, error)
+    believed = vegglue.diagnose(case, runs=tmp_path / "believed", jobs=1).verdict
+    assert "differs from what was reckoned with by" in believed.remarks[0]
+    assert "the command of `engine` differs" not in believed.sentence
+    monkeypatch.setattr(command_model, "BEYOND_BELIEF", -1.0)
+    doubted = vegglue.diagnose(case, runs=tmp_path / "doubted", jobs=1).verdict
+    assert doubted.kind == "cannot-tell"
+    assert doubted.sentence.endswith(f"What was found with it: {believed.sentence}")
+    assert doubted.remarks == believed.remarks

@@ -127,5 +127,6 @@ def _of_the_last(results: Sequence[tuple[Any, Any]]) -> list[str]:
     """The verdict on the last model that was diagnosed, where it is another than the first."""
     from vegglue.results.diagnosis import Diagnosis
 
-    (first, _), *_, (last, found) = [pair for pair in results if isinstance(pair[1], Diagnosis)] * 2
-    return [] if last.name == first.name else [f"With that: {found.verdict.sentence}"]
+    found = [(of, result) for of, result in results if isinstance(result, Diagnosis)]
+    last, verdict = found[-1][0], found[-1][1].verdict
+    return [] if last.name == found[0][0].name else [f"With that: {verdict.sentence}"]
