@@ -42,6 +42,9 @@ FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
 SHAPE_ERROR, AROUND = 0.5, 2.0
 # Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
 BUMP_CELLS = 1.5
+# Below it a bump counts as zero [-]: responses hold seven digits. Smaller ones are not told from zero in single
+# precision and take a processor ten times as long.
+LEAST_BUMP = 1e-15
 
 
 @dataclass(frozen=True)
@@ -66,16 +69,21 @@ def bumps(grid: Grid, length: float, width: float, cells: float = BUMP_CELLS) ->
 
 def bumps_at(grid: Grid, x: Array, y: Array, length: float, width: float) -> Bumps:
     """Bumps of half length l and half width w [m] around all x (k,) and y (j,) [m]."""
-    along = np.exp(-(((grid.x[None] - x[:, None]) / length) ** 2))
-    across = np.exp(-(((grid.y[None] - y[:, None]) / width) ** 2))
-    return Bumps(x, y, length, width, along, across)
+    return Bumps(x, y, length, width, _bump(grid.x, x, length), _bump(grid.y, y, width))
+
+
+def _bump(cells: Array, middles: Array, radius: float) -> Array:
+    """exp(-((c - m) / r)^2) of cells (n,) around middles (k,), (k, n) [-]."""
+    found = np.exp(-(((cells[None] - middles[:, None]) / radius) ** 2))
+    return np.where(found < LEAST_BUMP, 0.0, found)
 
 
 def responses_to_bumps(responses: CellResponses, term: Term, over: Bumps) -> Array:
     """d prediction / d size of each bump (station, k, j) [unit of a station per that of the term]."""
-    return np.asarray(
-        np.einsum("ai,nij,bj->nab", over.along, responses.of[term], over.across, optimize=True), dtype=float
-    )
+    of_cells = responses.of[term]
+    # Across first, in the precision of the responses: a fifth of the time that a product of all three takes in double.
+    by_row = of_cells.reshape(-1, of_cells.shape[2]) @ over.across.T.astype(of_cells.dtype)
+    return np.asarray(np.matmul(over.along, by_row.reshape(*of_cells.shape[:2], -1)), dtype=float)
 
 
 def field_columns(responses: CellResponses, term: Term, over: Bumps) -> Array:
