@@ -22,7 +22,7 @@ from vegglue.storage.result_files import read_ensemble, read_posterior, stored_h
 from vegglue.storage.resume import begun_or_finished
 from vegglue.workflow.command_model import with_command
 from vegglue.workflow.median_flow import median_flow
-from vegglue.workflow.run_folder import folder_of, of_size
+from vegglue.workflow.run_folder import folder_of, of_size, other_size
 from vegglue.workflow.set_aside import set_aside_of
 
 Method = Literal["refine", "glue"]
@@ -91,10 +91,20 @@ def _own_ensemble(case: Case, given: Ensemble | None, folder: Path, needed: bool
     """
     if given is None:
         there = needed or begun_or_finished(folder / "ensemble.h5")
+        _refuse_another_size(case, folder)
         return read_ensemble(folder / "ensemble.h5", simulation_hash(case)) if there else None
     if given.config_hash != simulation_hash(case):
         raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
     return given
+
+
+def _refuse_another_size(case: Case, folder: Path) -> None:
+    """Errors: InputError when the ensemble in the folder is of this case, but of another number of members."""
+    if (members := other_size(case, folder)) is not None:
+        raise InputError(
+            f"{folder / 'ensemble.h5'}: holds {members:,} members, and {case.simulate.members:,} are asked for; add "
+            f"--members {members}, or simulate the case again."
+        )
 
 
 def needs_ensemble(case: Case, method: Method) -> bool:

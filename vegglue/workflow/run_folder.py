@@ -16,7 +16,7 @@ from vegglue.calibration.baseline import Baseline, baseline, for_prediction, log
 from vegglue.calibration.fit import fit
 from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.case.parameter_space import theta_at, z_at
-from vegglue.case.resolved_config import case_hash
+from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
@@ -58,6 +58,16 @@ def as_solved(case: Case, folder: Path) -> Case:
     """
     path = folder / "ensemble.h5"
     return of_size(case, len(read_ensemble(path).status)) if path.exists() else case
+
+
+def other_size(case: Case, folder: Path) -> int | None:
+    """How many members the ensemble in the folder of its run has, if its size is all that is not the case's."""
+    path = folder / "ensemble.h5"
+    stored = stored_hash(path)
+    if stored in (None, simulation_hash(case)):
+        return None
+    members = len(read_ensemble(path).status)
+    return members if stored == simulation_hash(of_size(case, members)) else None
 
 
 def model_in(case: Case) -> Model:

@@ -18,7 +18,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble, stored_hash
 from vegglue.storage.resume import remove_left_over_fields
-from vegglue.workflow.run_folder import folder_of, of_size
+from vegglue.workflow.run_folder import folder_of, of_size, other_size
 
 
 @one_thread()
@@ -70,15 +70,12 @@ def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
 
 def refuse_to_shrink(case: Case, runs: Path | str, force: bool) -> None:
     """Errors: InputError when a finished ensemble of the case with more members would be replaced, unless forced."""
-    path = Path(runs) / case.name / "ensemble.h5"
-    stored = None if force else stored_hash(path)
-    if stored in (None, simulation_hash(case)):
-        return
-    members = len(read_ensemble(path).status)
-    if members > case.simulate.members and stored == simulation_hash(of_size(case, members)):
+    folder = Path(runs) / case.name
+    members = None if force else other_size(case, folder)
+    if members is not None and members > case.simulate.members:
         raise InputError(
-            f"{path}: holds {members:,} members of this case, which {case.simulate.members:,} would replace; ask for "
-            f"--members {members}, give another folder by --runs, or add --force."
+            f"{folder / 'ensemble.h5'}: holds {members:,} members of this case, which {case.simulate.members:,} would "
+            f"replace; ask for --members {members}, give another folder by --runs, or add --force."
         )
 
 
