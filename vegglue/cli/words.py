@@ -7,7 +7,6 @@ from typing import Any
 from vegglue.case.schema import Case
 from vegglue.cli.brief_posterior import show_posterior
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
-from vegglue.discovery.discovered import chance_told
 from vegglue.errors import shown_path
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
@@ -52,13 +51,8 @@ def show(case: Case, runs: Path, result: Any) -> None:
 
 def _show_discovery(result: DiscoveredCase) -> None:
     print(result.found.sentence)
-    told = [law.lines for law in result.found.laws]
-    if result.found.product is not None:
-        told.append(result.found.product.lines)
-    for first, *further in told:
+    for first, *further in result.found.ranked:
         print("\n".join([f"- {first}", *(f"  {line}" for line in further)]))
-    for name, chance in result.found.others.items():
-        print(f"- {name} (chance {chance_told(chance)})")
     if result.child is not None and result.effect_file is not None:
         print(f"Effect file: {shown_path(result.effect_file)}")
         print(f"Child config: {shown_path(result.child.source)}")

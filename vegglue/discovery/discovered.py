@@ -157,7 +157,17 @@ class Discovery:
         return (best,) if self.product is None else (best, self.product.found)
 
     @property
+    def ranked(self) -> list[list[str]]:
+        """Lines of every law and other cause, the likeliest first; those of the product after its law."""
+        told = [(law.chance, law.lines) for law in self.laws]
+        told += [(chance, [f"{name} (chance {chance_told(chance)})"]) for name, chance in self.others.items()]
+        told.sort(key=lambda pair: -pair[0])
+        ranked = [lines for _, lines in told]
+        if self.product is not None:
+            ranked.insert(1, self.product.lines)
+        return ranked
+
+    @property
     def lines(self) -> list[str]:
-        """All laws, and the product."""
-        told = [line for law in self.laws for line in law.lines]
-        return told if self.product is None else [*told, *self.product.lines]
+        """The same, one after the other."""
+        return [line for lines in self.ranked for line in lines]
