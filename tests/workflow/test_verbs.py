@@ -98,7 +98,7 @@ def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
     runs = tmp_path / "runs"
     ensemble = vegglue.simulate(case, runs=runs, members=8, jobs=1)
     assert len(ensemble.status) == 8
-    with pytest.raises(vegglue.InputError, match="holds 8 members, .* are asked for; add --members 8, or"):
+    with pytest.raises(vegglue.InputError, match=r"holds 8 members, .* are asked for; add --members 8, or"):
         vegglue.infer(case, runs=runs, method="glue")
     vegglue.infer(case, ensemble, runs=runs, method="glue")
     assert vegglue.report(case, runs=runs).exists(), "a page is of the members that are there"
