@@ -4,6 +4,7 @@ A listed effect is called by its name. One data set of an independent code in th
 """
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from vegglue.discovery.search import discover_laws
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.screening.laws_in_case import LEAST_SPREAD, laws_in_case, products_in_case
+from vegglue.twins.hidden_effect import TwinBase
 from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
 
@@ -48,10 +50,16 @@ def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
     assert 0.0 < low < high < 4.0, "no section crosses a patch; what is in it is seen all the same"
 
 
+@cache
+def ground_of(seed: int) -> TwinBase:
+    """The truth before something is hidden in it: most tests share it."""
+    model = model_in(load_case(CONFIG))
+    return twin_base(model, true_place(len(model.names), seed))
+
+
 def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
     """What is found in measurements of a truth that hides something at a ratio of 8, errors white."""
-    ground = twin_base(model, true_place(len(model.names), seed))
-    station, _ = measured_twin(ground, hidden, 8.0, "white", seed)
+    station, _ = measured_twin(ground_of(seed), hidden, 8.0, "white", seed)
     return discover_laws(replace(model, station=station))
 
 
