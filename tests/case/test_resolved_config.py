@@ -62,6 +62,13 @@ def test_an_ensemble_outlives_another_likelihood_but_not_another_prior():
     assert simulation_hash(load_case(swapped)) != simulation_hash(case)
 
 
+def test_results_outlive_another_title():
+    case = load_case(write(SMALL))
+    named = load_case(changed("name: small", "name: small\ntitle: A small brook"))
+    assert case_hash(named) == case_hash(case)
+    assert "A small brook" in resolved_yaml(named)
+
+
 def test_an_ensemble_outlives_what_is_said_of_the_record():
     write("experiment,x,y,level\nlow,1,0,0.9\n", "levels.csv")
     text = SMALL + "observations:\n  - {kind: level, file: levels.csv}\n"

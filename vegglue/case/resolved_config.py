@@ -34,8 +34,11 @@ def as_yaml(tree: Tree) -> str:
 
 
 def case_hash(case: Case) -> str:
-    """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie."""
-    return _hash(dumped(case))
+    """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie.
+
+    Its title is not in it: no number hangs on that.
+    """
+    return _hash(dumped(case) | {"title": ""})
 
 
 def simulation_hash(case: Case) -> str:
