@@ -182,6 +182,8 @@ def test_a_bend_lies_on_the_map_where_it_bends(tmp_path: Path) -> None:
     assert last["east [m]"].mean() == pytest.approx(15.0 + 9.549, abs=0.1)
     assert last["north [m]"].mean() == pytest.approx(9.549, abs=0.8)
     assert (last["north_velocity [m/s]"] > 3.0 * last["east_velocity [m/s]"].abs()).all()
+    with pytest.raises(InputError, match="choose --only netcdf or csv"):
+        export(case, runs=tmp_path / "runs", forms=("geotiff",))
 
 
 def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path: Path) -> None:

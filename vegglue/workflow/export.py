@@ -55,8 +55,13 @@ def export(
     the priors. csv: stations.csv and flow-<experiment>.csv; geotiff: one file for each quantity and experiment, none on
     a grid along a centreline; netcdf: flow.nc, a UGRID mesh. With a `frame` in the case all have their place on the
     map, and velocities are turned to it.
-    Errors: InputError when no flow is found, or a library is missing; StorageError.
+    Errors: InputError when no flow is found, nothing is left to write, or a library is missing; StorageError.
     """
+    if list(forms) == ["geotiff"] and build_grid(case).centreline is not None:
+        raise InputError(
+            f"{shown_path(case.source)}: expected cells in straight rows for a GeoTIFF, got a grid along a centreline; "
+            "choose --only netcdf or csv."
+        )
     for library in (name for form in forms for name in LIBRARIES_OF_FORM[form]):  # before minutes are spent on the flow
         extra_library(library, "field", "vegglue export", "choose --only csv")
     folder = folder_of(runs, case)
