@@ -103,6 +103,14 @@ def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
     assert np.mean(found) == pytest.approx(rho, abs=0.12)
 
 
+def test_one_reading_a_section_tells_nothing_of_neighbours() -> None:
+    """However alike the readings are."""
+    alone = stations()[:6].assign(section=list("abcdef"), x=10.0 * np.arange(6))
+    noise = estimate_noise(noise_of(alone), np.full(6, 0.02), np.zeros((6, 1)))
+    assert noise.correlation == 0.0
+    assert noise.correlation_chances.tolist() == [[0.0], [1.0]]
+
+
 def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
     random = np.random.default_rng(6)
     left = correlated(0.0, random, error=0.02)

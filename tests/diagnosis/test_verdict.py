@@ -212,6 +212,7 @@ DOUBTED = {
     "absurd": ({"misfit": ABSURD}, {"misfit": MISSES}, {}, {}, "misses by 2.4 times"),
     "far off": ({"strained": ("k_s", 4.5)}, {"strained": ("k_s", 3.5)}, {}, {}, "k_s would have to lie 4.5"),
     "at its upper end": ({}, {}, AT_ITS_END, AT_ITS_END | {"value": 0.97}, "a would have to be as large as can be"),
+    "as far as a calibration goes": ({}, {}, {"value": 3.0, "scale": 0.5}, {"value": 2.9, "scale": 0.5}, "as large as"),
     "at its lower end": ({}, {}, AT_ITS_END | {"value": -0.996}, AT_ITS_END | {"value": -0.97}, "as large as can be"),
 }
 

@@ -7,6 +7,7 @@ import pytest
 from reach import COARSE, block, said_to, write_reach
 
 from vegglue.cli.main import main
+from vegglue.errors import InputError
 
 
 def thin(folder: Path, lines: int) -> Path:
@@ -25,13 +26,14 @@ def without_parameters(folder: Path) -> Path:
     return config
 
 
-@pytest.mark.parametrize("command", ["diagnose", "next", "discover", "run", "simulate", "infer"])
+@pytest.mark.parametrize("command", ["diagnose", "next", "discover", "run", "simulate", "infer", "export"])
 def test_nothing_to_calibrate_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     config = without_parameters(tmp_path)
     monkeypatch.chdir(tmp_path)
-    code, told = said_to(monkeypatch, capsys, command, config, "--jobs", 1)
+    options = () if command == "export" else ("--jobs", 1)
+    code, told = said_to(monkeypatch, capsys, command, config, *options)
     assert (code, "`parameters` expected a prior or more, got none" in told) == (2, True), told
 
 
@@ -60,3 +62,22 @@ def test_one_reading_and_one_section_are_diagnosed(
         code, told = said_to(monkeypatch, capsys, command, config, "--jobs", 1)
         assert code == 0, told
         assert "Traceback" not in told
+
+
+@pytest.mark.slow
+def test_velocities_no_flow_comes_near_are_told_before_priors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where no flow is found at all, wrong units are the reason and not the priors."""
+    config = thin(tmp_path, 10)
+    monkeypatch.chdir(tmp_path)
+
+    def none_found(_: object) -> None:
+        raise InputError("brook: the model finds no steady flow at its best point; widen the priors.")
+
+    monkeypatch.setattr("vegglue.diagnosis.diagnose.kept_baseline", none_found)
+    code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
+    assert (code, "widen the priors" in told) == (2, True), told
+    monkeypatch.setattr("vegglue.diagnosis.diagnose.absurd_values", lambda *_: ["All velocities are in cm/s."])
+    code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
+    assert (code, told) == (2, "brook: no flow comes near what was measured. All velocities are in cm/s.\n")

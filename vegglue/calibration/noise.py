@@ -164,7 +164,12 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
     size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only when
     the likelihood rejects the stated errors at 1 %.
     """
-    deviance = _deviance_of(noise, residual, systematic)
+    known = _deviance_of(noise, residual, systematic)
+    neighbours = _has_neighbours(noise)
+
+    def deviance(rho: float, scale: float, log_t: float) -> float:
+        return known(rho if neighbours else 0.0, scale, log_t)
+
     pairs = itertools.product(START_CORRELATIONS, START_SIZES)
     _, *start = min((deviance(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho, t in pairs)
 
@@ -183,8 +188,15 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
 
     fixed, free = in_threads(best, [(False,), (True,)])
     _, rho, scale, log_t = free if fixed[0] - free[0] > SCALE_EVIDENCE and free[2] > 1.0 else fixed
-    found = with_correlation(noise, rho if rho > 0.05 else 0.0, scale)
+    found = with_correlation(noise, rho if rho > 0.05 and neighbours else 0.0, scale)
+    if not neighbours:
+        return found
     return replace(found, correlation_chances=_correlation_chances(lambda level: deviance(level, scale, log_t)))
+
+
+def _has_neighbours(noise: Noise) -> bool:
+    """Whether two stations share a section, so that the data know of a correlation."""
+    return bool((np.isfinite(noise.separation) & ~np.eye(noise.rows.size, dtype=bool)).any())
 
 
 def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:

@@ -97,6 +97,8 @@ def _fit(posterior: Posterior) -> list[str]:
 
 
 def _chi2(misfit: MisfitTest) -> str:
+    if misfit.freedom < 1:
+        return f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."
     result = f"chi2 = {misfit.chi2:.4g} with {misfit.freedom} degrees of freedom (p = {misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
         return f"{result}: something is missing in the model or its data; `vegglue diagnose` asks what."

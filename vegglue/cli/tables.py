@@ -14,6 +14,8 @@ from vegglue.workflow.next_measurement import Question
 
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
+# An amplitude that no data show, see `detectability`: its trace has no length.
+NEVER = 1e100
 
 
 def show_diagnosis(found: Diagnosis) -> None:
@@ -48,11 +50,11 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
         one.name,
         f"{found.chances[one.name]:.0%}" if one.name in found.chances else "",
         f"{amplitude.value:.3g} {unit}".strip(),
-        f"{low:.3g} .. {high:.3g}",
+        f"{low:.3g} .. {high:.3g}" if low < high else "at its end",
         " -> ".join(f"{score:+.1f}" for score in scores if np.isfinite(score)),
         "" if np.isnan(p) else f"< {p:.1g}" if p < 5e-4 else f"{p:.2g}",
         f"{detectability.visibility:.2f}",
-        f"{detectability.smallest:.2g}",
+        f"{detectability.smallest:.2g}" if detectability.smallest < NEVER else "never",
     )
 
 

@@ -32,6 +32,7 @@ from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
+from vegglue.errors import InputError
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import in_threads
 from vegglue.progress import Progress, Watch, silent
@@ -69,10 +70,11 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
     watch(Progress(with_compilation("calibrating the model as it is")))
-    base = kept_baseline(model)
+    absurd = tuple(absurd_values(model.case, model.site, model.station))
+    base = _calibrated_unless_absurd(model, absurd)
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)
-    found, suspects = Findings(absurd=tuple(absurd_values(model.case, model.site, model.station))), dict[str, Suspect]()
+    found, suspects = Findings(absurd=absurd), dict[str, Suspect]()
     while True:
         tested = suspects_of(screening)
         suspects = tested | _kept(suspects, tested)
@@ -89,12 +91,24 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         if following.what != "instrument":
             base, steps = with_rivals_again(base, found.steps, suspects, watch)
             found = _with_steps(found, steps)
+        else:  # amplitudes that were calibrated with these readings are no longer true
+            suspects = {step.accepted: suspects[step.accepted] for step in found.steps}
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], base)
         watch(Progress("looking for what is missing with it"))
         at_hand = following.screening if base is following.base else None
         screening = at_hand or screen(base, found.flagged)
     return concluded(first, screening, found, suspects, unseen)
+
+
+def _calibrated_unless_absurd(model: Model, absurd: Sequence[str]) -> Baseline:
+    """The calibrated model. Errors: InputError, which tells of absurd values first: no flow may come near them."""
+    try:
+        return kept_baseline(model)
+    except InputError as error:
+        if not absurd:
+            raise
+        raise InputError(f"{model.case.name}: no flow comes near what was measured. {' '.join(absurd)}") from error
 
 
 def _with_alarm(screening: Screening, found: Findings) -> Findings:

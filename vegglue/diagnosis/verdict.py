@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.case.parameter_space import FURTHEST
 from vegglue.diagnosis.causes_in_words import (
     causes_in_words,
     field_sentence,
@@ -172,14 +173,17 @@ def _accepted(found: Findings) -> list[str]:
 
 
 def _is_at_bound(suspect: Suspect) -> bool:
-    """Whether an amplitude lies at an end of its support, other than the end at which it is off."""
+    """Whether an amplitude lies at an end of its support, other than the end at which it is off, or as far off its
+    prior as a calibration goes.
+    """
     amplitude = suspect.amplitude
     margin = AT_BOUND * amplitude.scale
-    return any(abs(amplitude.value - end) < margin for end in amplitude.support if end != amplitude.off)
+    ends = [end for end in amplitude.support if end != amplitude.off]
+    return amplitude.relative_size > FURTHEST - AT_BOUND or any(abs(amplitude.value - end) < margin for end in ends)
 
 
 def _told(misfit: Misfit) -> str:
-    return f"chi2 is {misfit.chi2:.0f} for {misfit.freedom} degrees of freedom"
+    return f"chi2 is {misfit.chi2:.0f} {misfit.of_freedom}"
 
 
 def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:

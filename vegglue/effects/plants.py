@@ -110,7 +110,7 @@ EFFECTS = (
         amplitude=Amplitude("vogel_exponent", "-", "Vogel exponent chi, 0 for rigid plants", 0.5, -2.0, 1.0),
         shapes=(REFERENCE_SPEED,),
         source="Vogel (1984); Järvelä (2004)",
-        doi="10.1016/j.jhydrol.2003.10.018",
+        doi="10.1080/15715124.2004.9635222",
     ),
     Effect(
         name="canopy_height_error",
@@ -228,7 +228,7 @@ EFFECTS = (
     Effect(
         name="patch_density",
         stage="plants",
-        title="One patch is denser than counted",
+        title="One patch is denser or thinner than counted",
         equation="phi -> phi (1 + a) in one patch",
         act=patch_density,
         amplitude=Amplitude("excess", "-", "relative excess a of stems over those counted", 0.3, -0.95, 5.0),

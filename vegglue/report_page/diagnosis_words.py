@@ -172,7 +172,7 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
     apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)
     return [
-        KeyNumber("chi², correlated errors", chi2, f"for {misfit.freedom} degrees of freedom"),
+        KeyNumber("chi², correlated errors", chi2, misfit.of_freedom),
         KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
         KeyNumber("effects tried", f"{len(diagnosis.suspects)}", f"{apart} of them untestable with these data"),
         KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),

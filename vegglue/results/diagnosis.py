@@ -148,6 +148,11 @@ class Misfit:
     p: float
     zones: pd.DataFrame
 
+    @property
+    def of_freedom(self) -> str:
+        """Its degrees of freedom, in words."""
+        return f"for {self.freedom} degrees of freedom" if self.freedom > 0 else "with no more readings than parameters"
+
 
 @dataclass(frozen=True)
 class EstimatedErrors:
@@ -270,7 +275,7 @@ class Diagnosis:
             [
                 self.verdict.sentence,
                 *(interval_in_short(name, one.value, *one.interval95, one.unit) for name, one in sizes),
-                f"chi2 {misfit.chi2:.0f} for {misfit.freedom} degrees of freedom (p = {misfit.p:.2g}), {tested}",
+                f"chi2 {misfit.chi2:.0f} {misfit.of_freedom} (p = {misfit.p:.2g}), {tested}",
                 stations_in_short(self.predictions.station),
             ],
         )

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import theta_at
+from vegglue.case.parameter_space import refuse_without_parameters, theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
@@ -62,6 +62,7 @@ def export(
             f"{shown_path(case.source)}: expected cells in straight rows for a GeoTIFF, got a grid along a centreline; "
             "choose --only netcdf or csv."
         )
+    refuse_without_parameters(case)
     for library in (name for form in forms for name in LIBRARIES_OF_FORM[form]):  # before minutes are spent on the flow
         extra_library(library, "field", "vegglue export", "choose --only csv")
     folder = folder_of(runs, case)
