@@ -46,6 +46,15 @@ def survey_on_the_map() -> str:
     return "\n".join([*lines, "9;683120,000;247480,000;-999;-999"])
 
 
+def test_both_velocities_of_a_plain_table_are_taken(tmp_path: Path) -> None:
+    """Under the usual name of u alone."""
+    rows = ["experiment,section,x,y,u,u_se,v", *(f"June,A,8,{y},0.4,0.01,0.02" for y in (-1, 0, 1))]
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, velocities__csv="\n".join(rows))
+    table = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+    assert table["kind"].value_counts().to_dict() == {"velocity": 3, "velocity_across": 3}
+    assert set(table[table["kind"] == "velocity"]["standard_error"]) == {0.01}
+
+
 def test_a_table_on_the_map_in_other_units_becomes_stations(tmp_path: Path) -> None:
     site = (
         CHANNEL + JUNE + "frame: {origin: [683120, 247480], angle: 32}\nfiles: {adv__csv: {standard_error: 1 cm/s}}\n"

@@ -154,11 +154,12 @@ def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
 
 
 def _is_plain(path: Path, kind: Kind) -> bool:
-    """Whether a table is in the form that a case names as it is: commas, and all columns by their own names."""
+    """Whether a table is in the form that a case names as it is: commas, all columns by their own names, one kind."""
     lines = readable_text(path).splitlines()
     heading = [name.strip() for name in lines[0].split(",")] if lines else []
     place = ("x", *(["y"] if kind.at_point else []), *(["section"] if kind.velocity else []))
-    return {"experiment", kind.column, *place} <= set(heading)
+    of_others = {other.column for other in KINDS.values()} - {kind.column}
+    return {"experiment", kind.column, *place} <= set(heading) and not of_others & set(heading)
 
 
 def _check_plain(path: Path, kind: Kind, known: KnownExperiments) -> None:
