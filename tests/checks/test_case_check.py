@@ -58,6 +58,20 @@ def test_a_sound_case_is_passed_in_silence(tmp_path):
     assert odd(tmp_path) == []
 
 
+def test_a_patch_on_the_map_is_told_as_that(tmp_path):
+    patch = SOUND.index("x: [", SOUND.index("patches"))
+    west, east = SOUND[patch:].split("[")[1].split("]")[0].split(",")
+    on_map = SOUND[:patch] + SOUND[patch:].replace(
+        f"x: [{west},{east}]", f"x: [{1000 + int(west)}, {1000 + int(east)}]", 1
+    )
+    on_map = on_map.replace("y: [0, 1.5], stems", "y: [2000, 2001.5], stems")
+    framed = on_map + "frame: {origin: [1000, 2000], angle: 0}\n"
+    assert any(
+        "Patch p1 covers no cell centre: its corners are places on the map" in one for one in odd(tmp_path, framed)
+    )
+    assert any("Patch p1 covers no cell centre: it is outside" in one for one in odd(tmp_path, on_map))
+
+
 def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
     full = SOUND.replace("level: 1.0}", "level: 2.0}")
     walled = full.replace("  default: bed", "  default: bed\n  walls: {law: manning, n: 0.011}")

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vegglue.arrays import Array
 from vegglue.case.parameter_space import Bounds, prior_range
 from vegglue.case.parts import Value
 from vegglue.case.prior import quantile
@@ -33,7 +34,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
         alone = cells_of_patch(patch, site.grid)
         covered, hidden = alone.sum() * cell, int((alone & (site.patch != index)).sum())
         if not alone.any():
-            yield f"Patch {patch.name} covers no cell centre: it is outside the grid, or smaller than a cell."
+            yield f"Patch {patch.name} covers no cell centre: {_why_none(case, site, corners_of(case, patch))}."
         elif abs(covered - meant) > 0.1 * meant:
             yield f"Patch {patch.name} of {meant:.3g} m2 becomes {covered:.3g} m2 of cells: take finer cells."
         if hidden:
@@ -41,6 +42,17 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
     unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}
     for stand in sorted(unused):
         yield f"Stand {stand} grows in no patch."
+
+
+def _why_none(case: Case, site: Site, corners: Array) -> str:
+    """Why a patch with these corners (k, 2) [m] covers no cell centre."""
+    x, y = site.grid.x, site.grid.y
+    if case.frame is not None:
+        east, north = corners.mean(axis=0)
+        along, across = case.frame.to_model(east, north)
+        if x[0] <= along <= x[-1] and y[0] <= across <= y[-1]:
+            return "its corners are places on the map, and a case expects them along and across the channel; turn them"
+    return "it is outside the grid, or smaller than a cell"
 
 
 def remarks_on_friction_classes(case: Case, site: Site) -> Iterator[str]:
