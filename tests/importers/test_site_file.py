@@ -146,7 +146,7 @@ def test_what_nobody_said_is_told(tmp_path: Path) -> None:
         holdout={},
     )
     assert assumptions_of(folder) == [
-        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01, to within a factor of 2.",
+        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01 (standard deviation: a factor of 2).",
         "site.json: taken as notes, and not read: weather, experiments.low.plants.",
         "holdout.csv is not read: site.json names no experiment under `holdout`.",
     ]

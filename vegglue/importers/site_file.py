@@ -62,7 +62,7 @@ def left_open(folder: Path) -> list[str]:
     site, given = read_site(path), _given(path)
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
-        within = f", to within a factor of {site.viscosity_factor:g}" if site.viscosity_factor > 1 else ""
+        within = f" (standard deviation: a factor of {site.viscosity_factor:g})" if site.viscosity_factor > 1 else ""
         assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}{within}")
     if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
         assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
