@@ -72,13 +72,20 @@ def field_sentence(field: FieldFound) -> str:
     )
 
 
+def _percent(chance: float) -> str:
+    """A chance as it is told: neither 0 nor 100%."""
+    if chance < 0.01:
+        return "under 1%"
+    return "over 99%" if chance > 0.99 else f"{chance:.0%}"
+
+
 def law_in_words(laws: LawsSuspected) -> str:
     """Which quantity in which term, and how likely."""
     best, chance = laws.laws[0], sum(one.chance for one in laws.alike)
-    told = "over 99%" if chance > 0.99 else f"{chance:.0%}"
     return (
-        f"a law of {best.quantity} in {best.term} would explain it, with a chance of {told} among all that was "
-        f"compared to first order; errors alone make laws stand out as much in {100 * laws.p:.1g}% of cases"
+        f"a law of {best.quantity} in {best.term} would explain it, with a chance of {_percent(chance)} among "
+        "all that was compared to first order; errors alone make laws stand out as much in "
+        f"{100 * laws.p:.1g}% of cases"
     )
 
 
@@ -124,18 +131,19 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
     others = [_other_words(step, name) for name in step.others if name != first]
     if rest or own < STATED_BELOW:
-        words += f", {'together ' if same else ''}with a chance of {own:.0%} among all that was tried"
+        words += f", {'together ' if same else ''}with a chance of {_percent(own)} among all that was tried"
     words += f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else ""
     return f"{_likelier_words(step, first)}{words}" if first else words
 
 
 def _likelier_words(step: Step, name: str) -> str:
-    return f"most likely something in no list ({step.others[name]:.0%}): {_place_words(step.places[name])}; or else "
+    chance = _percent(step.others[name])
+    return f"most likely something in no list ({chance}): {_place_words(step.places[name])}; or else "
 
 
 def _other_words(step: Step, name: str) -> str:
     """One of another kind with its chance; of something at a place, what it does and where."""
-    chance = f"({step.others[name]:.0%})"
+    chance = f"({_percent(step.others[name])})"
     if name not in step.places:
         return f"{name} {chance}"
     place = step.places[name]
@@ -149,7 +157,7 @@ def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
 def undecided_in_words(contenders: Sequence[Contender]) -> str:
     """The likeliest contenders with their chances among all of them."""
     told = zip(contenders[:UNDECIDED_TOLD], chances_of(contenders), strict=False)
-    return " or ".join(f"{_contender_words(one)} ({chance:.0%})" for one, chance in told)
+    return " or ".join(f"{_contender_words(one)} ({_percent(chance)})" for one, chance in told)
 
 
 def _contender_words(one: Contender) -> str:
@@ -163,7 +171,7 @@ def _contender_words(one: Contender) -> str:
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
     """Names with their chances."""
-    return [f"{name} ({step.chance[name]:.0%})" for name in names]
+    return [f"{name} ({_percent(step.chance[name])})" for name in names]
 
 
 def model_error_in_words(used: ModelErrorUsed) -> str:
