@@ -12,7 +12,7 @@ from vegglue.calibration.noise import (
     noise_of,
     with_correlation,
     with_grid_error,
-    with_offset,
+    with_unknown_errors,
 )
 from vegglue.errors import InputError
 
@@ -118,26 +118,41 @@ def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
     assert noise.scale == pytest.approx(2.0, rel=0.2)
 
 
+def among(readings: list[int], value: float | np.ndarray = 1.0) -> np.ndarray:
+    """A column of the values at the readings, zero elsewhere (n,)."""
+    column = np.zeros(SECTIONS * STATIONS)
+    column[readings] = value
+    return column
+
+
 def test_a_station_set_aside_counts_for_nothing() -> None:
-    noise = with_offset(noise_of(stations()), np.array([5]))
-    left = np.zeros(SECTIONS * STATIONS)
-    left[5] = 1.0
-    assert np.abs(noise.whiten(left)).max() < 0.2
+    noise = with_unknown_errors(noise_of(stations()), among([5])[:, None])
+    assert np.abs(noise.whiten(among([5]))).max() < 0.2
 
 
 def test_of_an_instrument_that_is_off_only_differences_count() -> None:
     """Where three readings share an offset, it counts for nothing, and two independent errors are left."""
-    readings = np.array([5, 30, 60])
-    before, noise = noise_of(stations()), with_offset(noise_of(stations()), readings)
-    shared, own = np.zeros(before.rows.size), np.zeros(before.rows.size)
-    shared[readings], own[readings] = 1.0, (0.02, -0.01, -0.01)
+    readings = [5, 30, 60]
+    before, shared = noise_of(stations()), among(readings)
+    noise, own = with_unknown_errors(before, shared[:, None]), among(readings, np.array([0.02, -0.01, -0.01]))
     assert np.abs(noise.whiten(shared)).max() < 0.2
     assert np.sum(noise.whiten(own) ** 2) == pytest.approx(np.sum((own / 0.01) ** 2), rel=1e-3)
     others = np.ones(before.rows.size) - shared
     assert np.sum(noise.whiten(others) ** 2) == pytest.approx(np.sum(before.whiten(others) ** 2))
-    again = with_offset(noise, np.array([7]))
-    assert again.offsets.shape == (before.rows.size, 2), "one instrument after another"
+    again = with_unknown_errors(noise, among([7])[:, None])
+    assert again.unknown.shape == (before.rows.size, 2), "one instrument after another"
     assert np.abs(again.whiten(shared)).max() < 0.2
+
+
+def test_neither_offset_nor_factor_of_a_probe_that_is_off_counts() -> None:
+    """Of four readings two independent errors are left."""
+    readings, value = [5, 30, 45, 60], np.array([0.2, 0.5, 0.3, 0.6])
+    before, columns = noise_of(stations()), np.column_stack([among(readings), among(readings, value)])
+    noise = with_unknown_errors(before, columns)
+    assert np.abs(noise.whiten(columns @ np.array([0.1, 0.2]))).max() < 0.2
+    slopes = np.linalg.svd(columns[readings], full_matrices=True)[0][:, 2:]
+    own = among(readings, 0.01 * slopes @ np.array([1.0, 2.0]))
+    assert np.sum(noise.whiten(own) ** 2) == pytest.approx(np.sum((own / 0.01) ** 2), rel=1e-3)
 
 
 def test_a_station_without_a_standard_error_is_named() -> None:

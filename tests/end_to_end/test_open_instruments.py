@@ -1,9 +1,16 @@
 """The loop on data that another code made, with nothing hidden in them, or an instrument that is off."""
 
+import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
-from open_cases import looked_into
+import yaml
+from open_cases import OPEN_CASES, looked_into
+
+from vegglue.case.config import load_case
+from vegglue.importers.field_folder import case_from_folder
+from vegglue.workflow.diagnose import diagnose
 
 pytestmark = pytest.mark.slow
 
@@ -20,3 +27,17 @@ def test_an_instrument_that_is_off_is_set_aside_alone(name: str, kind: str, offs
     assert found.verdict.kind == "instrument", found.verdict.sentence
     assert (faulty.kind, found.steps, found.places) == (kind, (), ())
     assert faulty.interval95[0] <= offset <= faulty.interval95[1]
+
+
+def test_of_a_probe_that_is_off_by_a_factor_nothing_is_left(campaigns: Path) -> None:
+    """Half as much again at one y, where velocities are 0.27 to 0.63 m/s: no offset makes up for it in all sections."""
+    folder, config = campaigns / "probe_factor", campaigns / "probe_factor.yaml"
+    shutil.copytree(OPEN_CASES / "open-a", folder)
+    velocities = pd.read_csv(folder / "velocities.csv")
+    velocities.loc[(velocities["y"] + 0.6).abs() < 0.01, "u"] *= 1.5
+    velocities.to_csv(folder / "velocities.csv", index=False)
+    config.write_text(yaml.safe_dump(case_from_folder(folder, config)), encoding="utf-8")
+    found = diagnose(load_case(config), runs=campaigns / "runs", watch=print)
+    assert found.verdict.kind == "instrument", found.verdict.sentence
+    assert [(one.kind, one.y) for one in found.instruments] == [("probe", -0.6)]
+    assert (found.steps, found.places) == ((), ())

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from vegglue.screening.instruments import Instrument, instruments_of, offset_columns
+from vegglue.screening.instruments import Instrument, error_columns, instruments_of, offset_columns
 
 
 def readings(*rows: tuple[str, str, float, float]) -> pd.DataFrame:
@@ -57,3 +57,11 @@ def test_an_offset_is_the_same_in_all_readings_of_an_instrument() -> None:
     some = (Instrument("probe", (0, 3), np.nan, 1.0), Instrument("reading", (2,), 5.0, 1.0))
     assert offset_columns(some, 4).T.tolist() == [[1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]
     assert offset_columns((), 4).shape == (4, 0)
+
+
+def test_a_probe_may_be_off_by_a_factor_too_and_a_gauge_may_not() -> None:
+    value = np.array([0.3, 0.5, 0.7, 0.4])
+    probe, gauge = Instrument("probe", (0, 3), np.nan, 1.0), Instrument("gauge", (1, 2), 2.0, 0.0)
+    assert error_columns(probe, value).T.tolist() == [[1.0, 0.0, 0.0, 1.0], [0.3, 0.0, 0.0, 0.4]]
+    assert error_columns(gauge, value).T.tolist() == [[0.0, 1.0, 1.0, 0.0]]
+    assert error_columns(probe, np.zeros(4)).shape == (4, 1), "of nothing a factor is nothing"

@@ -6,7 +6,7 @@ D are the standard errors of the measurements and s their scale. rho is the corr
 their usual spacing and d_ij the distance between stations i and j, across the channel where they were measured together
 across it. R_ij is 0 between sections, experiments and kinds.
 g is the error of discretisation and c its correlation between two stations. M is the model's own error, see
-`model_error`. A column of O is an instrument found to be off: what all its readings share counts for nothing.
+`model_error`. The columns of O are of instruments found to be off: what their readings share counts for nothing.
 """
 
 import itertools
@@ -37,9 +37,9 @@ SCALE_EVIDENCE = 6.6
 # Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
 # Chosen, not measured: more pairs cost time and guard against a local maximum.
 START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
-# Offset of an instrument that is off, over the largest standard error of its readings [-]: so large that it is free,
+# What an instrument that is off adds, over the largest standard error of its readings [-]: so large that it is free,
 # and the covariance can still be factored.
-UNKNOWN_OFFSET = 1e3
+UNKNOWN_ERROR = 1e3
 # Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
 # decide between some correlation and none. Chosen, not measured: closer levels only cost time.
 CORRELATION_LEVELS, UNCORRELATED_CHANCE = np.linspace(0.05, 0.95, 19), 0.5
@@ -60,7 +60,7 @@ class Noise:
     lower: Array  # lower Cholesky factor of the covariance (n, n)
     correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
     model_error: Array  # M (n, n), zero when the model is taken to be right
-    offsets: Array  # O (n, k), instruments that are off by an unknown amount
+    unknown: Array  # O (n, k), of instruments that are off by an unknown amount [m/s or m]
 
     def used(self, values: Array) -> Array:
         """The rows of the used stations (n, ...) of values of all stations (station, ...)."""
@@ -116,7 +116,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
             lower=np.diag(error),
             correlation_chances=certain,
             model_error=np.zeros((len(used), len(used))),
-            offsets=np.zeros((len(used), 0)),
+            unknown=np.zeros((len(used), 0)),
         )
     )
 
@@ -146,13 +146,13 @@ def with_model_error(noise: Noise, columns: Array) -> Noise:
     return _with_cholesky(replace(noise, model_error=used @ used.T))
 
 
-def with_offset(noise: Noise, readings: np.ndarray) -> Noise:
-    """The noise with one instrument off by an unknown amount, of which all `readings` (indices of used stations) have
-    their share: a single one counts for nothing any more, of several only what differs between them.
+def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
+    """The noise with one instrument off by an unknown amount of each of columns (n, k) [-], zero but in its readings:
+    what they can make counts for nothing any more. See `screening.instruments.error_columns`.
     """
-    column = np.zeros(noise.rows.size)
-    column[readings] = UNKNOWN_OFFSET * noise.error[readings].max()
-    return _with_cholesky(replace(noise, offsets=np.column_stack([noise.offsets, column])))
+    largest = np.where(columns != 0.0, noise.error[:, None], 0.0).max()
+    unknown = UNKNOWN_ERROR * largest * columns / np.abs(columns).max(axis=0)
+    return _with_cholesky(replace(noise, unknown=np.column_stack([noise.unknown, unknown])))
 
 
 def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
@@ -250,7 +250,7 @@ def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E + M + O O' of the used stations (n, n)."""
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
     own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
-    return np.asarray(covariance_of_data(noise) + shared + own + noise.model_error + noise.offsets @ noise.offsets.T)
+    return np.asarray(covariance_of_data(noise) + shared + own + noise.model_error + noise.unknown @ noise.unknown.T)
 
 
 def covariance_of_data(noise: Noise) -> Array:

@@ -106,7 +106,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
 def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    freedom = after.noise.rows.size - after.fitted.point.z.size - len(found.instruments)
+    freedom = after.noise.rows.size - after.fitted.point.z.size - after.noise.unknown.shape[1]
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
         chi2=misfit,

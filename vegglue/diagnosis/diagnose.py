@@ -16,7 +16,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.kept_baselines import kept_baseline
-from vegglue.calibration.noise import with_offset
+from vegglue.calibration.noise import with_unknown_errors
 from vegglue.diagnosis.competition import (
     Contender,
     contenders_of,
@@ -39,7 +39,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
 from vegglue.screening.candidates import candidate_in_case
 from vegglue.screening.evidence import alarm_p
-from vegglue.screening.instruments import Instrument
+from vegglue.screening.instruments import Instrument, error_columns
 from vegglue.screening.residual_screening import Screening, screen
 
 # How often errors alone sound the first alarm; 5 % is usual. Later alarms are sounded five times less often.
@@ -182,11 +182,11 @@ def _without_instrument(
         return None
     watch(Progress(f"setting aside a {best.kind} that is off"))
     base, readings = screening.base, instrument.readings
-    noise = with_offset(base.noise, np.array(readings))
+    noise = with_unknown_errors(base.noise, error_columns(instrument, base.noise.value))
     flagged = (*found.flagged, *(row for row in readings if row not in found.flagged))
     faulty = (*found.instruments, instrument_found(screening, best, instrument))
     following = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
-    # An offset is all but free in the covariance: its prior is charged here, as it was in the competition.
+    # Its errors are all but free in the covariance: their prior is charged here, as it was in the competition.
     charge = Charge(best.name, 0.0, best.log_evidence - (log_evidence(following) - log_evidence(base)))
     found = replace(found, instruments=faulty, flagged=flagged, charges=(*found.charges, charge))
     return Following("instrument", found, following)

@@ -127,7 +127,7 @@ def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, 
         grid_error=noise.grid_error[kept],
         lower=np.asarray(lower),
         model_error=noise.model_error[np.ix_(kept, kept)],
-        offsets=noise.offsets[kept],
+        unknown=noise.unknown[kept],
     )
     return replace(model, case=case, station=model.station[here].reset_index(drop=True)), part
 

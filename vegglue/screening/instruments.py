@@ -1,6 +1,9 @@
 """Instruments that could be off: a reading, a probe at one place or at one y of all sections, a gauge at one place.
 
 value -> value + offset,   the offset the same in all readings of the instrument
+
+By its offset it is found. A probe may be off by a factor, too: once it is set aside neither counts, see
+`error_columns`.
 """
 
 from collections.abc import Mapping
@@ -52,6 +55,16 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
         ),
         "gauge": _shared("gauge", {row: of[row] for row in gauges}, places),
     }
+
+
+def error_columns(instrument: Instrument, value: Array) -> Array:
+    """What an instrument that is off may add to its readings, of measured values (n,): an offset, and for a probe of
+    several readings a factor, value itself (n, 1 or 2).
+    """
+    offset = offset_columns((instrument,), value.size)
+    factor = offset[:, 0] * value
+    is_probe = instrument.kind in ("position", "probe")
+    return np.column_stack([offset, factor]) if is_probe and factor.any() else offset
 
 
 def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
