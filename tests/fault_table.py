@@ -211,10 +211,12 @@ FAULTS = (
     Fault("the clock jumps by twenty years", "simulate", 0, NOTHING, "everything: no time of a file is looked at",
           done_to(ENSEMBLE, lambda path: os.utime(path, (2.5e9, 2.5e9))), 0),
     Fault("the config was changed", "infer", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, "
-          "--members, a data file or vegglue changed since this was made; run `vegglue simulate CONFIG` again.", OLD,
+          "--members, a file it names or vegglue changed since this was made; run `vegglue simulate CONFIG` again.",
+          OLD,
           done_to("brook.yaml", replaced("high: 0.10", "high: 0.12")), 0),
     Fault("a data file was changed", "report", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, "
-          "--members, a data file or vegglue changed since this was made; run `vegglue simulate CONFIG` again.", OLD,
+          "--members, a file it names or vegglue changed since this was made; run `vegglue simulate CONFIG` again.",
+          OLD,
           done_to("velocities.csv", replaced("0.436", "0.437")), 0),
     Fault("fewer members than are there", "simulate --members 8", 2,
           f"{ENSEMBLE}: holds 256 members of this case, which 8 would replace; ask for --members 256, give another "

@@ -59,6 +59,8 @@ def test_a_folder_has_one_digest_until_a_file_in_it_changes(tmp_path: Path) -> N
     (template / "deep").mkdir(parents=True)
     (template / "deep" / "grid.txt").write_text("1", encoding="utf-8")
     before = digest_of(template)
+    (template / "deep" / "__pycache__").mkdir()
+    (template / "deep" / "__pycache__" / "model.cpython-312.pyc").write_bytes(b"left by the first run")
     assert digest_of(template) == before
     (template / "deep" / "grid.txt").rename(template / "grid.txt")
     assert digest_of(template) != before
@@ -77,6 +79,7 @@ def test_a_command_may_have_parameters_that_the_built_in_solver_lacks(tmp_path: 
     [
         ("engine: {command: ''}", "`engine` .* expected a `command` with the name of a program"),
         ("engine: {command: 'run \"it'}", "expected a `command` with quotes in pairs"),
+        ("engine: {command: 'run it | tee log'}", r"expected a `command` without '\|', as no shell reads it"),
         ("engine: {command: 'run {modl}', files: {model: model.py}}", "{modl} names one of `files`: model, python"),
         ("engine: {command: 'run', files: {python: model.py}}", "expected another name than `python` in `files`"),
         (

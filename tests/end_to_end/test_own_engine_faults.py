@@ -92,6 +92,25 @@ def test_where_all_fail_it_is_said_why(
 
 
 @pytest.mark.slow
+def test_members_that_failed_are_run_again_with_force_and_no_other(tmp_path: Path) -> None:
+    """A licence that is there for some members only, at first."""
+    licence = tmp_path / "licence"
+    asks = f"import os\nif not os.path.exists({str(licence)!r}) and phi > 10: raise SystemExit('no licence')\n"
+    marks = slow_brook(tmp_path, 0.0)
+    model = tmp_path / "model.py"
+    model.write_text(model.read_text(encoding="utf-8") + asks, encoding="utf-8")
+    first = shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
+    failed = int(re.search(r"(\d) failed", first)[1])  # type: ignore[index]
+    assert 0 < failed < MEMBERS == len(lines_of(marks))
+    licence.touch()
+    assert "is up to date" in shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
+    again = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
+    assert f"{MEMBERS} members, run by the command, 0 failed" in again
+    assert len(lines_of(marks)) == MEMBERS + failed
+    assert "is up to date" in shell(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
+
+
+@pytest.mark.slow
 def test_a_killed_run_goes_on_and_repeats_no_member(tmp_path: Path) -> None:
     marks = slow_brook(tmp_path, 0.3)
     process = begin(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2)
@@ -115,11 +134,12 @@ def test_a_killed_run_goes_on_and_repeats_no_member(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
-def test_ctrl_c_ends_what_is_under_way(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_or_a_plain_kill_ends_what_is_under_way(how: signal.Signals, tmp_path: Path) -> None:
     marks = slow_brook(tmp_path, 60.0)
     process = begin(tmp_path, "simulate", "brook.yaml", "--trust", "--jobs", 2)
     after_runs(marks, 2, process)
-    os.kill(process.pid, signal.SIGINT)
+    os.kill(process.pid, how)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Stopped; solved members and finished steps are kept" in said

@@ -52,7 +52,7 @@ def test_an_ensemble_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwh
     meanwhile(solve_ensemble, "starts_and_chunks")
     vegglue.simulate(case, jobs=1)
     assert stored_hash(Path("runs/brook/ensemble.h5")) == before != simulation_hash(case)
-    with pytest.raises(InputError, match="a data file or vegglue changed since this was made"):
+    with pytest.raises(InputError, match="a file it names or vegglue changed since this was made"):
         vegglue.infer(case)
 
 

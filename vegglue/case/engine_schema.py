@@ -12,6 +12,8 @@ from vegglue.case.parts import Number, Part, Positive
 # What a word of the command may name in braces beside the files: the Python that runs vegglue.
 PYTHON = "python"
 _PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
+# Words that only a shell understands: a program would be given them as they stand.
+_OF_A_SHELL = ("|", "||", "&", "&&", ";", "<", ">", ">>", "2>", "2>&1")
 
 
 class CommandEngine(Part):
@@ -39,6 +41,9 @@ class CommandEngine(Part):
             raise ValueError(f"a `command` with quotes in pairs ({error})") from None
         if not words:
             raise ValueError("a `command` with the name of a program")
+        for word in words:
+            if word in _OF_A_SHELL:
+                raise ValueError(f"a `command` without {word!r}, as no shell reads it; put it into a script of `files`")
         for name in _PLACEHOLDER.findall(self.command):
             if name not in known:
                 raise ValueError(f"a `command` in which {{{name}}} names one of `files`: {', '.join(known)}")

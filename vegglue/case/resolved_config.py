@@ -66,10 +66,12 @@ def _hash(tree: Tree) -> str:
 
 
 def digest_of(path: Path) -> str:
-    """sha256 of the content of a file; of a folder, of the names and contents of all files below it."""
+    """sha256 of the content of a file; of a folder, of the names and contents of all files below it, but for the
+    bytecode that Python leaves there.
+    """
     if not path.is_dir():
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    below = sorted(file for file in path.rglob("*") if file.is_file())
+    below = sorted(file for file in path.rglob("*") if file.is_file() and file.parent.name != "__pycache__")
     listed = [(file.relative_to(path).as_posix(), hashlib.sha256(file.read_bytes()).hexdigest()) for file in below]
     return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
 

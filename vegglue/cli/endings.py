@@ -1,7 +1,9 @@
 """How a command ends: its exit code, and one sentence where something went wrong; and what it prints to."""
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -13,9 +15,10 @@ KEPT_ANYWAY = "what was finished is kept"
 
 def ending_well(command: Callable[[], object]) -> None:
     """Run a command: errors a user can mend are one sentence and exit code 2, what the machine refuses (a full disk, a
-    lock, no memory) 3, Ctrl-C 130.
+    lock, no memory) 3, Ctrl-C or a plain kill 130.
     """
     _make_printable()
+    _heed_kill()
     try:
         command()
     except InputError as error:
@@ -55,6 +58,12 @@ def _make_printable() -> None:
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:
         reconfigure(errors="replace")
+
+
+def _heed_kill() -> None:
+    """A plain kill, with which queues of clusters end a job at its time, is as Ctrl-C: what was started ends, too."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _flush() -> None:

@@ -35,13 +35,16 @@ def simulate_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """Solve every member of the ensemble; a run that was stopped goes on where it was."""
+    """Solve every member of the ensemble; a run that was stopped goes on where it was.
+
+    With --force, members for which the command of an `engine` failed are run again.
+    """
     case = opened_case(config, trust)
     from vegglue.workflow.run_folder import of_size
-    from vegglue.workflow.simulate import is_simulated, refuse_all_failed
+    from vegglue.workflow.simulate import is_up_to_date, refuse_all_failed
 
     case = of_size(case, members)
-    current = is_simulated(case, runs)
+    current = is_up_to_date(case, runs, force)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
     if as_object:

@@ -113,6 +113,6 @@ def _read(path: Path, expected_hash: str | None, step: str, understand: Callable
         except UNREADABLE as error:
             raise StorageError(f"{path}: is broken or of another version ({error}); remove it and {remedy}.") from error
     raise InputError(
-        f"{path}: expected config hash {wanted[:12]}, found {found[:12]}: the config, --members, a data file or "
-        f"vegglue changed since this was made; {remedy} again."
+        f"{path}: expected config hash {wanted[:12]}, found {found[:12]}: the config, --members, a file "
+        f"it names or vegglue changed since this was made; {remedy} again."
     )

@@ -19,7 +19,7 @@ from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 from vegglue.workflow.infer import chosen_method, infer, is_inferred, needs_ensemble
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of, of_size
-from vegglue.workflow.simulate import is_simulated, refuse_to_shrink, simulate
+from vegglue.workflow.simulate import is_up_to_date, refuse_to_shrink, simulate
 
 Show = Callable[[Case, Any], None]
 
@@ -115,7 +115,7 @@ def _has_posterior(
     folder, ensemble = folder_of(runs, case), None
     if wanted:
         sized = of_size(case, members)
-        current = is_simulated(sized, runs)
+        current = is_up_to_date(sized, runs, force)
         ensemble = simulate(sized, runs=runs, jobs=jobs, watch=watch, force=force)
         show(case, f"{folder / 'ensemble.h5'} is up to date." if current else ensemble)
     if is_inferred(case, runs, members):

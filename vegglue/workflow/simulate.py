@@ -37,8 +37,8 @@ def simulate(
     An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
     ensemble does not depend on; one that was stopped goes on where it was. members: size of the ensemble instead of the
     case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is told how far it is;
-    force: replace a larger ensemble of the case, too. Predictions are (member, station), in m/s for velocities and m
-    for levels.
+    force: replace a larger ensemble of the case, too, and run members again for which the command of an engine failed.
+    Predictions are (member, station), in m/s for velocities and m for levels.
 
     Errors: InputError for a case without parameters, fields beyond their budget, or a larger ensemble there;
     StorageError when another run holds the folder or the disk is full.
@@ -48,7 +48,7 @@ def simulate(
     refuse_to_shrink(case, runs, force)
     if not is_simulated(case, runs):
         _share_one_beside(case, path)
-    if not is_simulated(case, runs):
+    if not is_up_to_date(case, runs, force):
         if case.engine is None:
             solve_ensemble(case, read_observations(case), path, jobs, watch)
         else:
@@ -66,6 +66,15 @@ def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
     except (InputError, StorageError):
         return False
     return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
+
+
+def is_up_to_date(case: Case, runs: Path | str, force: bool) -> bool:
+    """Whether nothing is left to do: the ensemble is there, and no failed run of a command is to be tried again."""
+    if not is_simulated(case, runs):
+        return False
+    if not force or case.engine is None:
+        return True
+    return not (read_ensemble(Path(runs) / case.name / "ensemble.h5").status == FAILED).any()
 
 
 def refuse_to_shrink(case: Case, runs: Path | str, force: bool) -> None:
@@ -112,7 +121,8 @@ def refuse_all_failed(case: Case, ensemble: Ensemble) -> None:
     failed = ensemble.status == FAILED
     if failed.all():
         reason, many = Counter(map(str, ensemble.reason[failed])).most_common(1)[0]
+        again = "" if case.engine is None else " with --force"
         raise InputError(
             f"{shown_path(case.source)}: expected members with a solution, got none of {failed.size:,}; {many:,} of "
-            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again with --force."
+            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
         )
