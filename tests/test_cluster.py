@@ -215,9 +215,23 @@ def test_a_worker_of_another_version_that_comes_later_is_refused(tmp_path: Path)
             side_by_side(abs, [(1,)])
 
 
-@pytest.mark.parametrize("where", ["local:0", "local:", "local:two", "local:-1", "somewhere", "tcp://here", "a b:1"])
+@pytest.mark.parametrize(
+    "where", ["local:0", "local:", "local:two", "local:-1", "somewhere", "tcp://here", "a b:1", "http://here:80"]
+)
 def test_an_address_has_a_port(where: str) -> None:
     with pytest.raises(InputError, match=r"--cluster: expected tcp://HOST:PORT, or local:N .* got "), on_cluster(where):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("where", "sentence"),
+    [
+        ("local:5000", r"--cluster: expected at most local:\d+ on the \d+ cores here, got local:5000\."),
+        ("tls://here:8786", r"--cluster: expected certificates for tls://here:8786, got none in Dask's configuration"),
+    ],
+)
+def test_what_no_cluster_can_be_is_refused_at_once(where: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence), on_cluster(where):
         pass
 
 

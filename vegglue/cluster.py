@@ -16,6 +16,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
+from joblib import cpu_count
+
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, keep_folder_out, no_ctrl_c_for_children, one_thread_for_good, taken
 from vegglue.version import VERSION
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 # How long a scheduler is waited for [s]. Chosen, not measured: long for a network, short for someone who mistyped.
 LONGEST_WAIT = 10
+# Processes of local:N for each core at most. More than one only serves to try how workers come and go.
+EACH_CORE = 16
 # Tasks under way for each thread of a worker [-]: one at work, one that waits beside it. And in all at least, so that
 # workers that come find some.
 EACH_THREAD, AT_LEAST = 2, 16
@@ -75,6 +79,7 @@ def _connected(where: str) -> Iterator["Client"]:
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(DASK_SETTINGS))
         count = _local(where)
+        _refuse_without_certificates(where)
         address = stack.enter_context(_processes_here(count)) if count else where
         try:
             client = Client(address, timeout=LONGEST_WAIT, set_as_default=False)
@@ -116,14 +121,28 @@ def dask_setup(worker: object) -> None:
 
 def _local(where: str) -> int:
     """N of local:N, 0 for an address. Errors: InputError when it is neither."""
-    if re.fullmatch(r"([a-z]+://)?[^\s/]+:\d{1,5}", where) and not where.startswith("local:"):
+    if re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^\s/]+:\d{1,5}", where) and not where.startswith("local:"):
         return 0
     found = re.fullmatch(r"local:([1-9]\d{0,3})", where)
     if found is None:
         raise InputError(
             f"--cluster: expected tcp://HOST:PORT, or local:N with N processes, got {where!r}; e.g. local:2."
         )
-    return int(found[1])
+    count, most = int(found[1]), EACH_CORE * int(cpu_count())
+    if count > most:
+        raise InputError(f"--cluster: expected at most local:{most} on the {cpu_count()} cores here, got {where}.")
+    return count
+
+
+def _refuse_without_certificates(where: str) -> None:
+    """Errors: InputError for an address of TLS where Dask's configuration names no certificate of a client."""
+    from distributed.security import Security
+
+    if where.startswith(("tls:", "wss:")) and Security().get_connection_args("client")["ssl_context"] is None:
+        raise InputError(
+            f"--cluster: expected certificates for {where}, got none in Dask's configuration; name them there, below "
+            "distributed.comm.tls: `ca-file`, and `cert` and `key` of the `client`."
+        )
 
 
 def _first_line(error: BaseException) -> str:

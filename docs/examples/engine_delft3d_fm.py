@@ -23,11 +23,15 @@ from string import Template
 import h5py
 
 TEXT = (".mdu", ".bc", ".ext", ".ini", ".ttd", ".pol", ".xyz")
+ENCODING = "latin-1"  # any, so that letters in comments stay as they are
+READ = ("velocity", "velocity_across", "speed", "level")
 STEADY = 1e-3  # largest change between the last two times that are written [m, m/s]
 
 given = json.loads(Path("parameters.json").read_text(encoding="utf-8"))
 with Path("stations.csv").open(newline="", encoding="utf-8") as file:
     stations = list(csv.DictReader(file))
+if other := sorted({row["kind"] for row in stations} - set(READ)):
+    sys.exit(f"this template reads {', '.join(READ)}; {', '.join(other)} has to be added to it")
 parameters = {name: one["value"] for name, one in given["parameters"].items()}
 
 predictions = {}
@@ -35,7 +39,7 @@ for experiment, flow in given["experiments"].items():
     folder = shutil.copytree(sys.argv[1], Path(experiment))
     values = parameters | {"discharge": sum(flow["discharge"].values()), "level": flow["level"]}
     for file in (file for file in folder.rglob("*") if file.suffix in TEXT):
-        file.write_text(Template(file.read_text(encoding="utf-8")).safe_substitute(values), encoding="utf-8")
+        file.write_text(Template(file.read_text(ENCODING)).safe_substitute(values), ENCODING)
     here = [row for row in stations if row["experiment"] == experiment]
     places = [f"{row['x']} {row['y']} '{row['station']}'\n" for row in here]
     (folder / "stations_obs.xyn").write_text("".join(places), encoding="utf-8")

@@ -31,11 +31,14 @@ VARIABLES = {
     "level": "Water Surface",
 }
 MANNING = 3  # column of Manning's n in the tables of faces
+READ = (*VARIABLES, "speed")
 STEADY = 1e-3  # largest change between the last two times that are written [m, m/s]
 
 given = json.loads(Path("parameters.json").read_text(encoding="utf-8"))
 with Path("stations.csv").open(newline="", encoding="utf-8") as file:
     stations = list(csv.DictReader(file))
+if other := sorted({row["kind"] for row in stations} - set(READ)):
+    sys.exit(f"this template reads {', '.join(READ)}; {', '.join(other)} has to be added to it")
 
 predictions = {}
 for experiment in given["experiments"]:

@@ -26,11 +26,15 @@ from data_manip.extraction.telemac_file import TelemacFile
 
 TEXT = (".cas", ".tbl", ".liq", ".txt")
 VARIABLES = {"velocity": "VELOCITY U", "velocity_across": "VELOCITY V", "level": "FREE SURFACE"}
+ENCODING = "latin-1"  # any, so that letters in comments stay as they are
+READ = (*VARIABLES, "speed")
 STEADY = 1e-3  # largest change between the last two records [m, m/s]
 
 given = json.loads(Path("parameters.json").read_text(encoding="utf-8"))
 with Path("stations.csv").open(newline="", encoding="utf-8") as file:
     stations = list(csv.DictReader(file))
+if other := sorted({row["kind"] for row in stations} - set(READ)):
+    sys.exit(f"this template reads {', '.join(READ)}; {', '.join(other)} has to be added to it")
 parameters = {name: one["value"] for name, one in given["parameters"].items()}
 
 predictions = {}
@@ -38,7 +42,7 @@ for experiment, flow in given["experiments"].items():
     folder = copytree(sys.argv[1], Path(experiment))
     values = parameters | {"discharge": sum(flow["discharge"].values()), "level": flow["level"]}
     for file in (file for file in folder.rglob("*") if file.suffix in TEXT):
-        file.write_text(Template(file.read_text(encoding="utf-8")).safe_substitute(values), encoding="utf-8")
+        file.write_text(Template(file.read_text(ENCODING)).safe_substitute(values), ENCODING)
 
     subprocess.run(["telemac2d.py", "model.cas", "--ncsize=1"], cwd=folder, check=True)
 

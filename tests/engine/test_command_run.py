@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -115,6 +116,22 @@ def test_what_an_earlier_run_has_left_is_taken_away(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "predictions.csv").write_text("station,prediction\n0,1\n1,1\n", encoding="utf-8")
     assert ended(tmp_path, "pass").reason == "the command ended well and left no predictions.csv"
+
+
+def test_one_that_was_left_behind_and_writes_on_is_no_obstacle(tmp_path: Path) -> None:
+    """As after a kill by force; it began in the same folder and goes on in it, wherever that is now."""
+    (tmp_path / "run").mkdir()
+    forever = "import itertools, pathlib\nfor i in itertools.count(): pathlib.Path(f'{i % 100}.txt').write_text('')"
+    left = subprocess.Popen([sys.executable, "-c", forever], cwd=tmp_path / "run")
+    try:
+        while not (tmp_path / "run" / "99.txt").exists():
+            time.sleep(0.01)
+        for _ in range(5):
+            assert ended(tmp_path, GOOD).reason == ""
+        assert sorted(os.listdir(tmp_path / "run")) == ["command.log", "given.txt", "predictions.csv"]
+    finally:
+        left.kill()
+        left.wait()
 
 
 def test_parameters_say_all_that_a_model_needs(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -21,8 +22,8 @@ from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 LOG_FILE = "command.log"
 # How often a running command is looked at [s]. Chosen: short against any run of a flow model, and hardly any work.
 LOOK_EVERY = 0.05
-# Signs of the last line of the log that a reason quotes: a reason of an ensemble has room for 240.
-QUOTED = 90
+# Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
+QUOTED = 160
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ def run_command_once(
     Errors: StorageError when the folder cannot be written.
     """
     with failed_writes_told(folder, MAKE_ROOM):
-        if folder.exists():  # what a run that was killed has left; one that still writes there then writes nowhere
-            shutil.rmtree(folder)
+        if folder.exists():
+            _clear_away(folder)
         folder.mkdir(parents=True)
         for name, text in given.items():
             (folder / name).write_text(text, encoding="utf-8")
@@ -56,6 +57,13 @@ def run_command_once(
         except BadPredictionsError as error:
             reason = str(error)
     return CommandEnd(None, reason, time.monotonic() - began)
+
+
+def _clear_away(folder: Path) -> None:
+    """Remove what a killed run has left. One that still writes there then writes beside, until it ends by itself."""
+    aside = Path(tempfile.mkdtemp(prefix="left-", dir=folder.parent))
+    folder.rename(aside / folder.name)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) -> str:
