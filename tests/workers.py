@@ -53,10 +53,20 @@ def workers_in(folder: Path, count: int) -> Iterator[Workers]:
         workers = Workers(_address(at), folder, begun)
         for _ in range(count):
             workers.begin()
+        if count:
+            _wait_for(workers.address, count)
         yield workers
     finally:
         for process in begun:
             _end(process)
+
+
+def _wait_for(address: str, count: int) -> None:
+    """Until so many serve: what a test asks of all would be asked of none before."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=LONGEST_START)
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

@@ -16,10 +16,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from joblib import cpu_count
-
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, keep_folder_out, no_ctrl_c_for_children, one_thread_for_good, taken
+from vegglue.parallel import at_most, cores_allowed, keep_folder_out, no_ctrl_c_for_children, one_thread_for_good, taken
 from vegglue.version import VERSION
 
 if TYPE_CHECKING:
@@ -128,9 +126,9 @@ def _local(where: str) -> int:
         raise InputError(
             f"--cluster: expected tcp://HOST:PORT, or local:N with N processes, got {where!r}; e.g. local:2."
         )
-    count, most = int(found[1]), EACH_CORE * int(cpu_count())
+    count, most = int(found[1]), EACH_CORE * cores_allowed()
     if count > most:
-        raise InputError(f"--cluster: expected at most local:{most} on the {cpu_count()} cores here, got {where}.")
+        raise InputError(f"--cluster: expected at most local:{most} on the {cores_allowed()} cores here, got {where}.")
     return count
 
 

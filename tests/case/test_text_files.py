@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vegglue.case.text_files import case_name, write_text
+from vegglue.case.text_files import case_name, names_in_files, write_text
 from vegglue.errors import StorageError
 
 
@@ -36,3 +36,13 @@ def test_what_cannot_be_written_is_told_and_leaves_the_old(tmp_path: Path, monke
 def test_any_words_become_the_name_of_a_case(words: str, name: str) -> None:
     assert case_name(words) == name
     assert len(case_name(words * 100)) <= 100
+
+
+def test_no_two_names_come_to_the_same_file() -> None:
+    """Where case does not count either, and for letters of any script."""
+    names = ["June", "june", "June!", "高", "低", "+1", "-1", "***", "", "x" * 300, "x" * 301]
+    found = names_in_files(names)
+    assert list(found) == names
+    assert len({name.casefold() for name in found.values()}) == len(names)
+    assert (found["June"], found["june"], found["高"], found["***"]) == ("june", "june-2", "高", "case")
+    assert max(len(name) for name in found.values()) < 60

@@ -194,6 +194,25 @@ def test_a_command_that_ignores_its_parameters_is_refused(
     assert "expected a command of `engine` whose predictions change with n_b or phi, got the same ones" in said
 
 
+# As SMOOTH, with errors of 20 mm/s that are the same for the same parameters.
+RESTLESS = SMOOTH.replace("+ float(row['x'])", "+ error(row) + float(row['x'])").replace(
+    "with open",
+    "import random\ndef error(row): return random.Random(f'{n} {phi} {row}').gauss(0.0, 0.02)\nwith open",
+    1,
+)
+
+
+@pytest.mark.slow
+def test_a_command_that_never_rests_gets_no_verdict(tmp_path: Path) -> None:
+    """Its differences are noise, which was told as friction and water that are not there."""
+    error = ("experiment: June}", "experiment: June, standard_error: 0.05}")
+    case = commanded(tmp_path, RESTLESS, "", COARSE, SMALL, error)
+    found = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1).verdict
+    assert found.kind == "cannot-tell"
+    assert "did not settle. Its differences in" in found.sentence
+    assert "`engine.step` larger. What was found with it: " in found.sentence
+
+
 @pytest.mark.slow
 def test_a_command_far_from_what_was_reckoned_with_gets_no_verdict(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

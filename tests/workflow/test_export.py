@@ -153,6 +153,15 @@ def test_only_some_forms_and_a_case_without_a_frame(tmp_path: Path) -> None:
     assert "east [m]" not in pd.read_csv(found.files[0]).columns
 
 
+def test_experiments_that_differ_in_case_alone_have_files_of_their_own(tmp_path: Path) -> None:
+    """One overwrote the other, and the list named the file twice."""
+    twice = ("  June: {", "  june: {discharge: 1.0, level: 0.9}\n  June: {")
+    case = load_case(write_reach(tmp_path, COARSE, twice))
+    tables = [path for path in export(case, runs=tmp_path / "runs", forms=("csv",)).files if "flow" in path.name]
+    assert [path.name for path in tables] == ["flow-june.csv", "flow-june-2.csv"]
+    assert tables[0].read_bytes() != tables[1].read_bytes()
+
+
 def test_a_posterior_of_another_state_is_told(tmp_path: Path) -> None:
     """It was passed over in silence, and what came out was written over the export of before."""
     case = load_case(write_reach(tmp_path, COARSE))

@@ -2,6 +2,8 @@
 
 import re
 import stat
+from collections.abc import Iterable
+from itertools import chain, count
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
@@ -10,6 +12,7 @@ from vegglue.whole_files import write_file
 # Most that a small result as JSON may take [bytes]; vegglue writes some tens of thousands.
 LARGEST_JSON = 10_000_000
 LONGEST_NAME = 100  # letters of the name of a case, as in its schema
+LONGEST_IN_FILES = 50  # letters of a name in that of a file, which has room for 255 bytes; a letter takes up to four
 # Signs that no text of a case may hold: control characters but tabs and ends of lines, halves of characters (which no
 # file can hold), and marks that turn the direction of what follows.
 UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
@@ -67,3 +70,16 @@ def case_name(words: str, otherwise: str = "case") -> str:
     otherwise: the name when nothing is left.
     """
     return re.sub(r"[^a-z0-9_-]+", "-", words.lower()).strip("-")[:LONGEST_NAME] or otherwise
+
+
+def names_in_files(names: Iterable[str]) -> dict[str, str]:
+    """What each of some names is called in files: in lower case, with hyphens for what is no letter, digit or _.
+
+    Letters of all scripts stay. Those that come to be the same, June and june, get a number from the second on.
+    """
+    found = dict[str, str]()
+    for name in names:
+        stem = re.sub(r"[^\w-]+", "-", name.lower()).strip("-")[:LONGEST_IN_FILES] or "case"
+        numbered = (f"{stem}-{number}" for number in count(2))
+        found[name] = next(one for one in chain([stem], numbered) if one not in found.values())
+    return found

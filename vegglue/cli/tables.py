@@ -58,6 +58,11 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
     )
 
 
+def _error(value: float) -> str:
+    """An error [m/s or m]; - where there is nothing that it could be of."""
+    return "-" if np.isnan(value) else f"{value:.4f}"
+
+
 def show_ladder(found: Comparison) -> None:
     """The error ladder as a table, what it leaves out, and which parameters differ between experiments."""
     rungs, note = found.rungs, exclusion_in_words(found.left_out)
@@ -70,11 +75,11 @@ def show_ladder(found: Comparison) -> None:
         gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
         seen, scores = one.in_sample, one.predictive
         rows.append((
-            one.name, str(len(one.values)), f"{seen.rmse[STREAMWISE]:.4f}", f"{seen.rmse[WATER_LEVEL]:.4f}",
-            *(f"{seen.rmse[kind.name]:.4f}" for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
-            f"{held_out_rmse(one):.4f}", gain, f"{held_out_rmse(one, 'experiments'):.4f}",
+            one.name, str(len(one.values)), _error(seen.rmse[STREAMWISE]), _error(seen.rmse[WATER_LEVEL]),
+            *(_error(seen.rmse[kind.name]) for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
+            _error(held_out_rmse(one)), gain, _error(held_out_rmse(one, "experiments")),
             f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}",
-            *([f"{one.validation:.4f}"] if validated else []),
+            *([_error(one.validation)] if validated else []),
         ))  # fmt: skip
     print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
     if rungs:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from vegglue.case.text_files import names_in_files
 from vegglue.figures.plan_view import Gauges, Outline, PlanWindow, draw_plan, draw_reach, stretch_of, wet_window
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
@@ -21,6 +22,7 @@ REACH_MARGIN = 8.0
 def plans(run: Run, experiment: str) -> Iterator[Picture]:
     """The reach of patches and stations, and the whole channel."""
     flow, table = run.flow[experiment], run.observations.table
+    called = names_in_files(run.case.experiments)[experiment]
     rows = table[table["experiment"] == experiment]
     stations = rows[["x", "y"]].drop_duplicates().to_numpy(float)
     patches = _outlines(run, experiment)
@@ -31,12 +33,12 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
         window = wet_window(flow, reach)
         drawn = draw_reach(flow, window, patches, stations, stamp(run.case))
         alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
-        yield published_svg(run, drawn, f"reach-{experiment}", _reach_caption(run, experiment, window), alt)
+        yield published_svg(run, drawn, f"reach-{called}", _reach_caption(run, experiment, window), alt)
     gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
     drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
     caption = _channel_caption(flow, experiment, _of_engine(run))
-    yield published_svg(run, drawn, f"channel-{experiment}", caption, alt)
+    yield published_svg(run, drawn, f"channel-{called}", caption, alt)
 
 
 def _outlines(run: Run, experiment: str) -> list[Outline]:

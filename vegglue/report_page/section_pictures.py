@@ -118,9 +118,9 @@ def _drawn(
 
 def _unused(words: str, taken: set[str]) -> str:
     name, number = file_name(words), 2
-    while name in taken:
+    while name.casefold() in taken:  # some disks know no upper case
         name, number = f"{file_name(words)}-{number}", number + 1
-    taken.add(name)
+    taken.add(name.casefold())
     return name
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.frame import Frame
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import names_in_files
 from vegglue.flow.sensor import FlowFields
 from vegglue.site.centreline import heading_at, on_map
 from vegglue.site.grid import Grid
@@ -62,13 +62,13 @@ def write_mesh(
     """
     xarray = extra_library("xarray", "field", "vegglue export")
     extra_library(ENGINE, "field", "vegglue export")
-    variables = _mesh(grid, frame)
+    variables, called = _mesh(grid, frame), names_in_files(flows)
     for experiment, flow in flows.items():
         for name, values in quantities(flow, grid, frame).items():
             words, unit = QUANTITIES_OF_FLOW[name]
             at_faces = {"mesh": "mesh", "location": "face", "coordinates": "face_x face_y", "grid_mapping": "map"}
             told = {"long_name": f"{words}, {experiment}", "units": unit, **at_faces}
-            variables[f"{name}_{case_name(experiment)}"] = ("face", values.ravel(), told)
+            variables[f"{name}_{called[experiment]}"] = ("face", values.ravel(), told)
     dataset = xarray.Dataset(variables, attrs={"Conventions": "CF-1.8 UGRID-1.0", **attributes})
     with failed_writes_told(path, MAKE_ROOM), TemporaryDirectory() as folder:  # the library writes to a name only
         whole = Path(folder) / path.name

@@ -33,6 +33,7 @@ CLOSE_ENOUGH = 0.5
 # Standard errors by which it may differ before no verdict is believed: larger than what names rest on. Chosen after a
 # command that gave the same numbers for all parameters was told as water that enters the channel.
 BEYOND_BELIEF = 3.0
+TO_CALM = "let its flow come to rest, or set `engine.step` larger"
 
 
 def with_command(model: Model, folder: Path, watch: Watch = silent) -> Model:
@@ -81,23 +82,37 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
         said.append(f"At the parameters found last it differs from what was reckoned with by {off:.2f} errors{doubt}.")
     if place.rough:
-        said.append(
-            f"Its differences in {' and '.join(place.rough)} are mostly noise: let its flow come to rest, or set "
-            "`engine.step` larger."
-        )
+        said.append(f"{_noisy(place)}: {TO_CALM}.")
     if not place.settled:
         said.append("The search for its best place did not settle: its predictions may be rough.")
-    told = found.verdict if off <= BEYOND_BELIEF else _disbelieved(found.verdict, off)
+    doubt = _reason_not_to_believe(place, off)
+    told = found.verdict if not doubt else _disbelieved(found.verdict, doubt)
     return replace(found, verdict=replace(told, remarks=(" ".join(said), *told.remarks)))
 
 
-def _disbelieved(verdict: Verdict, off: float) -> Verdict:
+def _noisy(place: CommandPlace) -> str:
+    return f"Its differences in {' and '.join(place.rough)} are mostly noise"
+
+
+def _reason_not_to_believe(place: CommandPlace, off: float) -> str:
+    """Why no verdict rests on what the command says, '' when one may; off: from what was reckoned with [errors].
+
+    Noise in differences alone is a caution, as of a parameter that hardly matters; with a search that did not settle
+    it has led astray, a command with noise of a third of an error to friction that was not there.
+    """
+    if off > BEYOND_BELIEF:
+        return (
+            "at the parameters found last the command of `engine` differs from what was reckoned with by "
+            f"{off:.1f} errors; see whether it reads its parameters, and comes to rest"
+        )
+    if place.rough and not place.settled:
+        return f"the search for the best place of the command did not settle. {_noisy(place)}: {TO_CALM}"
+    return ""
+
+
+def _disbelieved(verdict: Verdict, why: str) -> Verdict:
     """The verdict on numbers that the command does not give."""
-    sentence = (
-        "These data cannot tell: at the parameters found last the command of `engine` differs from what was reckoned "
-        f"with by {off:.1f} errors; see whether it reads its parameters, and comes to rest. What was found with it: "
-        f"{verdict.sentence}"
-    )
+    sentence = f"These data cannot tell: {why}. What was found with it: {verdict.sentence}"
     return replace(verdict, kind="cannot-tell", sentence=sentence)
 
 

@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import refuse_without_parameters, theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import names_in_files
 from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.first_use import with_compilation
 from vegglue.ensemble.solve_ensemble import solve_flow
@@ -101,8 +101,9 @@ def _csv(case: Case, flows: dict[str, FlowFields], predicted: Array | None, into
         stations, {name: table[name].to_numpy() for name in table}, predicted, build_grid(case), case.frame
     )
     paths = [stations]
+    called = names_in_files(flows)
     for name, flow in flows.items():
-        paths.append(into / f"flow-{case_name(name)}.csv")
+        paths.append(into / f"flow-{called[name]}.csv")
         write_field_table(paths[-1], flow, build_grid(case), case.frame)
     return paths
 
@@ -112,9 +113,10 @@ def _geotiff(case: Case, flows: dict[str, FlowFields], predicted: Array | None, 
     grid, paths = build_grid(case), list[Path]()
     if grid.centreline is not None:
         return []
+    called = names_in_files(flows)
     for experiment, flow in flows.items():
         for name, values in quantities(flow, grid, case.frame).items():
-            paths.append(into / f"{name}-{case_name(experiment)}.tif")
+            paths.append(into / f"{name}-{called[experiment]}.tif")
             write_geotiff(paths[-1], values, grid, case.frame)
     return paths
 
