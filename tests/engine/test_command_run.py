@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import commanded
 
+from vegglue.engine import command_run
 from vegglue.engine.command_files import (
     BadPredictionsError,
     parameters_text,
@@ -104,6 +105,13 @@ def test_a_run_that_takes_too_long_is_ended_with_all_it_has_started(tmp_path: Pa
     while is_alive(child) and time.monotonic() < until:
         time.sleep(0.02)
     assert not is_alive(child)
+
+
+def test_a_run_that_prints_without_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_run, "LONGEST_LOG", 10_000_000)
+    end = ended(tmp_path, "while True: print('no end', flush=True)")
+    assert end.reason == "the command printed more than 0.01 GB and was stopped"
+    assert not (tmp_path / "run" / "command.log").exists()
 
 
 def test_a_run_that_nobody_waits_for_any_more_is_ended(tmp_path: Path) -> None:

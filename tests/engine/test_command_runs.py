@@ -49,6 +49,18 @@ def test_what_has_run_is_not_run_again(tmp_path: Path) -> None:
     assert sorted(path.suffix for path in visible(runs)) == [".json"] * 3, "folders of good runs are gone"
 
 
+def test_a_model_that_is_edited_while_it_runs_is_told_and_not_kept(tmp_path: Path) -> None:
+    """What ran before is kept as that of the model that it was then."""
+    case, runs, _ = counting(tmp_path)
+    command_predictions(runs, case, table_of(case), THETAS[:1])
+    model = tmp_path / "model.py"
+    model.write_text(model.read_text(encoding="utf-8") + "# edited\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"expected `model` \(.*model\.py\) to stay while vegglue runs"):
+        command_predictions(runs, case, table_of(case), THETAS)
+    command_predictions(command_runs(case, tmp_path / "runs"), case, table_of(case), THETAS)
+    assert sorted(path.suffix for path in visible(runs)).count(".json") == 1 + len(THETAS)
+
+
 def test_predictions_are_those_of_their_parameters(tmp_path: Path) -> None:
     case, runs, _ = counting(tmp_path)
     found, _ = command_predictions(runs, case, table_of(case), THETAS)

@@ -71,9 +71,20 @@ def digest_of(path: Path) -> str:
     """
     if not path.is_dir():
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    below = sorted(file for file in path.rglob("*") if file.is_file() and file.parent.name != "__pycache__")
-    listed = [(file.relative_to(path).as_posix(), hashlib.sha256(file.read_bytes()).hexdigest()) for file in below]
+    listed = [
+        (file.relative_to(path).as_posix(), hashlib.sha256(file.read_bytes()).hexdigest()) for file in _files_in(path)
+    ]
     return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
+
+
+def last_changes(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Of the files that `digest_of` reads: name, time of the last change [ns] and size [bytes]; they are not read."""
+    stats = [(file.as_posix(), file.stat()) for file in (_files_in(path) if path.is_dir() else [path])]
+    return tuple((name, found.st_mtime_ns, found.st_size) for name, found in stats)
+
+
+def _files_in(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != "__pycache__")
 
 
 def _relative(file: Path, source: Path) -> str:

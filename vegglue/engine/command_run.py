@@ -20,6 +20,8 @@ from vegglue.engine.command_files import PREDICTIONS_FILE, BadPredictionsError, 
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 LOG_FILE = "command.log"
+# Most that a command may say [bytes]. Chosen: more than any model prints, and no disk is full before it is noticed.
+LONGEST_LOG = 1_000_000_000
 # How often a running command is looked at [s]. Chosen: short against any run of a flow model, and hardly any work.
 LOOK_EVERY = 0.05
 # Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
@@ -81,11 +83,14 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
         except OSError as error:
             return f"the command cannot be started: {error.strerror} ({words[0]})"
         try:
-            code = _waited_for(process, time.monotonic() + timeout, stop)
+            code = _waited_for(process, time.monotonic() + timeout, stop, log.fileno())
         finally:
             _end_all(process)
     if stop.is_set():
         return "the command was stopped"
+    if code is None and (folder / LOG_FILE).stat().st_size > LONGEST_LOG:
+        (folder / LOG_FILE).unlink()
+        return f"the command printed more than {LONGEST_LOG / 1e9:g} GB and was stopped"
     if code is None:
         return f"the command did not end within {timeout:g} s and was stopped"
     if code:
@@ -94,9 +99,9 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
     return ""
 
 
-def _waited_for(process: "subprocess.Popen[bytes]", until: float, stop: Event) -> int | None:
-    """The exit code; None when it was not there in time."""
-    while not stop.is_set():
+def _waited_for(process: "subprocess.Popen[bytes]", until: float, stop: Event, log: int) -> int | None:
+    """The exit code; None when it was not there in time, or its log grew too long."""
+    while not stop.is_set() and os.fstat(log).st_size <= LONGEST_LOG:
         left = until - time.monotonic()
         if left <= 0.0:
             return None

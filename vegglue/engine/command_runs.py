@@ -24,7 +24,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.consistency import values
 from vegglue.case.engine_schema import CommandEngine
-from vegglue.case.resolved_config import digest_of
+from vegglue.case.resolved_config import digest_of, last_changes
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.engine.command_files import PARAMETERS_FILE, STATIONS_FILE, parameters_text, stations_text
@@ -36,15 +36,19 @@ from vegglue.storage.lock import hold_lock
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 OneTheta = Mapping[str, float]
+Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
 
 
 @dataclass(frozen=True)
 class CommandRuns:
-    """A command that is ready to run: its words, a digest of it and of its files, and where its runs are kept."""
+    """A command that is ready to run: its words, a digest of it and of its files, when each of these was changed, and
+    where its runs are kept.
+    """
 
     settings: CommandEngine
     words: tuple[str, ...]
     digest: str
+    changed: Changes
     folder: Path
 
 
@@ -67,9 +71,25 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
             f"{shown_path(case.source)}: `engine.command` expected a program that can be run, got {words[0]!r}; "
             "install it, give its full path, or name it in `engine.files` and make it executable."
         )
+    changed = _changes(settings)  # first: what changes while it is read is noticed
     content = [settings.command, {name: digest_of(path) for name, path in settings.files.items()}]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
-    return CommandRuns(settings, words, digest, folder.resolve() / "engine")
+    return CommandRuns(settings, words, digest, changed, folder.resolve() / "engine")
+
+
+def _changes(settings: CommandEngine) -> Changes:
+    return {name: last_changes(path) for name, path in settings.files.items()}
+
+
+def _refuse_changed(runs: CommandRuns) -> None:
+    """Errors: InputError when a file of the command is another than when its digest was made."""
+    now = _changes(runs.settings)
+    for name, path in runs.settings.files.items():
+        if now[name] != runs.changed[name]:
+            raise InputError(
+                f"engine.files: expected `{name}` ({shown_path(path)}) to stay while vegglue runs, but it was changed; "
+                "what ran before is kept with what it was then. Run the same command again."
+            )
 
 
 def own_parameters(case: Case) -> tuple[str, ...]:
@@ -169,6 +189,7 @@ def _run(runs: CommandRuns, key: str, given: Mapping[str, str], stations: int, s
     end = run_command_once(runs.words, folder, given, stations, settings.timeout, stop)
     if end.prediction is None:
         return end
+    _refuse_changed(runs)
     text = json.dumps({"prediction": end.prediction.tolist(), "seconds": round(end.seconds, 3)})
     write_text(runs.folder / f"{key}.json", text, MAKE_ROOM)
     if settings.keep == "failed":
