@@ -1,6 +1,8 @@
 """The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
 
-    M = sum_k s_f^2 T_k T_k' + sum_k s_b^2 B_k B_k' + S                      S: see site_error.py
+    M = (s_f^2 / v) sum_k T_k T_k' + (s_b^2 / v) sum_k B_k B_k' + S,   v = mean over cells of sum_k bump_k^2 [-]
+
+S: see site_error.py.
 
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
@@ -35,7 +37,7 @@ TERM_OF: dict[str, Term] = {
     "unlisted_viscosity": "viscosity",
 }
 # Radius of a bump over the half width of the floor [-]: friction differs from one stone, tuft or stem count to the
-# next, a survey from one line of points to the next, about half a width. Chosen, not measured.
+# next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
 # What a spot leaves of an object of another shape, over the size of the spot [-], and how far around it, over its size.
 # Chosen, not measured, after open-f: beside the spot two more places were accepted there without it, and none with it.

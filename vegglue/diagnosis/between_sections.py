@@ -1,6 +1,6 @@
 """How wrong a calibrated model may be where nobody measured: halfway between the sections, and beyond the last.
 
-    e = y - f(z) there,   r = residual at the stations,   C = cov + J J',   c = J_e J' + M_e M'
+    e = y - f(z) there,   r = residual at the stations,   C = cov + J J',   c = J J_e' + M M_e'
     e ~ N(-J_e z + c' C^-1 (r + J z),   J_e J_e' + M_e M_e' - c' C^-1 c)
 
 Before the data parameters are standard normal, and the model and its site err as `model_error` allows: M are the

@@ -6,8 +6,8 @@ with g a pure number of the size of 1, to first order a factor 1 + a g. The last
 velocity does not carry, (exp(a g) - 1) h U U, as `dispersion` is with a constant.
 
 A law is a term, a quantity and a form: friction of the banks, with the speed, as a step. exp keeps every term above 0.
-Quantities q are measured by a reference r, the middle of what the data have seen; a form makes g of q and r, 0 or
-nearly so at q = r, so that a law does not stand in for the calibrated coefficient of its term. Each law is an effect
+Quantities q are measured by a reference r, a quantile of what the data have seen; a form makes g of q and r, which is 0
+at q = r, or 1 there (or at q = 0) and falls off. Each law is an effect
 as any other, with the tag `law`, which the search of a diagnosis leaves out. A product c g_1 g_2 is a law beside the
 law a g_1 that it belongs to: what the one quantity does then changes evenly with another.
 """

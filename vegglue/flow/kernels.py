@@ -250,8 +250,8 @@ def _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend):
                 if y.size:
                     across[i, j, k] = depth[i, j, k] * y[i, j, k]
                 if xy.size:
-                    north = lift_n * xy[i, j + 1, k] if j + 1 < ny else 0.0
-                    south = lift_s * xy[i, j - 1, k] if j > 0 else 0.0
+                    north = lift_n * xy[i, j + 1, k] if j + 1 < ny else -xy[i, j, k]  # none through the side
+                    south = lift_s * xy[i, j - 1, k] if j > 0 else -xy[i, j, k]
                     along[i, j, k] -= (north - south) / (2.0 * dy)
                     if nx > 1:
                         across[i, j, k] -= (xy[after, j, k] - xy[before, j, k]) / ((after - before) * dx * stretch)

@@ -1,7 +1,8 @@
 """The problem of the flow, all that its equations need, and the layout of a state, what they are solved for.
 
     dh/dt + d(hu)/dx + d(hv)/dy = 0
-    du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - div(h nu grad u)/h = f        (v alike)
+    du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - [dT_xx/dx + dT_xy/dy] / h = f        (v alike)
+    T_xx = 2 h nu du/dx,  T_xy = h nu (du/dy + dv/dx)
 
 with k = g / (C^2 h) [1/m] from the friction laws where all of a cell is wet. On a grid along a centreline of curvature
 kappa, x along it and y across, J = 1 - y kappa (Smith and McLean 1984, doi:10.1029/WR020i009p01301; not checked against
