@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -27,6 +28,7 @@ def test_an_instrument_that_is_off_is_set_aside_alone(name: str, kind: str, offs
     assert found.verdict.kind == "instrument", found.verdict.sentence
     assert (faulty.kind, found.steps, found.places) == (kind, (), ())
     assert faulty.interval95[0] <= offset <= faulty.interval95[1]
+    assert np.isnan(faulty.factor), "it reads too much by the same everywhere"
 
 
 def test_of_a_probe_that_is_off_by_a_factor_nothing_is_left(campaigns: Path) -> None:
@@ -40,4 +42,6 @@ def test_of_a_probe_that_is_off_by_a_factor_nothing_is_left(campaigns: Path) -> 
     found = diagnose(load_case(config), runs=campaigns / "runs", watch=print)
     assert found.verdict.kind == "instrument", found.verdict.sentence
     assert [(one.kind, one.y) for one in found.instruments] == [("probe", -0.6)]
+    assert found.instruments[0].factor == pytest.approx(1.5, abs=0.05)
+    assert "rather by a factor of 1.5" in found.verdict.sentence
     assert (found.steps, found.places) == ((), ())

@@ -107,7 +107,8 @@ def _instrument_words(one: FaultyInstrument) -> str:
         "gauge": f"The gauge at {where} m is off in all experiments",
     }[one.kind]
     low, high = one.interval95
-    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}); it was set aside"
+    rather = "" if np.isnan(one.factor) else f", rather by a factor of {one.factor:.3g} than by the same everywhere"
+    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}){rather}; it was set aside"
 
 
 def _where(x: float, y: float) -> str:

@@ -8,14 +8,14 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2
-from vegglue.diagnosis.competition import Contender, chances_of
+from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.refits import Refit
 from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 from vegglue.screening import score_test
 from vegglue.screening.evidence import prior_shrinkage
-from vegglue.screening.instruments import Instrument
+from vegglue.screening.instruments import Instrument, error_columns
 from vegglue.screening.residual_screening import Screening
 
 # Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
@@ -132,7 +132,22 @@ def instrument_found(screening: Screening, best: Contender, one: Instrument) -> 
         interval95=(offset - NORMAL95 * spread, offset + NORMAL95 * spread),
         unit=kind_of(str(station["kind"])).unit,
         log_factor=best.log_evidence,
+        factor=_factor(screening, one),
     )
+
+
+def _factor(screening: Screening, one: Instrument) -> float:
+    """What a probe reads over what is there [-], NaN where an offset explains its readings as well, to LEAST_ODDS."""
+    noise, point = screening.base.noise, screening.base.fitted.point
+    columns = error_columns(one, noise.value)
+    if columns.shape[1] < 2:
+        return float("nan")
+    residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
+    projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
+    offset, factor = score_test.scores(projected, np.zeros(2))
+    if 0.5 * (factor**2 - offset**2) < np.log(LEAST_ODDS):
+        return float("nan")
+    return float(1.0 / (1.0 - factor / projected.length[1]))
 
 
 def rivals_among(

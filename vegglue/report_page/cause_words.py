@@ -124,7 +124,12 @@ def likelier_place_in_words(step: Step) -> str:
 
 def instrument_in_words(one: FaultyInstrument) -> str:
     """Which, where, by how much (HTML)."""
-    return f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}, by {short(one.offset, 2)}{NARROW}{unit_html(one.unit)}"
+    return f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}, by {_offset(one)}"
+
+
+def _offset(one: FaultyInstrument) -> str:
+    rather = "" if np.isnan(one.factor) else f", rather by a factor of {short(one.factor, 2)}"
+    return f"{short(one.offset, 2)}{NARROW}{unit_html(one.unit)}{rather}"
 
 
 def place_rows(diagnosis: Diagnosis) -> list[PlaceRow]:
@@ -152,7 +157,7 @@ def instrument_rows(diagnosis: Diagnosis) -> list[InstrumentRow]:
             what=OF_KIND[one.kind],
             where=where(one.x, one.y),
             readings=count(len(one.stations), "reading"),
-            offset=f"{short(one.offset, 2)}{NARROW}{unit_html(one.unit)}",
+            offset=_offset(one),
             interval=interval(*one.interval95),
             odds=odds_in_words(float(np.exp(min(one.log_factor, np.log(2 * TOLD_ODDS))))),
         )

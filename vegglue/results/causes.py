@@ -62,7 +62,8 @@ class FaultyInstrument:
     """An instrument found to be off, whose readings were set aside: a reading, a position, a probe or a gauge.
 
     x, y: where it stood [m], NaN where it stood at several; stations: rows of its readings; offset: what it shows too
-    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-].
+    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-]; factor: what
+    it shows over what is there [-], NaN where that explains its readings no better than an offset.
     """
 
     kind: str
@@ -73,6 +74,7 @@ class FaultyInstrument:
     interval95: tuple[float, float]
     unit: str
     log_factor: float
+    factor: float = float("nan")
 
 
 @dataclass(frozen=True)
