@@ -7,7 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.flow import kernels, wet_and_dry
 from vegglue.flow.closures import Closures, closures, wall_rates
-from vegglue.flow.problem import ALONG, EMPTY, LEVEL, InflowSegment, Problem
+from vegglue.flow.problem import ALONG, EMPTY, LEVEL, InflowSegment, Problem, above_bed
 from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 
@@ -93,9 +93,7 @@ def all_depths(problem: Problem, level: Array) -> tuple[Array, Array, Array, Arr
 
 def storage(problem: Problem, level: Array) -> Array:
     """dh/dz_s of every cell [-], (nx, ny, m): the share of it that is wet."""
-    above = level - problem.bed[:, :, None] - FILM_ON_LAND * problem.film
-    if problem.bed_rise.size:
-        above = above - problem.bed_rise
+    above = above_bed(problem, level) - FILM_ON_LAND * problem.film
     half_range = problem.bed_half_range[:, :, None]
     return np.clip(0.5 * (above + half_range) / half_range, 0.0, 1.0)
 

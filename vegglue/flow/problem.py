@@ -163,6 +163,12 @@ class Problem:
         return self.bed, self.bed_rise, self.bed_half_range, self.film
 
 
+def above_bed(problem: Problem, level: Array) -> Array:
+    """Heights of levels (nx, ny, m) above the members' own beds [m], below 0 on land."""
+    above = level - problem.bed[:, :, None]
+    return above - problem.bed_rise if problem.bed_rise.size else above
+
+
 def stretch_of_cells(problem: Problem) -> Array:
     """J (nx, ny, 1) [-], the length of each cell over dx; (1, 1, 1) on a straight grid."""
     if problem.bend is None:

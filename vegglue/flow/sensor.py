@@ -12,7 +12,7 @@ from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import Faces, faces, side_discharges
-from vegglue.flow.problem import Problem, stretch_of_cells
+from vegglue.flow.problem import Problem, above_bed, stretch_of_cells
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
 from vegglue.measurements.kinds import Kind, kind_of
 from vegglue.resistance.physical_constants import FILM_ON_LAND
@@ -127,12 +127,14 @@ def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.Data
 
 
 def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
-    """The first member at cell centres, NaN where shallower than the film."""
+    """The first member at cell centres, over its own bed; NaN where shallower than the film."""
     now = faces(problem, state)
     centres = _at_centres(now, slice(0, grid.x.size))[..., 0]
-    level, u, v = np.where(centres[0] - problem.bed > problem.film, centres, np.nan)
+    above = above_bed(problem, now.level)[..., 0]
+    level, u, v = np.where(above > problem.film, centres, np.nan)
     depth = np.where(np.isnan(level), np.nan, now.cell[..., 0])
-    return FlowFields(grid.x, grid.y, problem.bed, depth, level, u, v)
+    bed = problem.bed + problem.bed_rise[..., 0] if problem.bed_rise.size else problem.bed
+    return FlowFields(grid.x, grid.y, bed, depth, level, u, v)
 
 
 def _at_centres(now: Faces, columns: slice) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.problem import ACROSS, LEVEL, Problem, crop
+from vegglue.flow.problem import ACROSS, LEVEL, Problem, above_bed, crop
 from vegglue.solver.chord import ChordSolution, chord
 from vegglue.solver.jacobian import Factors
 
@@ -16,7 +16,7 @@ MARGIN = 0.1
 
 def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
     """Rows start..stop-1 to solve: those that may be wet, with a margin; whole sides through which water enters."""
-    above = (start[:, LEVEL] - problem.bed[:, :, None]).max(axis=(0, 2))
+    above = above_bed(problem, start[:, LEVEL]).max(axis=(0, 2))
     wet = np.flatnonzero(above > -MARGIN)
     if not wet.size:
         return 0, problem.shape[1]
@@ -28,7 +28,7 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
 
 def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np.ndarray:
     """Whether water stands in an outermost row of the band, where a wall is that the problem does not have (m,)."""
-    above = state[:, LEVEL] - part.bed[:, :, None]
+    above = above_bed(part, state[:, LEVEL])
     south = (above[:, 0].max(axis=0) > 0.0) & (band[0] > 0)
     north = (above[:, -1].max(axis=0) > 0.0) & (band[1] < ny)
     return south | north
