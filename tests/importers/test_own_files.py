@@ -55,6 +55,22 @@ def test_both_velocities_of_a_plain_table_are_taken(tmp_path: Path) -> None:
     assert set(table[table["kind"] == "velocity"]["standard_error"]) == {0.01}
 
 
+@pytest.mark.parametrize(
+    ("said", "velocity", "level"), [("1.5 cm/s", 0.015, None), ("4 mm", None, 0.004), ("0.02", 0.02, 0.02)]
+)
+def test_a_standard_error_is_of_the_values_of_its_unit(
+    said: str, velocity: float | None, level: float | None, tmp_path: Path
+) -> None:
+    """1.5 cm/s was the error of levels in the same table, too."""
+    rows = ["experiment,section,x,y,u,level", *(f"June,A,8,{y},0.4,0.95" for y in (-1, 0, 1))]
+    words = f"files: {{all.csv: {{standard_error: {said}}}}}\n"
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + words, all__csv="\n".join(rows))
+    table = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+    for kind, wanted in (("velocity", velocity), ("level", level)):
+        found = table[table["kind"] == kind]["standard_error"].to_numpy(float)
+        assert np.isnan(found).all() if wanted is None else set(found) == {wanted}, kind
+
+
 def test_a_table_on_the_map_in_other_units_becomes_stations(tmp_path: Path) -> None:
     site = (
         CHANNEL + JUNE + "frame: {origin: [683120, 247480], angle: 32}\nfiles: {adv__csv: {standard_error: 1 cm/s}}\n"

@@ -1,21 +1,22 @@
 """What a site file says about one file of measurements: its columns, its units, and what stands in no column."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from vegglue.case.messages import nearest
 from vegglue.errors import InputError
 from vegglue.importers.column_names import ROLES
-from vegglue.importers.unit_words import in_si, si_factor
+from vegglue.importers.unit_words import UNITS, in_si, si_factor
 
 
 @dataclass(frozen=True)
 class FileWords:
     """columns: name of the column of each role; units: unit of each role; missing: numbers that mark no value;
-    experiment, section: of all rows; standard_error: of all values [SI]; coordinates, directions: whether places and
-    components of velocity are those of the map or of the channel, None for map where the site has a frame; flip:
-    coordinates that run the other way;
+    experiment, section: of all rows; standard_error: by the SI unit of the values that it is of; coordinates,
+    directions: whether places and components of velocity are those of the map or of the channel, None for map where
+    the site has a frame; flip: coordinates that run the other way;
     line: ends of the tape (first its zero), for tables along a tape; start: where a boat started; position: of a probe
     whose record holds no place; sheet: of a workbook; floor, surface: z of the file at the lowest bed and at the water;
     draft: of a raw ADCP below the surface [m], None for that in the file; declination: of its compass, degrees that
@@ -27,7 +28,7 @@ class FileWords:
     missing: tuple[float, ...] = ()
     experiment: str | None = None
     section: str | None = None
-    standard_error: float | None = None
+    standard_error: Mapping[str, float] = field(default_factory=dict)
     coordinates: Literal["map", "channel"] | None = None
     directions: Literal["map", "channel"] | None = None
     flip: tuple[str, ...] = ()
@@ -58,9 +59,7 @@ def file_words(given: Any, where: str) -> FileWords:
         if key in given:
             changes[key] = in_si(given[key], quantity, f"{where}.{key}")
     if "standard_error" in given:
-        # Of a velocity or of a level: a bare number is in SI, and words of the two are told apart by themselves.
-        quantity = "velocity" if "/" in str(given["standard_error"]) else "length"
-        changes["standard_error"] = in_si(given["standard_error"], quantity, f"{where}.standard_error")
+        changes["standard_error"] = _errors_by_unit(given["standard_error"], f"{where}.standard_error")
     changes |= _places(given, where)
     for key in {"coordinates", "directions"} & set(given):
         changes[key] = _one_of(given[key], ("map", "channel"), f"{where}.{key}")
@@ -73,6 +72,20 @@ def file_words(given: Any, where: str) -> FileWords:
     flip = flip if isinstance(flip, list | tuple) else [flip]
     changes["flip"] = tuple(_one_of(axis, ("x", "y"), f"{where}.flip") for axis in flip)
     return FileWords(**changes)
+
+
+def _errors_by_unit(given: Any, where: str) -> dict[str, float]:
+    """A standard error by the SI unit of the values that it is of: a bare number is of all, 1 cm/s of velocities."""
+    units = {quantity: next(iter(UNITS[quantity])) for quantity in ("velocity", "length", "discharge")}
+    if not isinstance(given, str):
+        return dict.fromkeys(units.values(), in_si(given, "velocity", where))
+    for quantity, unit in units.items():
+        with suppress(InputError):
+            return {unit: in_si(given, quantity, where)}
+    raise InputError(
+        f"{where} expected a number and a unit of velocity, length or discharge, such as `1 cm/s`, "
+        f"got {given!r}; correct it."
+    )
 
 
 def _by_role(given: Any, where: str) -> dict[str, str]:

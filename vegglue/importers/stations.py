@@ -195,7 +195,7 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     kept = taken.only(np.isfinite(taken.numbers[kind.column]))
     errors = kept.numbers.get(kind.error_column)
     if errors is None:
-        errors = np.full(kept.size, np.nan if words.standard_error is None else words.standard_error)
+        errors = np.full(kept.size, words.standard_error.get(kind.unit, np.nan))
     gathered: dict[PlaceKey, list[RepeatedValue]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
