@@ -16,7 +16,7 @@ from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
-from vegglue.results.diagnosis import Step
+from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
 
@@ -37,6 +37,12 @@ def plain(words: str) -> str:
     return re.sub("<[^>]*>", "", words).replace("\u202f", " ")
 
 
+def off(sentence: str) -> Diagnosis:
+    """One reading is off, and what its verdict goes on with."""
+    verdict = replace(NOTHING.verdict, kind="instrument", sentence=sentence)
+    return replace(NOTHING, verdict=verdict, instruments=(an_instrument(),))
+
+
 @pytest.mark.parametrize(
     ("found", "said"),
     [
@@ -48,8 +54,10 @@ def plain(words: str) -> str:
         (replace(a_diagnosis(steps=()), places=(a_location(amplitude=-0.56, x_error=6.7),),
                  verdict=replace(NOTHING.verdict, kind="none-of-these")),
          "less drag by 0.56 1/m at x = 33.0 ± 6.7 m, y = −0.6 m"),
-        (replace(NOTHING, verdict=replace(NOTHING.verdict, kind="instrument"), instruments=(an_instrument(),)),
-         "an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
+        (off("Nothing else is missing: chi2 is 9."),
+         "The model is sound, but an instrument is off: one reading, at x = 36.0 m, y = 1.0 m."),
+        (off("Nothing else stands out, but a missing effect may hide."),
+         "More may be missing, but an instrument is off: one reading"),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m"),
         (replace(EVERY_KIND, steps=(), field=None, places=(), verdict=replace(EVERY_KIND.verdict, kind="cannot-tell")),

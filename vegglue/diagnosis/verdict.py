@@ -23,6 +23,7 @@ from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import (
+    NOTHING_ELSE,
     EstimatedErrors,
     FieldFound,
     Misfit,
@@ -212,7 +213,7 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
     )
     clear = [one for one in grounds.findings.instruments if _is_clear(one)]
     if clear:
-        return "instrument", f"{instruments_in_words(clear)} Nothing else is missing: {nothing}"
+        return "instrument", f"{instruments_in_words(clear)} {NOTHING_ELSE}: {nothing}"
     return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
 
 

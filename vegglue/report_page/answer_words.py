@@ -54,7 +54,7 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
         return f"Nothing {tense} missing from {model} that these data could show."
     if kind == "instrument":
         which = " and ".join(f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}" for one in found.instruments)
-        told = "The model is sound, but an" if found.laws is None else "More may be missing, but an"
+        told = "The model is sound, but an" if found.verdict.clears_the_model else "More may be missing, but an"
         return f"{told} instrument is off: {which}."
     if kind == "none-of-these" and found.field is not None:
         return f"Something is missing that is in no list: {field_in_words(found)}."

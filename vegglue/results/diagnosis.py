@@ -23,7 +23,9 @@ from vegglue.results.causes import (
     PlaceMap,
 )
 
-# instrument: nothing is missing but that some readings are off.
+# How the sentence of an instrument goes on where the rest of the model is cleared.
+NOTHING_ELSE = "Nothing else is missing"
+# instrument: some readings are off. Whether more is missing the sentence says, see `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
 
 
@@ -134,6 +136,11 @@ class Verdict:
     remarks: tuple[str, ...]
     location: Location | None
     not_excluded: tuple[tuple[str, ...], ...]
+
+    @property
+    def clears_the_model(self) -> bool:
+        """Whether it says that nothing is missing in the model, an instrument or none being off."""
+        return self.kind == "nothing-missing" or (self.kind == "instrument" and NOTHING_ELSE in self.sentence)
 
 
 @dataclass(frozen=True)
