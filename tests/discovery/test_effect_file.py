@@ -5,15 +5,19 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Experiment
+from vegglue.diagnosis.excluded_stations import MEASUREMENT
 from vegglue.discovery.discovered import Discovery, LawFound, ProductFound
 from vegglue.discovery.effect_file import effect_name, effect_text
 from vegglue.effects.grammar import LAWS, PRODUCTS
 from vegglue.effects.law import Law
+from vegglue.engine.interface import Model
 from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
 from vegglue.workflow import discover as verb
 from vegglue.workflow.check import check_effects, doubts_of
 from vegglue.workflow.discover import DiscoveredCase, discover
@@ -189,6 +193,22 @@ def test_nothing_is_written_where_no_law_is_new(
     assert (result.effect_file, result.child) == (None, None)
     assert not list(tmp_path.iterdir())
     assert ("bank_trend" if law else "40 % of cases") in found.sentence
+
+
+def test_what_a_diagnosis_set_aside_has_no_say(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As in every other verb that compares models."""
+    case, judged = load_case(CONFIG), list[pd.DataFrame]()
+    first = read_observations(case).table.iloc[[0]]
+    monkeypatch.setattr(verb, "set_aside_of", lambda *_: first[MEASUREMENT])
+
+    def discover_laws(model: Model, *_: object) -> Discovery:
+        judged.append(model.station)
+        return Discovery(0.4, 44, (), {})
+
+    monkeypatch.setattr(verb, "discover_laws", discover_laws)
+    found = discover(case, runs=tmp_path)
+    assert (~judged[0]["used"]).to_numpy().nonzero()[0].tolist() == [0]
+    assert found.aside.startswith("1 station is left out of every model")
 
 
 def test_an_unknown_effect_cannot_be_left_out() -> None:

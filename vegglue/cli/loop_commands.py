@@ -96,7 +96,7 @@ def discover_command(
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
     case = opened_case(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        found = vegglue.discover(case, without=without or [], to=to, jobs=jobs, watch=watch, force=force)
+        found = vegglue.discover(case, without=without or [], runs=runs, to=to, jobs=jobs, watch=watch, force=force)
     tell(case, runs, found, as_object)
 
 

@@ -98,6 +98,7 @@ def _discovered(result: DiscoveredCase) -> Told:
         "laws": [_law(one) for one in result.found.laws],
         "product": None if result.found.product is None else _law(result.found.product.found),
         "others": result.found.others,
+        "left_out": result.aside or None,
         "effect_file": result.effect_file,
         "config": None if result.child is None else result.child.source,
     }

@@ -53,6 +53,8 @@ def _show_discovery(result: DiscoveredCase) -> None:
     print(result.found.sentence)
     for first, *further in result.found.ranked:
         print("\n".join([f"- {first}", *(f"  {line}" for line in further)]))
+    if result.aside:
+        print(f"- {result.aside}")
     if result.child is not None and result.effect_file is not None:
         print(f"Effect file: {shown_path(result.effect_file)}")
         print(f"Child config: {shown_path(result.child.source)}")

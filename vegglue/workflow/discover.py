@@ -10,6 +10,7 @@ from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
+from vegglue.diagnosis.excluded_stations import excluding, exclusion_in_words
 from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.discovery.effect_file import effect_name, effect_text
 from vegglue.discovery.search import discover_laws
@@ -21,19 +22,24 @@ from vegglue.progress import Watch, silent
 from vegglue.screening.candidates import Candidate
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.set_aside import set_aside_of
 
 
 @dataclass(frozen=True)
 class DiscoveredCase:
-    """What was found, and where a law is written: its effect file and the child config; None where none is."""
+    """What was found, and where a law is written: its effect file and the child config, None where none is; aside: what
+    was left out since a diagnosis set it aside, in a sentence, '' when nothing was.
+    """
 
     found: Discovery
     effect_file: Path | None
     child: Case | None
+    aside: str = ""
 
     def __repr__(self) -> str:
         written = [f"written to {self.effect_file}"] if self.effect_file else []
-        return in_short(f"Discovery: {self.found.sentence}", [*self.found.lines, *written])
+        left_out = [self.aside] if self.aside else []
+        return in_short(f"Discovery: {self.found.sentence}", [*self.found.lines, *left_out, *written])
 
 
 @one_thread()
@@ -41,12 +47,15 @@ def discover(
     case: Case,
     *,
     without: Sequence[str] = (),
+    runs: Path | str = "runs",
     to: Path | str | None = None,
     jobs: int = -1,
     watch: Watch = silent,
     force: bool = False,
 ) -> DiscoveredCase:
     """Say which law explains what the calibrated model misses; the best becomes an effect file and a child config.
+
+    Measurements that the diagnosis kept in `runs` has set aside are left out.
 
     without: listed effects that do not compete; to: the config to write, beside the parent if not given, its effect
     file beside it; force: replace files there that vegglue did not write, too. Nothing is written where no law is
@@ -58,15 +67,17 @@ def discover(
     for name in without:
         if name not in known:
             raise InputError(f"--without: `{name}` is not an effect of the library: {nearest_effect(name, known)}")
+    out = set_aside_of(case, runs)
+    aside = exclusion_in_words(out)
     with at_most(jobs):
-        found = discover_laws(model_in(case), without, watch)
+        found = discover_laws(excluding(model_in(case), out), without, watch)
     laws = found.written
     if not laws:
-        return DiscoveredCase(found, None, None)
+        return DiscoveredCase(found, None, None, aside)
     name = effect_name(laws[-1])  # of a product, which begins with that of its law
     target = Path(to) if to is not None else case.source.with_name(f"{case.source.stem}+{name}{case.source.suffix}")
     file = target.with_name(f"{target.stem}.py")
-    return DiscoveredCase(found, file, _written(case, laws, target, file, force))
+    return DiscoveredCase(found, file, _written(case, laws, target, file, force), aside)
 
 
 def _written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:

@@ -85,7 +85,7 @@ def _with_a_law(
     """The case with a law that is in no list, where one is found and errors at held-out sections are less with it than
     those of the case `alone`; else the case. Only then their ladder is kept.
     """
-    law = discover(case, jobs=jobs, watch=watch, force=force)
+    law = discover(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, law)
     if law.child is None:
         return case
