@@ -14,7 +14,7 @@ DEEPEST_KEYS, MOST_PARTS = 40, 50_000
 MOST_DIGITS = 30
 # Files one after the other that `extends` names.
 LONGEST_CHAIN = 50
-# Cells of a grid: fifteen times as many as the largest case of this project.
+# Cells of a grid: more than twenty times as many as the largest case of this project.
 MOST_CELLS = 1_000_000
 # The factors of one member [bytes], 4 x 3 nx (3 ny)^2 of single precision: they must fit into memory beside others.
 LARGEST_FACTORS = 16_000_000_000

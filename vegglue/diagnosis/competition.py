@@ -4,7 +4,7 @@
 
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters. All kinds are as likely before, see `evidence`, and
+no flow: to first order is exact for them but for the parameters. What is how likely before says `evidence`, and
 their chances are tempered, see `tempered_chances`.
 
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete

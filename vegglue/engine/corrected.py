@@ -6,7 +6,7 @@ f_c and J_c are predictions and slopes of the command, the latter by central dif
 with and without the effects of the case, which the command does not know: they are added to what it predicts. At z_0
 this is exact. Further off the built-in engine only says how the flow bends away from the tangent, and draws of a
 posterior are runs of the command itself. What an effect or a cell would change is the built-in engine's word.
-Source: first-order correction of one model by another (Alexandrov and Lewis 2001, doi:10.1023/A:1016014512624; not
+Source: first-order correction of one model by another (Alexandrov and Lewis 2001, doi:10.1023/A:1016042505922; not
 checked against it).
 """
 

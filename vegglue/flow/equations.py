@@ -99,7 +99,9 @@ def storage(problem: Problem, level: Array) -> Array:
 
 
 def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
-    """q = Q w / (sum w * width) [m2/s] into the west (ny, m), south and north (nx, m) side, w = h^(5/3) or 1."""
+    """q = Q w / (sum w * width) [m2/s] into the west (ny, m), south and north (nx, m) side; w = h^(5/3) or 1, times the
+    spread that an effect gives the inflow; widths along a bend are those of its cells.
+    """
     (nx, ny), m = problem.shape, problem.members
     fluxes = {"west": np.zeros((ny, m)), "south": np.zeros((nx, m)), "north": np.zeros((nx, m))}
     beside = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}

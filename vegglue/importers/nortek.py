@@ -22,7 +22,7 @@ from vegglue.importers.raw_files import opened_raw
 VECTOR_BEGINS = b"\xa5\x05\x18\x00VEC"
 BYTES_OF_A_SAMPLE = 24
 LEAST_CORRELATION = 70.0  # %, the maker's advice for means and turbulence
-SPIKE = 6.0  # median absolute deviations beyond which a sample is a spike; of noise one in 10,000 is
+SPIKE = 6.0  # robust standard deviations beyond which a sample is a spike; of normal noise one in 5e8 is
 
 
 @dataclass(frozen=True)

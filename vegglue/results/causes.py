@@ -132,9 +132,9 @@ class LawSuspected:
 
 @dataclass(frozen=True)
 class LawsSuspected:
-    """Laws that stand out where no listed effect was accepted. p: chance that errors alone make laws stand out as much;
-    tried: how many; chance: of all of them together among all that was compared [-]; laws: the likeliest first, those
-    that hold 95 % of it.
+    """Laws that stand out in what is left, whatever was accepted. p: chance that errors alone make laws stand out as
+    much; tried: how many; chance: of all of them together among all that was compared [-]; laws: the likeliest first,
+    those that hold 95 % of it.
     """
 
     p: float

@@ -4,7 +4,8 @@
 
 B is the Bayes factor of a hypothesis of size N(0, s^2) against nothing, T its score and |S_perp| the length of its
 fingerprint per unit of size, both in standard errors (see `score_test`): the width of its prior is charged (Occam's
-factor). Of a kind, all hypotheses are as likely before, and all kinds are; of one hypothesis, all settings. What is
+factor). Groups of kinds (listed effects, places, instruments) are as likely before; of a group all kinds are, of a kind
+all hypotheses, of one hypothesis all settings. What is
 missing is one of them or nothing. The alarm is sounded by the sum over all, against the same sum in draws of errors
 alone.
 Source: Kass and Raftery (1995), doi:10.2307/2291091, for Bayes factors; not checked against it.

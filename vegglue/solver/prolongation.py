@@ -7,7 +7,7 @@ from vegglue.flow.problem import ACROSS, ALONG
 
 
 def on_grid(state: Array, shape: tuple[int, int]) -> Array:
-    """A state (nx, 3, ny, 1) on a grid of `shape` (nx, ny), along each axis its own or twice as many cells.
+    """A state (nx, 3, ny, m) on a grid of `shape` (nx, ny), along each axis its own or twice as many cells.
 
     Levels are those of the cell around; velocities on new faces are the mean of both neighbours.
     """
