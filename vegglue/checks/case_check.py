@@ -57,7 +57,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
         remarks_on_patches(case, site),
-        remarks_on_friction_classes(case, site),
+        remarks_on_friction_classes(site),
         remarks_on_unnamed_banks(case, site),
         remarks_on_idle_parameters(case, site),
         remarks_on_units_of_effects(case),

@@ -55,7 +55,7 @@ def _why_none(case: Case, site: Site, corners: Array) -> str:
     return "it is outside the grid, or smaller than a cell"
 
 
-def remarks_on_friction_classes(case: Case, site: Site) -> Iterator[str]:
+def remarks_on_friction_classes(site: Site) -> Iterator[str]:
     """Friction classes that hold in no cell."""
     for index, name in enumerate(site.class_names):
         if not (site.friction_class == index).any():

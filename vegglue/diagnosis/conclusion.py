@@ -55,7 +55,7 @@ def concluded(
     if found.places and not found.instruments and clearly_a_law(laws):
         last, found = first, replace(found, steps=(), places=(), charges=(), of_shape=0.0)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
-    misfit = _misfit(first, last, found)
+    misfit = _misfit(first, last)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
     grounds = replace(_grounds(last, found, misfit, unseen), field=field, laws=laws)
     base, before = last.base, first.base
@@ -103,7 +103,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
     )
 
 
-def _misfit(first: Screening, last: Screening, found: Findings) -> Misfit:
+def _misfit(first: Screening, last: Screening) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
     freedom = after.noise.rows.size - after.fitted.point.z.size - after.noise.unknown.shape[1]

@@ -25,7 +25,7 @@ EFFECT = """Effect(
     title="{title}",
     equation="{equation}",
     source="found by `vegglue discover`; seen for {seen}",
-    amplitude=Amplitude("strength", "-", "strength a of the law", scale={scale:.2g}, low={low:g}, high={high:g}),
+    amplitude=Amplitude("strength", "-", "strength {letter} of the law", scale={scale:.2g}, low={low:g}, high={high:g}),
     seen=SeenRange("{symbol}", "{unit}", lambda cells: {quantity}, {least:.2g}, {most:.2g}),
 )"""
 
@@ -64,7 +64,8 @@ def _parts(found: LawFound) -> dict[str, object]:
         "name": effect_name(found), "equation": found.equation, "seen": found.range_seen, "g": g, "change": change,
         "stage": law.term.stage, "title": law.title, "scale": found.scale, "low": -law.form.strongest,
         "high": law.form.strongest, "symbol": law.quantity.symbol, "unit": law.quantity.unit,
-        "quantity": law.quantity.written, "least": found.seen[0], "most": found.seen[1],
+        "quantity": law.quantity.written, "letter": "a" if law.times is None else "c",
+        "least": found.seen[0], "most": found.seen[1],
     }  # fmt: skip
 
 

@@ -7,11 +7,9 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.exchange import dispersion
 from vegglue.effects.law import Law, LawForm, LawQuantity, LawTerm
+from vegglue.effects.resistance import LEAST_DEPTH_OF_POWER
 from vegglue.effects.surroundings import Cells
 from vegglue.resistance.physical_constants import GRAVITY
-
-# Depth [m] at which a Froude number is held, as in `resistance`: twice the default film.
-LEAST_DEPTH_OF_LAW = 0.02
 
 
 def _friction(cells: Cells, factor: Array) -> dict[str, Array]:
@@ -60,8 +58,8 @@ _DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, 
 _SPEED = LawQuantity("speed", "the speed", "|U|", "m/s", lambda cells: cells.speed, "cells.speed", 0.5)
 _FROUDE = LawQuantity(
     "froude", "the Froude number", "F", "-",
-    lambda cells: cells.speed / np.sqrt(GRAVITY * cells.depth.clip(LEAST_DEPTH_OF_LAW)),
-    f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_LAW}))", 0.2,
+    lambda cells: cells.speed / np.sqrt(GRAVITY * cells.depth.clip(LEAST_DEPTH_OF_POWER)),
+    f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_POWER}))", 0.2,
 )  # fmt: skip
 _SHEAR = LawQuantity(
     "shear", "the lateral shear", "(|du/dy| h/|U|)", "-", lambda cells: np.abs(cells.u_y) * cells.depth / cells.speed,

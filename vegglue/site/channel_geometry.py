@@ -11,10 +11,8 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.site.grid import Grid, cell_stretch, curvature_of
 from vegglue.site.gridded_site import Site, in_experiment
-from vegglue.site.zones import beyond
+from vegglue.site.zones import BANK_SLOPE, beyond
 
-# Slope across the channel [-] above which a cell is bank: one in five, steeper than a floor, flatter than a built bank.
-STEEPEST_FLOOR = 0.2
 # Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
 GEOMETRIES_KEPT = 8
 
@@ -48,7 +46,7 @@ def cells_across(site: Site) -> float:
 def _geometry(site: Site, present: tuple[int, ...], relative_stems: tuple[float, ...]) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
     side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
-    floor = ~beyond(side_slope > STEEPEST_FLOOR, bed)
+    floor = ~beyond(side_slope > BANK_SLOPE, bed)
     axis, half_width = _extent(floor, grid.y, grid.dy)
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
