@@ -12,6 +12,7 @@ from vegglue.calibration.noise import (
     noise_of,
     with_correlation,
     with_grid_error,
+    with_scale,
     with_unknown_errors,
 )
 from vegglue.errors import InputError
@@ -153,6 +154,14 @@ def test_neither_offset_nor_factor_of_a_probe_that_is_off_counts() -> None:
     slopes = np.linalg.svd(columns[readings], full_matrices=True)[0][:, 2:]
     own = among(readings, 0.01 * slopes @ np.array([1.0, 2.0]))
     assert np.sum(noise.whiten(own) ** 2) == pytest.approx(np.sum((own / 0.01) ** 2), rel=1e-3)
+
+
+def test_a_scale_that_is_set_is_that_of_the_covariance() -> None:
+    """It stayed that of the estimate where sizes are those of the best member, and weights and bands differed."""
+    noise = with_scale(with_correlation(noise_of(stations()), 0.4, 9.0), 1.0)
+    np.testing.assert_allclose(noise.lower @ noise.lower.T, covariance_of(noise), atol=1e-12)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance_of(noise))), noise.data_error)
+    assert noise.correlation == 0.4
 
 
 def test_a_station_without_a_standard_error_is_named() -> None:

@@ -1,5 +1,6 @@
 """Which of the refits are kept as rivals, in which groups, and the evidence of a refit."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,9 +9,14 @@ import scipy.stats
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
 from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.fit import covariance
+from vegglue.case.parameter_space import theta_at, z_of
+from vegglue.diagnosis import refits
 from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.rivals import rivals_among
 from vegglue.diagnosis.tempered_chances import tempering
+from vegglue.effects.library import library
+from vegglue.screening.candidates import Candidate, with_effect
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 
@@ -52,6 +58,29 @@ def test_of_less_than_all_chances_the_set_holds_its_share_of_what_effects_have()
     chance, groups = rivals_among("ab", np.array([0.49, 0.01]), np.eye(2))
     assert groups == (("a",),)
     assert chance == {"a": 0.49}
+
+
+@pytest.mark.parametrize(("errors_away", "dropped"), [(0.5, True), (1.5, True), (3.0, False), (8.0, False)])
+@pytest.mark.parametrize("name", ["edge_mixing", "discharge_error"])
+def test_what_the_data_no_longer_need_is_dropped(
+    name: str, errors_away: float, dropped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where it has one sign only: its prior ends at off, so that it seemed to be far from there always."""
+    effect = library(None)[name]
+    one = Candidate(effect, experiments=("low",) if effect.name == "discharge_error" else ())
+    case = with_effect(CASE_OF_TWINS, one, {shape.name: shape.default for shape in effect.shapes})
+    station, z, step = stations_of(case, ("A", "B"), 4), np.zeros(len(case.parameters)), 1e-4
+    z[-1] = z_of(case.parameters[one.parameter], effect.amplitude.at(0.2 * effect.amplitude.plausible_gain))
+    beside = theta_at(case, z + np.outer([-step, 0.0, step], np.arange(z.size) == z.size - 1))[one.parameter]
+    before, gain, after = (effect.amplitude.gain(float(value)) for value in beside)
+    slope = np.zeros((len(station), z.size))
+    # So much of the gain is one error of the data: with residuals of zero they want what there is.
+    slope[0, -1] = 0.01 * errors_away / gain * (after - before) / (2.0 * step)
+    base = at_best(case, station, slope @ z, slope)
+    point = replace(base.fitted.point, z=z, prediction=slope @ z)
+    fitted = replace(base.fitted, point=point, covariance=covariance(base.noise, point))
+    monkeypatch.setattr(refits, "without_effect", lambda base, _: base)
+    assert refits.pruned(replace(base, fitted=fitted), [one.name], lambda *_: None)[1] == [one.name] * dropped
 
 
 def test_chances_are_those_of_the_evidence_where_little_is_explained() -> None:

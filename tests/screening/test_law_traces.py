@@ -1,11 +1,14 @@
 """Fingerprints of laws from answers to cells: those of the effects, also at a point with borrowed factors."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from vegglue.calibration.model_error import model_error_columns
 from vegglue.case.config import load_case
+from vegglue.case.schema import ModelError
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.interface import Model, Point, by_itself, linearise, responses
 from vegglue.engine.model import coarser
@@ -46,6 +49,17 @@ def test_a_trace_is_the_response_to_the_effect(model: Model, borrowed: Point, na
     exact = responses(model, borrowed, [cause_of(model.case, Candidate(law.effect), settings)])
     trace = law_traces(model, borrowed).of(law, [settings])
     assert trace == pytest.approx(exact, abs=0.02 * np.abs(exact).max())
+
+
+def test_an_experiment_without_measurements_is_no_obstacle(model: Model) -> None:
+    """It was a traceback, after a minute."""
+    seen = model.station[model.station["experiment"] != "mid"].reset_index(drop=True)
+    part = replace(model, station=seen)
+    point = linearise(part, np.zeros(len(part.names)))
+    assert point is not None
+    assert np.isfinite(law_traces(part, point).of(LAWS[NAMES[0]], [{"reference": 0.5}])).all()
+    allowed = ModelError(friction=0.05, edges=0.1)
+    assert len(model_error_columns(part, point, allowed)) == len(seen)
 
 
 def test_a_point_by_itself_borrows_nothing(model: Model, borrowed: Point) -> None:

@@ -140,6 +140,11 @@ def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
     return _with_cholesky(replace(noise, correlation=correlation, scale=scale, correlation_chances=certain))
 
 
+def with_scale(noise: Noise, scale: float) -> Noise:
+    """The noise with s given [-]; rho is as uncertain as it was."""
+    return _with_cholesky(replace(noise, scale=scale))
+
+
 def with_model_error(noise: Noise, columns: Array) -> Noise:
     """The noise with M = columns columns' (station, k), see `model_error_columns`."""
     used = noise.used(columns)

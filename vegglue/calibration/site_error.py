@@ -92,7 +92,7 @@ def _side(model: Model, cells: CellResponses, rate: Mapping[str, Array], index: 
         if index in patches_present(model.case, experiment):
             excess = within * (rate[experiment] - _next(rate[experiment], axis, outwards)) / width
             beside = ~inside * _next(excess, axis, -outwards)
-            answers = cells.of["drag"][rows].reshape(rows.size, -1)
+            answers = cells.of["drag"][rows].reshape(rows.size, inside.size)
             inwards, beyond = answers @ excess.ravel(), answers @ beside.ravel()
             found[rows] = np.stack([0.5 * (inwards + beyond), inwards], axis=1)
     return found

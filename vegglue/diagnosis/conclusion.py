@@ -106,7 +106,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
 def _misfit(first: Screening, last: Screening) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    freedom = after.noise.rows.size - after.fitted.point.z.size - after.noise.unknown.shape[1]
+    freedom = after.noise.rows.size - after.fitted.point.z.size - int(np.linalg.matrix_rank(after.noise.unknown))
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
         chi2=misfit,

@@ -14,7 +14,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
 from vegglue.calibration.fit import MapEstimate, fit
-from vegglue.calibration.noise import Noise, noise_of, with_grid_error
+from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -173,7 +173,7 @@ def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch 
         noise = _with_estimated_sizes(noise, fits[0], model.station)
         fits = _refitted(model, noise, fits)
     estimated = noise_given_all(Baseline(model, noise, fits[0], coarse, on_coarse))
-    noise = estimated if rule == "known" else replace(estimated, scale=1.0)
+    noise = estimated if rule == "known" else with_scale(estimated, 1.0)
     fits = _refitted(model, noise, fits)
     standardised = standardised_residual(noise, fits[0].point)
     return ModesAndErrors(

@@ -199,19 +199,19 @@ def _flagged(observations: Observations) -> Iterator[Finding]:
 def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
     for (experiment, section), rules in observations.discharge.items():
         given = list(case.experiments[experiment].discharge.values())
-        prescribed = "" if any(isinstance(value, str) for value in given) else f"{sum(map(float, given)):.2f}"
+        prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
         measured = rules["profile"]
         text = (
             f"The verticals at {html.escape(section)} ({html.escape(experiment)}) add up to "
             f"{plus_minus(measured.value, measured.standard_error)}{NARROW}m³/s"
         )
-        if not prescribed:
+        if prescribed is None:
             yield Finding("discharge", f"{text}; the discharge is itself a parameter.")
             continue
-        off = (measured.value - float(prescribed)) / measured.standard_error
+        off = (measured.value - prescribed) / measured.standard_error
         yield Finding(
             "discharge",
-            f"{text}; the model was given {prescribed}{NARROW}m³/s, {fixed(abs(off), 1)} standard errors "
+            f"{text}; the model was given {short(prescribed)}{NARROW}m³/s, {fixed(abs(off), 1)} standard errors "
             f"{'less' if off > 0 else 'more'}.",
             doubt=abs(off) > DISCHARGE_DOUBTED,
         )

@@ -39,7 +39,8 @@ class LawTraces:
         for rows, cells in self.flows:
             share = law.term.share(cells)
             fields = [np.broadcast_to(law.g(cells, **one) * share, cells.depth.shape).ravel() for one in settings]
-            found[rows] = answers[rows].reshape(rows.size, -1) @ np.array(fields, dtype=np.float32).T
+            of_cells = answers[rows].reshape(rows.size, answers[0].size)
+            found[rows] = of_cells @ np.array(fields, dtype=np.float32).T
         return found
 
 
