@@ -11,7 +11,7 @@ from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.flow.equations import faces
-from vegglue.flow.problem import ACROSS, LEVEL, Problem, take
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, take
 from vegglue.flow.readers import nearest_face
 from vegglue.flow.sensor import read_sensors, reading_weights
 from vegglue.measurements.kinds import KINDS
@@ -88,6 +88,19 @@ def test_weights_are_the_derivative_of_the_reading(flowing, kind: str, lifted: b
     told = np.einsum("ikjn,ikjp->np", weights, direction)
     assert np.abs(told - found).max() < 1e-6 * np.abs(found).max()
     assert np.abs(found).max(axis=1).min() > 1e-3
+
+
+def test_beside_the_inflow_a_velocity_answers_to_the_face_ahead_alone(flowing) -> None:
+    """The one behind is set by the inflow; it counted as the one ahead, so that all answers were twice as large."""
+    problem, state, grid = flowing
+    first = stations("velocity").assign(x=0.2)
+    direction = np.zeros((*state.shape[:3], 1))
+    direction[0, ALONG] = 1.0
+    ahead, behind = (read_sensors(problem, state + s * STEP * direction, grid, first, ()) for s in (1.0, -1.0))
+    found = (ahead.prediction - behind.prediction)[0] / (2.0 * STEP)
+    told = np.einsum("ikjn,ikjp->np", reading_weights(problem, state, grid, first), direction)[:, 0]
+    np.testing.assert_allclose(told, found, rtol=1e-6)
+    assert found == pytest.approx(0.5)
 
 
 def test_at_rest_a_speed_answers_to_nothing(flowing) -> None:

@@ -1,4 +1,4 @@
-"""The rows that are solved are those where a member's own bed may be wet."""
+"""The rows that are solved are those where a member's own bed may be wet, as in the whole problem."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.prior import sample_prior
-from vegglue.flow.problem import EMPTY, Problem
+from vegglue.flow.problem import EMPTY, InflowSegment, Problem, crop
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import flow_fields
 from vegglue.site.gridded_site import Site, build_site
@@ -49,3 +49,23 @@ def test_a_bed_that_a_member_has_higher_counts_as_any_other(brook: tuple[Site, P
     np.testing.assert_allclose(there.bed, here.bed)
     np.testing.assert_array_equal(np.isnan(there.level), np.isnan(here.level))
     assert np.nanmax(np.abs(there.level - there.bed - there.depth)) < 0.25, "a cell on a bank is filled in part"
+
+
+def test_an_inflow_over_dry_rows_is_in_the_band(brook: tuple[Site, Problem]) -> None:
+    """It was a traceback: its rows were cut out."""
+    _, plain = brook
+    apart = InflowSegment("west", plain.shape[1] - 2, plain.shape[1], np.array([0.1]))
+    more = replace(plain, boundaries=replace(plain.boundaries, inflows=(*plain.boundaries.inflows, apart)))
+    low = still(plain)
+    low[:, 0] -= 0.6
+    assert wet_band(plain, low)[1] == plain.shape[1] - 2
+    assert wet_band(more, low)[1] == plain.shape[1]
+
+
+def test_cells_at_the_edge_of_the_band_fill_as_in_the_whole(brook: tuple[Site, Problem]) -> None:
+    """Beside a steep wall half of their range was lost, and 5 % of the discharge with it."""
+    _, plain = brook
+    walled = replace(plain, bed=np.where(np.arange(plain.shape[1]) % 9 == 4, 3.0, plain.bed))
+    part = crop(walled, 4, 11)
+    np.testing.assert_array_equal(part.bed_half_range, walled.bed_half_range[:, 4:11])
+    assert crop(part, 1, 5).bed_half_range.tolist() == walled.bed_half_range[:, 5:9].tolist()

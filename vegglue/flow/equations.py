@@ -62,6 +62,8 @@ def residual_of(
         out[:, ALONG] += np.maximum(boundaries.lateral_inflow, 0.0) / depth * state[:, ALONG]
     if closed.momentum:
         push_momentum(out, closed.momentum, depth, problem)
+    wall = ~boundaries.outlet
+    out[-1, ALONG, wall] = state[-1, ALONG, wall]  # u = 0 there, whatever pushes
     return out
 
 

@@ -121,7 +121,7 @@ class Problem:
     film: a tenth of it stays on dry land [m]; smallest_shear_depth: whether shear acts over the smallest depth of the
     cells around a point, not the mean; bed_rise (nx, ny, m) or empty: by how much members' beds lie higher [m];
     geometry: what effects see of the channel, none without effects; walls: friction of the sides of the grid; bend: the
-    curvature of a grid along a centreline, none of a straight one.
+    curvature of a grid along a centreline, none of a straight one; half_range: of rows cut out, that of the whole.
     """
 
     dx: float
@@ -138,6 +138,7 @@ class Problem:
     geometry: ChannelGeometry | None = None
     walls: SideWalls = SMOOTH_WALLS
     bend: Bend | None = None
+    half_range: Array = field(default_factory=lambda: EMPTY)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -152,8 +153,11 @@ class Problem:
     def bed_half_range(self) -> Array:
         """Half the range of the bed across the flow within each cell, (nx, ny) [m], at least four films.
 
-        Along x the surface falls with the bed, so that a slope there does not make a cell deep and shallow at once.
+        Along x the surface falls with the bed, so that a slope there does not make a cell deep and shallow at once. Of
+        rows cut out it is what it was in the whole, where the cells beside them are known.
         """
+        if self.half_range.size:
+            return self.half_range
         step = np.gradient(self.bed, axis=1) if self.shape[1] > 1 else np.zeros_like(self.bed)
         return np.maximum(0.5 * np.abs(step), 4.0 * self.film)
 
@@ -204,6 +208,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
     return replace(
         problem,
         bed=cut(problem.bed),
+        half_range=cut(problem.bed_half_range),
         friction=replace(problem.friction, friction_class=cut(problem.friction.friction_class)),
         plants=_plants_between(problem.plants, south, north),
         boundaries=replace(

@@ -45,9 +45,10 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
     added = _added_to_site(effects, geometry) if geometry else {}
-    if geometry and "inflow" in added:
-        added["inflow"] = _into_water(added["inflow"], share_under_water(case, site, setting), geometry.stretch)
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
+    entering = _entering(values.lateral, added, geometry) if geometry else EMPTY
+    if geometry and entering.size:
+        entering = _into_water(entering, share_under_water(case, site, setting), geometry.stretch)
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
@@ -55,7 +56,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         friction=_bed_friction(case, site, theta, members),
         plants=_plants(case, site, experiment, theta, members),
         viscosity=value_of(case.eddy_viscosity, theta, members),
-        boundaries=_boundaries(case, site, values, _entering(values.lateral, added, geometry) if geometry else EMPTY),
+        boundaries=_boundaries(case, site, values, entering),
         film=case.numerics.film_depth,
         smallest_shear_depth=case.numerics.shear_depth == "smallest",
         bed_rise=added.get("bed", EMPTY),

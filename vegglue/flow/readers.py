@@ -110,11 +110,11 @@ def _level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
 
 
 def _u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    """The face in the west, where the inflow sets u, counts as the one after it."""
+    """The face in the west, where the inflow sets u, counts as given."""
     weights = _no_weights(flow, x.size)
     for column, row, share in _corners(flow.grid, x, y):
-        for face in (column, np.maximum(column - 1, 0)):
-            weights[face, ALONG, row, np.arange(x.size)] += 0.5 * share
+        for face, inside in ((column, column >= 0), (np.maximum(column - 1, 0), column > 0)):
+            weights[face, ALONG, row, np.arange(x.size)] += np.where(inside, 0.5 * share, 0.0)
     return weights
 
 

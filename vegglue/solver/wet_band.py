@@ -15,7 +15,9 @@ MARGIN = 0.1
 
 
 def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
-    """Rows start..stop-1 to solve: those that may be wet, with a margin; whole sides through which water enters."""
+    """Rows start..stop-1 to solve: those that may be wet, with a margin; whole sides through which water enters, and
+    an inflow that stands apart.
+    """
     above = above_bed(problem, start[:, LEVEL]).max(axis=(0, 2))
     wet = np.flatnonzero(above > -MARGIN)
     if not wet.size:
@@ -23,6 +25,9 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
     sides = {inflow.side for inflow in problem.boundaries.inflows}
     south = 0 if "south" in sides else max(int(wet[0]) - 1, 0)
     north = problem.shape[1] if "north" in sides else min(int(wet[-1]) + 2, problem.shape[1])
+    for inflow in problem.boundaries.inflows:  # one that enters over dry rows alone wets them
+        if inflow.side == "west" and (inflow.stop <= south or inflow.start >= north):
+            south, north = min(south, inflow.start), max(north, inflow.stop)
     return south, north
 
 
