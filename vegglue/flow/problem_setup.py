@@ -48,7 +48,9 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     values = boundary_values(effects, _boundary_values(case, site, setting, theta, members))
     entering = _entering(values.lateral, added, geometry) if geometry else EMPTY
     if geometry and entering.size:
-        entering = _into_water(entering, share_under_water(case, site, setting), geometry.stretch)
+        under_water = share_under_water(case, site, setting)
+        both = np.maximum(entering, 0.0), np.minimum(entering, 0.0)  # what enters and what leaves may cancel
+        entering = np.ascontiguousarray(sum(_into_water(part, under_water, geometry.stretch) for part in both))
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
