@@ -53,6 +53,21 @@ def test_what_a_task_raises_is_raised() -> None:
         in_threads(lambda number: 1 / number, [(1,), (0,), (2,)])
 
 
+def test_what_waits_is_given_up_when_a_task_fails() -> None:
+    """All that waited was done first: Ctrl-C took as long as the whole."""
+    done: list[int] = []
+
+    def work(number: int) -> None:
+        if number == 0:
+            raise ValueError("the first")
+        time.sleep(0.05)
+        done.append(number)
+
+    with at_most(2), pytest.raises(ValueError, match="the first"):
+        in_threads(work, [(number,) for number in range(20)])
+    assert len(done) < 5
+
+
 def hears_ctrl_c(task: int) -> bool:
     return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 

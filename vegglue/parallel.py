@@ -138,8 +138,12 @@ def _shared_out(
             position, task = waiting.popleft()
         except IndexError:
             return False
-        found[position] = work(*task)
-        finished(next(ends))
+        try:
+            found[position] = work(*task)
+            finished(next(ends))
+        except BaseException:  # Ctrl-C, too: nobody waits for the rest any more
+            waiting.clear()
+            raise
         return True
 
     def by_another() -> None:

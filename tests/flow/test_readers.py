@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, river, solved
+from channels import centres, even_geometry, river, solved
 
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
+from vegglue.flow.closures import bent_plants, closures
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, take
 from vegglue.flow.readers import nearest_face
@@ -132,6 +133,35 @@ def test_a_gain_acts_on_velocities_of_every_direction(flowing) -> None:
         assert change[kind] == pytest.approx(0.1 * read(flowing, kind))
     assert not change["level"].any()
     assert not change["discharge"].any()
+
+
+def test_probes_among_plants_stand_among_what_is_left_of_them_upright(flowing) -> None:
+    """They saw the canopy of the config, however far the flow had bent it."""
+    problem, state, grid = flowing
+    column, row = problem.plants.column, problem.plants.row
+    geometry = even_geometry(problem.bed, problem.friction.friction_class, (problem.dx, problem.dy))
+    bending = ActiveEffect(library()["canopy_deflection"], {"rate": np.array([3.0])})
+    among = ActiveEffect(library()["among_plants"], {"gain": np.array([0.5])})
+    bent, both = (replace(problem, effects=effects, geometry=geometry) for effects in ((bending,), (bending, among)))
+    there = pd.DataFrame(
+        {"kind": ["velocity"], "x": grid.x[column[:1]], "y": grid.y[row[:1]], "section": "A", "device": "p"}
+    )
+    plain, seen = (read_sensors(one, state, grid, there, ()).prediction[0, 0] for one in (bent, both))
+    depth = faces(problem, state).cell
+    height = bent_plants(bent, state, depth)[1][0, 0]
+    assert height < 0.6 * problem.plants.canopy_height[0, 0]
+    share = min(height / depth[column[0], row[0], 0], 1.0)
+    assert seen / plain == pytest.approx(1.0 + 0.5 * share, rel=0.05)
+
+
+def test_two_places_that_mix_less_leave_no_negative_viscosity(flowing) -> None:
+    problem, state, _ = flowing
+    geometry = even_geometry(problem.bed, problem.friction.friction_class, (problem.dx, problem.dy))
+    values = {"viscosity": -0.4, "x": 15.0, "y": 0.0, "length": 2.0, "width": 1.0}
+    hole = ActiveEffect(library()["unlisted_viscosity"], {name: np.array([value]) for name, value in values.items()})
+    two = replace(problem, effects=(hole, hole), geometry=geometry)
+    least = closures(two, state, faces(problem, state).cell).viscosity.min()
+    assert least == 0.0
 
 
 def test_a_probe_beside_its_place_reads_what_flows_there(flowing) -> None:

@@ -43,9 +43,7 @@ class _Friction:
 def closures(problem: Problem, state: Array, depth: Array) -> Closures:
     """k, nu, h T and f of a state (nx, 3, ny, m) with depths (nx, ny, m) [m], effects included."""
     stages, geometry = {active.effect.stage for active in problem.effects}, problem.geometry
-    plants = (problem.plants.phi, problem.plants.canopy_height)
-    if "plants" in stages and geometry is not None:
-        plants = _plants_after_effects(problem, geometry, state, depth)
+    plants = bent_plants(problem, state, depth)
     rate = bed_drag(problem, depth)
     if geometry is None or not stages & {"resistance", "exchange", "force"}:
         _add_plant_drag(problem, rate, depth, plants)
@@ -106,10 +104,11 @@ def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[A
     )
 
 
-def _plants_after_effects(
-    problem: Problem, geometry: ChannelGeometry, state: Array, depth: Array
-) -> tuple[Array, Array]:
+def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array]:
     """phi and canopy height (cell, m) of vegetated cells after the effects of the stage plants."""
+    geometry, stages = problem.geometry, {active.effect.stage for active in problem.effects}
+    if geometry is None or "plants" not in stages:
+        return problem.plants.phi, problem.plants.canopy_height
     column, row = problem.plants.column, problem.plants.row
     before = np.maximum(column - 1, 0)
     u = 0.5 * (state[column, ALONG, row] + state[before, ALONG, row])
@@ -154,7 +153,8 @@ def _after_effects(problem: Problem, geometry: ChannelGeometry, state: Array, fr
                 found[name] = np.zeros_like(rate)
             found[name][first:stop] = np.broadcast_to(value, cells.depth.shape)[inner]
     momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
-    return Closures(found["rate"], found["viscosity"], momentum)
+    # Two places that mix less may take more than there is.
+    return Closures(found["rate"], np.maximum(found["viscosity"], 0.0), momentum)
 
 
 def _cells(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction, columns: slice) -> Cells:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Reading
-from vegglue.flow.closures import closures
+from vegglue.flow.closures import bent_plants, closures
 from vegglue.flow.equations import Faces, faces, side_discharges
 from vegglue.flow.problem import Problem, above_bed, stretch_of_cells
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
@@ -85,7 +85,7 @@ def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     """What instruments make of it: the effects of the stage sensor, each where it acts."""
     problem, now = flow.problem, flow.at_faces
     canopy = np.zeros_like(now.cell)
-    canopy[problem.plants.column, problem.plants.row] = problem.plants.canopy_height
+    canopy[problem.plants.column, problem.plants.row] = bent_plants(problem, flow.state, now.cell)[1]
     fields = {"depth": now.cell, "u": flow.u, "rate": closures(problem, flow.state, now.cell).rate}
     fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
