@@ -76,7 +76,7 @@ def _predicted(model: Model, points: Sequence[Point], z: Array, time_step: float
 
 
 def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: float, longest: float) -> Array:
-    """(f(small) - f(off)) / small^power, one march for each cause and experiment in which it acts."""
+    """(f(small) - f(off)) / gain of small, one march for each cause and experiment in which it acts."""
     found = np.zeros((len(model.station), len(causes)))
     theta = theta_at(model.case, point.z)
     for j, cause in enumerate(causes):
@@ -85,7 +85,7 @@ def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: f
             problem = build_problem(cause.case, model.site, experiment, theta | {cause.parameter: value})
             state = _rested(problem, point.flows[experiment], time_step, longest)
             moved = _read(model, experiment, problem, state)[0] - point.prediction[model.rows[experiment]]
-            found[model.rows[experiment], j] = moved / cause.amplitude.small**cause.amplitude.power
+            found[model.rows[experiment], j] = moved / cause.amplitude.gain(cause.amplitude.off + cause.amplitude.small)
     return found
 
 

@@ -114,7 +114,7 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     built, changes = [], np.empty((*flow.state.shape[:3], len(causes)))
     for lane, cause in enumerate(causes):
         amplitude = cause.amplitude
-        gain, value = amplitude.small**amplitude.power, np.array([amplitude.off + amplitude.small])
+        gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
         problem = build_problem(cause.case, model.site, experiment, theta | {cause.parameter: value})
         changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
         built.append((problem, gain))

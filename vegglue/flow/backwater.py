@@ -21,15 +21,16 @@ def backwater(problem: Problem) -> Array:
     (nx, ny), m = problem.shape, problem.members
     state = np.zeros((nx, 3, ny, m))
     discharge = _discharge(problem)
-    level = problem.boundaries.outlet_level.copy()
+    level, bed = problem.boundaries.outlet_level.copy(), problem.bed[:, :, None]
+    bed = bed + problem.bed_rise if problem.bed_rise.size else bed
     for i in range(nx - 1, -1, -1):
-        depth = np.maximum(level - problem.bed[i][:, None], 0.0) + 0.01 * problem.film
+        depth = np.maximum(level - bed[i], 0.0) + 0.01 * problem.film
         chezy = np.sqrt(physical_constants.GRAVITY / (bed_drag(problem, depth[None], slice(i, i + 1))[0] * depth))
         wet = np.where(depth > problem.film, depth, 0.0)
         conveyance = (chezy * wet**1.5).sum(axis=0) * problem.dy + 1e-9
         slope = np.minimum((discharge[i] / conveyance) ** 2, STEEPEST)
         state[i, LEVEL], state[i, ALONG] = level, chezy * np.sqrt(wet * slope)
-        level = np.maximum(level + slope * problem.dx, problem.bed[i].min() + 10.0 * problem.film)
+        level = np.maximum(level + slope * problem.dx, bed[i].min(axis=0) + 10.0 * problem.film)
     return state
 
 

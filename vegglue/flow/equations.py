@@ -155,6 +155,7 @@ def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
         lift = _stretch_of(problem, inflow, 0.0) / _stretch_of(problem, inflow, 0.5)
         entering[:-1][part] = flux * lift
         brought[:-1][part] = flux**2 / depth[part, row] * inflow.along * lift
+        entering[-1], brought[-1] = entering[-2], brought[-2]  # the last face has one cell alone
         h = np.concatenate([depth[:, row], depth[-1:, row]])
         both = problem.dy * (h[:-1] + h[1:])
         missing = (entering[:-1] + entering[1:]) * u[:, row] - (brought[:-1] + brought[1:])
