@@ -23,6 +23,8 @@ def test_errors_of_means_are_those_of_correlated_neighbours(points: int, varianc
     station = pd.concat([probes, gauges], ignore_index=True)
     base = at_best(CASE, station, np.zeros(len(station)), np.zeros((len(station), len(CASE.parameters))))
     table = misfit_zones(base.model, with_correlation(base.noise, 0.6, 1.0), base.fitted.point)
+    fewer = misfit_zones(base.model, base.noise, base.fitted.point, (0, len(station) - 1))
+    assert fewer["stations"].sum() == len(station) - 2, "what was set aside is no misfit of the model"
     assert table.groupby("section")["stations"].sum().to_dict() == {"A": 3 * points, "gauges": 3 * points}
     of_gauges = table[table["section"] == "gauges"]["standard_error"].to_numpy()
     assert of_gauges == pytest.approx(0.01 / np.sqrt(points))

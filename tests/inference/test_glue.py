@@ -10,11 +10,13 @@ import pandas as pd
 import pytest
 from posteriors import changed
 
-from vegglue.case.prior import sample_prior
-from vegglue.case.schema import CanopyCorrection, Case
+from vegglue.case.config import load_case
+from vegglue.case.prior import quantile, sample_prior
+from vegglue.case.schema import CanopyCorrection, Case, Parameter
 from vegglue.errors import InputError
 from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
+from vegglue.inference.posterior_summary import marginals, prior_mass_near_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.report_page.posterior_words import describe
 from vegglue.resistance.plant_laws import baptist_chezy
@@ -370,3 +372,21 @@ def test_canopy_correction_stands_beside_the_raw_median() -> None:
     assert posterior.canopy.median == pytest.approx(expected, rel=1e-3)
     assert 10**posterior.canopy.log10_median == pytest.approx(expected, rel=1e-3)
     assert any(f"goes from {raw:.3g} to {expected:.3g}" in sentence for sentence in describe(posterior))
+
+
+def test_a_prior_that_ends_where_it_is_largest_is_no_bound_that_is_pressed() -> None:
+    """Half a normal prior, as an effect of one sign has: a parameter left at it was told to press against its end."""
+    flat = Parameter(distribution="uniform", low=1.0, high=3.0, unit="-")
+    half = Parameter(distribution="normal", mean=0.0, sd=0.05, low=0.0, high=3.0, unit="-")
+    decades = Parameter(distribution="loguniform", low=0.01, high=100.0, unit="-")
+    open_ended = Parameter(distribution="lognormal", median=1.0, log_sd=0.5, unit="-")
+    assert prior_mass_near_bounds(flat) == pytest.approx([0.02, 0.02])
+    assert prior_mass_near_bounds(decades) == pytest.approx([0.02, 0.02])
+    assert prior_mass_near_bounds(half) == pytest.approx([0.770, 0.0], abs=1e-3)
+    assert np.isnan(prior_mass_near_bounds(open_ended)).all()
+    twin = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
+    case = twin.model_copy(update={"parameters": {"a": half}})
+    values = quantile(half, (np.arange(4000) + 0.5) / 4000)
+    told = marginals({"a": values}, case, np.full(4000, 1 / 4000))
+    assert told.bound_mass["a"][0] > 0.7
+    assert not told.bound_hit["a"].any()

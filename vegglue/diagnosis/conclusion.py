@@ -52,10 +52,10 @@ def concluded(
 ) -> Diagnosis:
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     laws = laws_suspected(first, last, found)
-    if found.places and not found.instruments and clearly_a_law(laws):
-        last, found = first, replace(found, steps=(), places=(), charges=(), of_shape=0.0)
+    if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
+        last, found = first, replace(found, places=(), charges=(), of_shape=0.0)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
-    misfit = _misfit(first, last)
+    misfit = _misfit(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
     grounds = replace(_grounds(last, found, misfit, unseen), field=field, laws=laws)
     base, before = last.base, first.base
@@ -103,7 +103,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
     )
 
 
-def _misfit(first: Screening, last: Screening) -> Misfit:
+def _misfit(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
     freedom = after.noise.rows.size - after.fitted.point.z.size - int(np.linalg.matrix_rank(after.noise.unknown))
@@ -112,7 +112,7 @@ def _misfit(first: Screening, last: Screening) -> Misfit:
         chi2=misfit,
         freedom=freedom,
         p=chance_of_misfit(misfit, freedom),
-        zones=misfit_zones(before.model, before.noise, before.fitted.point),
+        zones=misfit_zones(before.model, before.noise, before.fitted.point, flagged),
     )
 
 

@@ -16,8 +16,9 @@ from vegglue.site.gridded_site import cells_at
 AT_EDGE = 0.2
 
 
-def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
-    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge).
+def misfit_zones(model: Model, noise: Noise, point: Point, aside: Sequence[int] = ()) -> pd.DataFrame:
+    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge), of
+    all used stations but those set aside.
 
     Zones of velocities across and of speeds are told apart from those of velocities along x: `floor (v)`.
     """
@@ -32,6 +33,7 @@ def misfit_zones(model: Model, noise: Noise, point: Point) -> pd.DataFrame:
             "error": noise.data_error,
         }
     )
+    table = table.drop(index=list(aside))
     rows = []
     covariance = covariance_of_data(noise)
     for (experiment, section, zone), part in table.groupby(["experiment", "section", "zone"], sort=False):

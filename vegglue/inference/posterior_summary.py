@@ -1,12 +1,10 @@
 """What weighted members say of each parameter and of each prediction."""
 
-import math
-
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.prior import quantile
+from vegglue.case.prior import probability, quantile
 from vegglue.case.schema import Case, Parameter
 from vegglue.inference.canopy_correction import corrected_canopy
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
@@ -36,7 +34,7 @@ from vegglue.results.posterior import (
     WeightStatistics,
 )
 
-# Posterior mass near a bound from which a parameter may press against it; one left at its prior has NEAR_BOUND = 0.02.
+# Posterior mass near a bound from which a parameter may press against it; one left at a flat prior has NEAR_BOUND.
 PRESSES_ABOVE = 0.05
 # A bound cuts the 95 % range off when it lies within this share of the range from its end: for half a normal density at
 # the bound the share is 0.014, for a normal density two standard deviations away from it 0.09.
@@ -96,7 +94,8 @@ def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
     bounds = {name: quantile(priors[name], (0.0, 1.0)) for name in theta}
     ends = {name: _on_flat_scale(bounds[name], priors[name]) for name in theta}
     mass = {name: _mass_near_bounds(scaled[name], weights, ends[name]) for name in theta}
-    no_chance = _mass_beyond_chance(effective_size(weights))
+    before = {name: prior_mass_near_bounds(priors[name]) for name in theta}
+    effective = effective_size(weights)
     return Marginals(
         median={name: weighted_median(values, weights) for name, values in theta.items()},
         sd={name: weighted_sd(values, weights) for name, values in theta.items()},
@@ -110,7 +109,9 @@ def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
         bounds=bounds,
         bound_mass=mass,
         bound_hit={
-            name: (mass[name] > no_chance) & _cut_off_by_bounds(scaled[name], weights, ends[name]) for name in theta
+            name: (mass[name] > _mass_beyond_chance(before[name], effective))
+            & _cut_off_by_bounds(scaled[name], weights, ends[name])
+            for name in theta
         },
     )
 
@@ -150,9 +151,23 @@ def _cut_off_by_bounds(scaled: Array, weights: Array, ends: Array) -> np.ndarray
     return np.asarray(distance <= CUT_OFF_WITHIN * (quantiles[-1] - quantiles[0]))
 
 
-def _mass_beyond_chance(effective: float) -> float:
-    """Mass near a bound that is not chance: three standard errors above what a parameter left at its prior has [-]."""
-    return max(PRESSES_ABOVE, NEAR_BOUND + 3 * math.sqrt(NEAR_BOUND * (1 - NEAR_BOUND) / effective))
+def prior_mass_near_bounds(prior: Parameter) -> Array:
+    """Mass of the prior itself within NEAR_BOUND of its range of its low and high bound (2,) [-]: NEAR_BOUND of a flat
+    one, and more of one that ends where it is largest; NaN without both bounds.
+    """
+    low, high = _on_flat_scale(quantile(prior, (0.0, 1.0)), prior)
+    if not np.isfinite(high - low):
+        return np.full(2, np.nan)
+    near = np.array([low, high]) + NEAR_BOUND * (high - low) * np.array([1.0, -1.0])
+    below = probability(prior, 10.0**near if _has_log_scale(prior) else near)
+    return np.array([below[0], 1.0 - below[1]])
+
+
+def _mass_beyond_chance(before: Array, effective: float) -> Array:
+    """Mass near each bound that is not chance (2,) [-]: three standard errors above that of a parameter left at its
+    prior, before (2,).
+    """
+    return np.maximum(PRESSES_ABOVE, before + 3.0 * np.sqrt(before * (1.0 - before) / effective))
 
 
 def predictive_distribution(

@@ -34,7 +34,7 @@ def _bounds(posterior: Posterior, name: str, notation: Notation) -> list[str]:
     return [
         f"{notation.parameter(name)} presses against the {side} bound of its prior, {notation.number(bound[side], 3)}: "
         f"{notation.number(mass[side], 2)} of the posterior lies within {100 * NEAR_BOUND:g} % of the prior's range of "
-        f"it ({NEAR_BOUND:g} if the data said nothing)."
+        f"it ({NEAR_BOUND:g} of a flat prior to which the data say nothing)."
         for side in pressed_bounds(posterior, name)
     ]
 
