@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.special
 from drawings import off_the_sheet, points, texts
 
 from vegglue.figures.measured import Vertical, draw_quantiles, draw_residuals, draw_verticals
@@ -44,26 +45,33 @@ def uniform_flow(u: float = 0.5, v: float = 0.0) -> FlowFields:
 
 
 def unknown(values: np.ndarray, low: float, high: float, logarithmic: bool = False) -> DrawnParameter:
-    return DrawnParameter(values, values, low, high, logarithmic, "k_s", "m")
+    return DrawnParameter(values, values, low, high, logarithmic, "k_s", "m", (low, high))
 
 
 def test_density_keeps_its_mass_at_a_bound() -> None:
     values = np.linspace(0.0, 1.0, 2001)[1::2]
-    grid, flat = density(values, np.ones(len(values)), 0.0, 1.0)
+    grid, flat = density(values, np.ones(len(values)), 0.0, 1.0, (0.0, 1.0))
     assert np.trapezoid(flat, grid) == pytest.approx(1.0, abs=0.01)
     np.testing.assert_allclose(flat, 1.0, atol=0.03)
+
+
+def test_a_density_without_bounds_is_not_folded_into_the_window() -> None:
+    """A normal prior was drawn 2.6 times too high where the posterior is narrow."""
+    values = scipy.special.ndtri((np.arange(4000) + 0.5) / 4000)
+    _, drawn = density(values, np.ones(values.size), -0.3, 0.3, (-np.inf, np.inf))
+    np.testing.assert_allclose(drawn, 0.39, atol=0.02)
 
 
 def test_density_follows_the_weights() -> None:
     values = np.linspace(0.0, 1.0, 1001)
     weights = np.exp(-0.5 * ((values - 0.7) / 0.05) ** 2)
-    grid, drawn = density(values, weights, 0.0, 1.0)
+    grid, drawn = density(values, weights, 0.0, 1.0, (0.0, 1.0))
     assert grid[np.argmax(drawn)] == pytest.approx(0.7, abs=0.01)
     assert np.sqrt(np.trapezoid(drawn * (grid - 0.7) ** 2, grid)) == pytest.approx(0.05, rel=0.1)
 
 
 def test_density_of_a_single_member_is_finite() -> None:
-    _, drawn = density(np.array([0.2, 0.5]), np.array([1.0, 0.0]), 0.0, 1.0)
+    _, drawn = density(np.array([0.2, 0.5]), np.array([1.0, 0.0]), 0.0, 1.0, (0.0, 1.0))
     assert np.isfinite(drawn).all()
 
 
@@ -135,7 +143,7 @@ def test_marginal_keeps_the_longest_label_on_the_sheet() -> None:
 def test_marginal_draws_the_prior_from_its_own_values_or_not_at_all() -> None:
     values = np.linspace(0.4, 0.6, 500)
     before = np.linspace(0.0, 1.0, 500)
-    spread = DrawnParameter(values, before, 0.0, 1.0, False, "k_s", "m")
+    spread = DrawnParameter(values, before, 0.0, 1.0, False, "k_s", "m", (0.0, 1.0))
     for drawn, height in ((spread, 1.0), (replace(spread, prior=np.zeros(0)), 0.0)):
         outline = draw_marginal(drawn, np.ones(500), []).axes[0].collections[0].get_paths()[0].vertices
         inside = (outline[:, 0] > 0.2) & (outline[:, 0] < 0.8)

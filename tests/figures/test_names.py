@@ -24,7 +24,7 @@ def drawn(figure: Figure) -> Figure:
 @pytest.mark.parametrize("name", NASTY)
 def test_a_symbol_or_unit_of_any_signs_can_be_drawn(name: str) -> None:
     values = np.linspace(1.0, 2.0, 50)
-    parameter = DrawnParameter(values, values, 1.0, 2.0, False, name, name)
+    parameter = DrawnParameter(values, values, 1.0, 2.0, False, name, name, (1.0, 2.0))
     drawn(draw_joint(parameter, parameter, np.full(50, 0.02), [(name, 1.5, 1.5, "o")]))
     drawn(draw_cylinder(values, np.full(50, 0.02), values, 1.0, 2.0, name))
 

@@ -2,7 +2,7 @@
 
 import re
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import chain, count
 from pathlib import Path
 
@@ -75,11 +75,17 @@ def case_name(words: str, otherwise: str = "case") -> str:
 def names_in_files(names: Iterable[str]) -> dict[str, str]:
     """What each of some names is called in files: in lower case, with hyphens for what is no letter, digit or _.
 
-    Letters of all scripts stay. Those that come to be the same, June and june, get a number from the second on.
+    Letters of all scripts stay.
     """
+    stems = {name: re.sub(r"[^\w-]+", "-", name.lower()).strip("-")[:LONGEST_IN_FILES] or "case" for name in names}
+    return told_apart(stems)
+
+
+def told_apart(stems: Mapping[str, str]) -> dict[str, str]:
+    """Stems by name, with a number from the second on where they come to be the same on a disk that knows no case."""
     found = dict[str, str]()
-    for name in names:
-        stem = re.sub(r"[^\w-]+", "-", name.lower()).strip("-")[:LONGEST_IN_FILES] or "case"
+    for name, stem in stems.items():
+        taken = {one.casefold() for one in found.values()}
         numbered = (f"{stem}-{number}" for number in count(2))
-        found[name] = next(one for one in chain([stem], numbered) if one not in found.values())
+        found[name] = next(one for one in chain([stem], numbered) if one.casefold() not in taken)
     return found

@@ -28,9 +28,11 @@ NARROW_WIDTH = 3.4
 
 @dataclass(frozen=True)
 class DrawnParameter:
-    """One parameter as it is drawn: its values (member,) and bounds, on a logarithmic axis where `logarithmic`.
+    """One parameter as it is drawn: its values (member,) and from where to where, on a logarithmic axis where
+    `logarithmic`.
 
-    prior: values drawn from the prior alone (n,), empty where the prior is not to be drawn.
+    prior: values drawn from the prior alone (n,), empty where the prior is not to be drawn; bounds: its ends, infinite
+    where it has none.
     """
 
     values: Array
@@ -40,6 +42,7 @@ class DrawnParameter:
     logarithmic: bool
     symbol: str
     unit: str
+    bounds: tuple[float, float]
 
     @property
     def title(self) -> str:
@@ -47,7 +50,8 @@ class DrawnParameter:
 
     def coordinate(self, value: Array | float) -> Array:
         """Where a value is drawn: itself, or its common logarithm."""
-        return np.log10(value) if self.logarithmic else np.asarray(value, float)
+        with np.errstate(divide="ignore"):  # a lower bound may be 0
+            return np.log10(value) if self.logarithmic else np.asarray(value, float)
 
 
 @dataclass(frozen=True)
@@ -60,11 +64,11 @@ class ReferenceValue:
     marker: str
 
 
-def density(values: Array, weights: Array, low: float, high: float) -> tuple[Array, Array]:
-    """p(x) = sum_k w_k [N(x; x_k, b) + N(x; 2 low - x_k, b) + N(x; 2 high - x_k, b)], b = 0.9 s n^(-1/5) (Silverman).
+def density(values: Array, weights: Array, low: float, high: float, bounds: tuple[float, float]) -> tuple[Array, Array]:
+    """p(x) = sum_k w_k [N(x; x_k, b) + sum_c N(x; 2 c - x_k, b)] from low to high, b = 0.9 s n^(-1/5) (Silverman).
 
-    Mirrored at the bounds, so that no mass leaks out; n is the effective number of members, s the lesser of standard
-    deviation and quartile distance / 1.34. Returns grid and density (DENSITY_POINTS,).
+    Mirrored at the finite ones of the bounds c, so that no mass leaks out; n is the effective number of members, s the
+    lesser of standard deviation and quartile distance / 1.34. Returns grid and density (DENSITY_POINTS,).
     """
     share = weights / weights.sum()
     quartile = weighted_quantile(values, weights, [0.25, 0.75])
@@ -74,7 +78,7 @@ def density(values: Array, weights: Array, low: float, high: float) -> tuple[Arr
     grid = np.linspace(low, high, DENSITY_POINTS)
     kept = share > 1e-8
     total = np.zeros(DENSITY_POINTS)
-    for mirrored in (values[kept], 2 * low - values[kept], 2 * high - values[kept]):
+    for mirrored in (values[kept], *(2 * bound - values[kept] for bound in bounds if np.isfinite(bound))):
         total += np.exp(-0.5 * ((grid[:, None] - mirrored) / width) ** 2) @ share[kept]
     return grid, total / (width * np.sqrt(2 * np.pi))
 
@@ -85,10 +89,11 @@ def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequenc
     figure, axes = canvas(NARROW_WIDTH, 2.7)
     values, prior_values = parameter.coordinate(parameter.values), parameter.coordinate(parameter.prior)
     low, high = (float(parameter.coordinate(bound)) for bound in (parameter.low, parameter.high))
-    grid, posterior = density(values, weights, low, high)
+    bounds = float(parameter.coordinate(parameter.bounds[0])), float(parameter.coordinate(parameter.bounds[1]))
+    grid, posterior = density(values, weights, low, high, bounds)
     quantiles = weighted_quantile(values, weights, [0.025, 0.25, 0.5, 0.75, 0.975])
     prior = (
-        density(prior_values, np.ones(len(prior_values)), low, high)[1]
+        density(prior_values, np.ones(len(prior_values)), low, high, bounds)[1]
         if prior_values.size
         else np.zeros(DENSITY_POINTS)
     )
@@ -200,7 +205,7 @@ def draw_cylinder(inferred: Array, weights: Array, cylinder: Array, low: float, 
         (cylinder, np.ones(len(cylinder)), "rigid cylinders\n(plant survey)", "stems", "plants", sides[0]),
         (inferred, weights, "inferred\nfrom the flow", "model", "wide", sides[1]),
     ):
-        grid, height = density(np.log10(values), share, low, high)
+        grid, height = density(np.log10(values), share, low, high, (low, high))
         axes.fill_between(grid, height, color=COLOUR[face], linewidth=0, alpha=0.75)
         axes.plot(grid, height, color=COLOUR[line], linewidth=1.4)
         at = int(np.argmax(height))

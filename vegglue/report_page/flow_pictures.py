@@ -6,13 +6,13 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from vegglue.case.text_files import names_in_files
+from vegglue.case.text_files import told_apart
 from vegglue.figures.plan_view import Gauges, Outline, PlanWindow, draw_plan, draw_reach, stretch_of, wet_window
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import fixed, short
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
-from vegglue.report_page.run import Run, planted_cells, published_svg, stamp
+from vegglue.report_page.run import Run, file_name, planted_cells, published_svg, stamp
 from vegglue.site.polygons import corners_of
 
 # Drawn upstream and downstream of the outermost patch and station [m]: room for the wake of a patch.
@@ -22,7 +22,7 @@ REACH_MARGIN = 8.0
 def plans(run: Run, experiment: str) -> Iterator[Picture]:
     """The reach of patches and stations, and the whole channel."""
     flow, table = run.flow[experiment], run.observations.table
-    called = names_in_files(run.case.experiments)[experiment]
+    called = told_apart({name: file_name(name) for name in run.case.experiments})[experiment]
     rows = table[table["experiment"] == experiment]
     stations = rows[["x", "y"]].drop_duplicates().to_numpy(float)
     patches = _outlines(run, experiment)

@@ -67,6 +67,7 @@ def _drawn_parameter(run: Run, name: str) -> DrawnParameter:
         logarithmic,
         run.case.parameters[name].symbol or name,
         run.posterior.sample.unit[name],
+        (float(low), float(high)),
     )
 
 
@@ -86,7 +87,10 @@ def _references(run: Run, name: str) -> list[ReferenceValue]:
     stated = reference.table.get(name, reference.table.get(f"log10_{name}"))
     if stated is not None:
         value, sd = stated if isinstance(stated, tuple) else (stated, np.nan)
-        found.append(ReferenceValue(_source(reference), value if name in reference.table else 10**value, sd, "D"))
+        if name not in reference.table:
+            value, sd = 10**value, sd * 10**value * np.log(10.0)
+        on_axis = sd / (value * np.log(10.0)) if as_power(run.posterior, name) else sd
+        found.append(ReferenceValue(_source(reference), value, on_axis, "D"))
     if name in reference.made_with:
         found.append(ReferenceValue("made with", reference.made_with[name], np.nan, "X"))
     return found
