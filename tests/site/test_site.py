@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from reach import write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import dumped
@@ -221,3 +222,17 @@ def test_a_place_on_an_edge_is_in_its_lowest_cell() -> None:
     assert [one.tolist() for one in outermost] == [[0, grid.x.size - 1], [0, grid.y.size - 1]]
     at_centres = cells_at(site, grid.x[[2, 5]], grid.y[[3, 4]])
     assert [one.tolist() for one in at_centres] == [[2, 5], [3, 4]]
+
+
+def test_plants_stand_inside_their_own_patch_whatever_is_beside_it(tmp_path: Path) -> None:
+    """Beside another patch, or around a denser one, some seemed to stand outside."""
+    first = "    - {name: p1, stand: willow, x: [12, 16], y: [0, 1.5]}\n"
+    more = "".join(
+        f"    - {{name: {name}, stand: willow, x: {x}, y: {y}}}\n"
+        for name, x, y in (("p2", [12, 16], [1.5, 3.0]), ("p3", [20, 28], [-2.0, 2.0]), ("p4", [23, 25], [-0.5, 0.5]))
+    )
+    case = load_case(write_reach(tmp_path, (first, first + more), ("cell: [1.0, 0.5]", "cell: [1.0, 0.25]")))
+    geometry = channel_geometry(case, build_site(case), "June")
+    planted = geometry.planted[..., 0] > 0
+    assert planted.any()
+    assert geometry.edge[..., 0][planted].max() < 0.0

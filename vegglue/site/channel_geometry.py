@@ -116,7 +116,7 @@ def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array
 
 def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: float) -> tuple[Array, Array, Array]:
     """Front, edge and wake of ChannelGeometry, (nx, ny) [m]."""
-    front, edge, wake = (np.full(patch.shape, np.inf) for _ in range(3))
+    front, edge, wake, own = (np.full(patch.shape, np.inf) for _ in range(4))
     for index in np.unique(patch[patch >= 0]):
         column, row = np.nonzero(patch == index)
         west, east = x[column.min()] - 0.5 * dx, x[column.max()] + 0.5 * dx
@@ -125,10 +125,11 @@ def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: floa
         beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
         here = slice(column.min(), column.max() + 1)
         edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
+        own[column, row] = beside[row]
         behind = np.where(x > east, x - east, np.inf)[:, None]
         spans = ((y > south) & (y < north))[None]
         wake = np.where(spans & (behind < wake), behind, wake)
-    return front, edge, wake
+    return front, np.where(patch >= 0, own, edge), wake  # plants stand within their own patch, whatever is near
 
 
 def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
