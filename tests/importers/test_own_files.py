@@ -405,3 +405,12 @@ def test_flat_banks_of_a_channel_are_banks(tmp_path: Path, slope: float, beyond:
     outside = cells.friction_class == cells.class_names.index("bank")
     assert outside[:, np.abs(cells.grid.y) > 1.5].all()
     assert not outside[:, np.abs(cells.grid.y) < 1.4].any()
+
+
+def test_two_files_of_one_stem_have_tables_of_their_own(tmp_path: Path) -> None:
+    """The second wrote over the first, and was then read twice."""
+    first, second = "x;y;level\n8;0;0.95\n", "x\ty\tlevel\n20\t0\t0.94\n"
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, gauge__csv=first, gauge__txt=second, Gauge__dat=first)
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert len({one.file.name.lower() for one in case.observations}) == 3
+    assert sorted(read_observations(case).table["value"]) == [0.94, 0.95, 0.95]

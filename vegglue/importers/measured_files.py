@@ -8,7 +8,8 @@ import hashlib
 import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import Path
 
 from vegglue.case.resolved_config import Tree
@@ -99,11 +100,19 @@ def _read(
             others.append((path, said.get(path.name, FileWords())))
     for group in _groups(others):
         tables, records = _brought(group, place, known)
-        written += tables
         for table in tables:
-            found += [one | {"file": f"{data_folder(target).name}/{one['file']}"} for one in table.observations]
+            name = _free_name(table.file, [one.file for one in written])
+            written.append(replace(table, file=name))
+            found += [one | {"file": f"{data_folder(target).name}/{name}"} for one in table.observations]
         imported += records
     return MeasuredFiles(found, imported, written)
+
+
+def _free_name(file: str, taken: Sequence[str]) -> str:
+    """Where gauge.csv and gauge.txt are both there, `gauge-level.csv` and `gauge-level-2.csv`; also of Gauge.txt."""
+    stem, lower = file.removesuffix(".csv"), [name.casefold() for name in taken]
+    names = chain([file], (f"{stem}-{number}.csv" for number in count(2)))
+    return next(name for name in names if name.casefold() not in lower)
 
 
 def data_folder(target: Path) -> Path:
