@@ -414,3 +414,14 @@ def test_two_files_of_one_stem_have_tables_of_their_own(tmp_path: Path) -> None:
     case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
     assert len({one.file.name.lower() for one in case.observations}) == 3
     assert sorted(read_observations(case).table["value"]) == [0.94, 0.95, 0.95]
+
+
+@pytest.mark.parametrize("heading", ["x;y;Ve;Vn;Speed;Direction", "x;y;u;v;Speed;Direction"])
+def test_a_speed_beside_its_components_is_no_further_observation(tmp_path: Path, heading: str) -> None:
+    """One reading was three observations; a row that has a speed alone keeps it."""
+    table = f"{heading}\n8;0;0.4;0.03;0.401;86\n8;1;0.4;0.03;0.401;86\n20;1;;;0.43;\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    found = read_observations(case).table
+    assert found["kind"].value_counts().to_dict() == {"velocity": 2, "velocity_across": 2, "speed": 1}
+    assert case.imported is not None
+    assert "speed not taken again beside its components" in case.imported[0].taken

@@ -103,7 +103,7 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
 
 def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
     """The rows along and across the channel: turned, shifted and flipped; a speed with its direction as components."""
-    taken = _components(taken)
+    taken = _without_speed_again(_components(taken))
     if place.turned and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
         x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])
         taken = taken.having({"x": x, "y": y}, f"places turned from the map into {place.words}")
@@ -279,6 +279,17 @@ def _components(taken: Taken) -> Taken:
     to = np.radians(numbers["direction"])
     parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
     return taken.having(parts, "components from speed and direction").without("speed", "direction")
+
+
+def _without_speed_again(taken: Taken) -> Taken:
+    """The speed only where no component is: beside one it is the same reading, and would count twice."""
+    numbers = taken.numbers
+    known = [roles for roles in (("east_velocity", "north_velocity"), ("u",)) if set(roles) <= numbers.keys()]
+    if "speed" not in numbers or not known:
+        return taken
+    again = np.any([np.isfinite([numbers[role] for role in roles]).all(axis=0) for roles in known], axis=0)
+    left = np.where(again, np.nan, numbers["speed"])
+    return taken.having({"speed": left}, "speed not taken again beside its components") if again.any() else taken
 
 
 def _flipped(taken: Taken, axes: Sequence[str]) -> Taken:
