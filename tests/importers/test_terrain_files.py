@@ -20,8 +20,8 @@ from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_folder import unnamed_banks
 
 FRAME = Frame(origin=(5000.0, 2000.0), angle=30.0)
-# Of the tags of a GeoTIFF: size of a pixel, where its first corner lies, and what stands for no level.
-SCALE, TIE, NOTHING = 33550, 33922, 42113
+# Of the tags of a GeoTIFF: size of a pixel, where its first corner lies, keys, and what stands for no level.
+SCALE, TIE, KEYS, NOTHING = 33550, 33922, 34735, 42113
 
 
 def plane(x: Array, y: Array) -> Array:
@@ -83,6 +83,41 @@ def test_a_geotiff_knows_where_it_has_no_level(tmp_path: Path) -> None:
     (tmp_path / "none.tif").write_bytes(b"II*\x00 nothing of the kind")
     with pytest.raises(InputError, match=r"none\.tif cannot be read as a GeoTIFF"):
         read_geotiff(tmp_path / "none.tif")
+
+
+def small_geotiff(path: Path, values: Array, *more: tuple[object, ...], **said: str) -> None:
+    """Three rows and four columns of 2 m whose first one is at 100 m east, 200 m north."""
+    tifffile = pytest.importorskip("tifffile")
+    place = [(SCALE, "d", 3, (2.0, 2.0, 0.0), True), (TIE, "d", 6, (0.0, 0.0, 0.0, 100.0, 200.0, 0.0), True)]
+    tifffile.imwrite(path, values, extratags=[*place, *more], **said)
+
+
+@pytest.mark.parametrize("mark", ["-99999.9", "-3.40282346638529e+38", "-1.7976931348623157e+308", "nan"])
+def test_a_mark_is_known_among_levels_of_single_precision(tmp_path: Path, mark: str) -> None:
+    """-99999.9 was a level of the bed, as float32 holds another number."""
+    values = np.full((3, 4), 2.5, dtype=np.float32)
+    with np.errstate(over="ignore"):
+        values[0, 1] = np.float32(mark)
+    small_geotiff(tmp_path / "bed.tif", values, (NOTHING, "s", 0, mark, True))
+    raster = read_geotiff(tmp_path / "bed.tif")
+    assert np.argwhere(np.isnan(raster.values)).tolist() == [[1, 2]]
+
+
+@pytest.mark.parametrize(("kind", "first"), [(1, 101.0), (2, 100.0)])
+def test_a_geotiff_says_whether_its_places_are_corners_or_middles(tmp_path: Path, kind: int, first: float) -> None:
+    """Points stood half a pixel off."""
+    keys = (1, 1, 0, 2, 1024, 0, 1, 1, 1025, 0, 1, kind)
+    small_geotiff(tmp_path / "bed.tif", np.ones((3, 4)), (KEYS, "H", len(keys), keys, True))
+    raster = read_geotiff(tmp_path / "bed.tif")
+    assert raster.x[0] == first
+    assert raster.y[-1] == 300.0 - first
+
+
+def test_the_first_of_bands_that_lie_apart_is_read(tmp_path: Path) -> None:
+    """A column of all bands was taken for it."""
+    values = np.stack([np.full((3, 4), level) for level in (1.0, 7.0)])
+    small_geotiff(tmp_path / "bed.tif", values, photometric="minisblack", planarconfig="separate")
+    assert (read_geotiff(tmp_path / "bed.tif").values == np.ones((4, 3))).all()
 
 
 def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> None:

@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
 from scipy.spatial import QhullError
 
@@ -18,8 +20,13 @@ from vegglue.site.terrain import Raster, read_raster
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")
-# Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, and, of GDAL, what marks no data.
-PIXEL_SCALE, TIE_POINT, NO_DATA = 33550, 33922, 42113
+# Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, keys, and, of GDAL, what marks no data.
+PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA = 33550, 33922, 34735, 42113
+# Among the keys, in fours from the fifth number on: the one of the type of raster, and its value where a place on the
+# map is that of the middle of a pixel, not of its corner.
+TYPE_OF_RASTER, OF_POINTS = 1025, 2
+SEPARATE = 2  # of a TIFF whose bands lie one behind the other, not pixel by pixel
+Tags = dict[int, tuple[float, ...]]
 # Levels of a raster that are sought along a centreline to tell how far it reaches: it is told in words only.
 MOST_FOR_EXTENT = 5000
 
@@ -59,26 +66,45 @@ def read_geotiff(path: Path) -> Raster:
     with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
         page = file.pages.first
         refuse_larger(path, page.nbytes)  # before they are unpacked
-        tags = {code: page.tags[code].value for code in (PIXEL_SCALE, TIE_POINT, NO_DATA) if code in page.tags}
+        known = (PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA)
+        tags = {code: page.tags[code].value for code in known if code in page.tags}
         if PIXEL_SCALE not in tags or TIE_POINT not in tags or not 0.0 < tags[PIXEL_SCALE][0] == tags[PIXEL_SCALE][1]:
             raise InputError(
                 f"{shown_path(path)}: expected a GeoTIFF with square pixels along the map (tags ModelPixelScale and "
                 "ModelTiepoint), got another; warp it to its own coordinate system first."
             )
-        values = np.asarray(page.asarray(), dtype=np.float64)
-        return _north_up(values[..., 0] if values.ndim == 3 else values, tags)
+        values = np.asarray(page.asarray())
+        if values.ndim == 3:
+            values = values[0] if page.planarconfig == SEPARATE else values[..., 0]
+        return _north_up(_without_marks(values, tags), tags)
 
 
-def _north_up(values: Array, tags: dict[int, tuple[float, ...]]) -> Raster:
+def _without_marks(values: NDArray[Any], tags: Tags) -> Array:
+    """Levels [m], NaN where there is none. The mark is rounded as they are: none of float32 is -99999.9 itself."""
+    levels = values.astype(np.float64)
+    if NO_DATA not in tags:
+        return levels
+    mark = np.float64(str(tags[NO_DATA]).strip("\x00 "))
+    if np.issubdtype(values.dtype, np.floating):
+        with np.errstate(over="ignore"):  # the largest of float64 is a usual mark, too
+            mark = np.float64(mark.astype(values.dtype))
+    return np.where(levels == mark, np.nan, levels)
+
+
+def _north_up(values: Array, tags: Tags) -> Raster:
     size = tags[PIXEL_SCALE][0]
     column, row, _, east, north, _ = tags[TIE_POINT][:6]
-    x = np.array(east + (np.arange(values.shape[1]) + 0.5 - column) * size)
-    y = np.array(north - (np.arange(values.shape[0]) + 0.5 - row) * size)
+    middle = 0.0 if _is_of_points(tags) else 0.5
+    x = np.array(east + (np.arange(values.shape[1]) + middle - column) * size)
+    y = np.array(north - (np.arange(values.shape[0]) + middle - row) * size)
     if not (np.diff(x) > 0.0).all() or not (np.diff(y) < 0.0).all():
         raise ValueError(f"pixels of {size:g} m at {east:g}, {north:g} m have no places of their own")
-    if NO_DATA in tags:
-        values = np.where(values == float(str(tags[NO_DATA]).strip("\x00 ")), np.nan, values)
     return Raster(x, y[::-1].copy(), size, values[::-1].T)
+
+
+def _is_of_points(tags: Tags) -> bool:
+    keys = tags.get(KEYS, ())
+    return any(key == TYPE_OF_RASTER and value == OF_POINTS for key, value in zip(keys[4::4], keys[7::4], strict=False))
 
 
 def _of_raster(raster: Raster, place: Placement) -> Terrain:
