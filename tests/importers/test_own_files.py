@@ -425,3 +425,52 @@ def test_a_speed_beside_its_components_is_no_further_observation(tmp_path: Path,
     assert found["kind"].value_counts().to_dict() == {"velocity": 2, "velocity_across": 2, "speed": 1}
     assert case.imported is not None
     assert "speed not taken again beside its components" in case.imported[0].taken
+
+
+def verticals_of(tmp_path: Path, said: str, error: str) -> pd.DataFrame:
+    """Stations of two verticals; a cell of v is empty in the first, all of them in the second."""
+    rows = [f"8,{y},{z},{u},{v},{error}" for y in (0, 1) for z, u, v in (
+        (0.1, 0.4, "0.02" if y == 0 else ""), (0.3, 0.5, ""), (0.6, 0.6, "0.02" if y == 0 else ""))]  # fmt: skip
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + said, adv__csv="\n".join(["x,y,z,u,v,u_se", *rows]))
+    return read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+
+
+def test_points_without_a_second_component_cost_no_other_its_own(tmp_path: Path) -> None:
+    """One empty cell dropped all velocities across."""
+    table = verticals_of(tmp_path, "", "0.01")
+    across = table[table["kind"] == "velocity_across"]
+    assert across["y"].tolist() == [0.0]
+    assert 0.015 < across["value"].item() < 0.02
+    assert len(table[table["kind"] == "velocity"]) == 2
+
+
+def test_stated_errors_of_points_in_the_vertical_count(tmp_path: Path) -> None:
+    """Neither the column nor the site file did: all had the error of a minute of usual turbulence."""
+    errors = []
+    for name, said, column in (
+        ("a", "", ""),
+        ("b", "", "0.1"),
+        ("c", "files: {adv.csv: {standard_error: 10 cm/s}}\n", ""),
+    ):
+        (tmp_path / name).mkdir()
+        table = verticals_of(tmp_path / name, said, column)
+        errors.append(table.loc[table["kind"] == "velocity", "standard_error"].to_numpy(float))
+    usual, of_column, of_site = errors
+    assert (of_column > 2.0 * usual).all()
+    assert np.allclose(of_site, of_column)
+
+
+@pytest.mark.parametrize(
+    ("table", "errors"),
+    [
+        ("x;y;level;SE\n8;0;0.95;0.002\n", [0.002]),
+        ("x;y;level;SE (mm)\n8;0;0.95;2\n", [0.002]),
+        ("x;y;Speed;SE\n8;0;0.4;0.01\n", [0.01]),
+        ("x;y;Speed;Direction;SE\n8;0;0.4;80;0.01\n", [0.01, 0.01]),
+        ("x;Q;standard error\n8;2;0.1\n", [0.1]),
+    ],
+)
+def test_an_error_without_a_name_is_of_what_the_table_holds(tmp_path: Path, table: str, errors: list[float]) -> None:
+    """It was taken for that of u, and dropped."""
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    assert read_observations(case).table["standard_error"].tolist() == pytest.approx(errors)

@@ -8,12 +8,13 @@ import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, role_of, unit_stated, words_of
+from vegglue.importers.column_names import ROLES
+from vegglue.importers.columns_of_table import columns_of_table, unit_of_column
 from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
 from vegglue.importers.placement import Placement
-from vegglue.importers.unit_words import UNITS, si_factor, unit_named
+from vegglue.importers.unit_words import si_factor
 from vegglue.in_short import so_many
 
 # Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
@@ -21,8 +22,6 @@ from vegglue.in_short import so_many
 MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
-# Words of a heading that say across; V alone says none, and may be the velocity.
-WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -73,7 +72,7 @@ def read_rows(path: Path, words: FileWords) -> Taken:
 
 def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
     """What a table holds, in SI: columns by `words`, else by their usual names; units likewise."""
-    columns = _columns(path, table, words)
+    columns = columns_of_table(path, table, words)
     numbers: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
     units: dict[str, str] = {}
@@ -83,7 +82,7 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
         if not ROLES[role].quantity:
             texts[role] = fields
             continue
-        units[role] = _unit(path, table, place, role, words)
+        units[role] = unit_of_column(path, table, place, role, words)
         values, absent = _numbers(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
         if ROLES[role].quantity == "velocity":
@@ -174,64 +173,6 @@ def _without(heading: str, unit: str | None) -> str:
     return heading.removesuffix(f"[{unit}]").removesuffix(f"({unit})").rstrip()
 
 
-def _columns(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
-    """The place of the column of each role; of two of one role the first."""
-    found: dict[str, int] = {}
-    for role, heading in words.columns.items():
-        if heading not in table.headings:
-            raise InputError(
-                f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
-                f"correct `columns` of this file."
-            )
-        found[role] = table.headings.index(heading)
-    for place, heading in enumerate(table.headings):
-        known = role_of(heading)
-        if known is not None and known[0] not in found and place not in found.values():
-            found[known[0]] = place
-    if "v" not in words.columns and _is_the_speed(found, table.headings):
-        found["u"] = found.pop("v")
-    # One error for a velocity, not for a component of it, is that of both.
-    across = next((role for role in ("v", "north_velocity") if role in found), None)
-    if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
-        found["v_se"] = found["u_se"]
-    return found
-
-
-def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
-    """Whether a column V stands for the velocity: there is no other, and its name says no direction."""
-    alone = not any(ROLES[role].quantity == "velocity" for role in found if role not in ("v", "u_se", "u_std"))
-    return "v" in found and alone and not WORDS_FOR_ACROSS & set(words_of(headings[found["v"]]).split())
-
-
-def _of_one(heading: str) -> bool:
-    """Whether the heading of a standard error names a component, `u_se`."""
-    return "u" in words_of(heading).split()
-
-
-def _unit(path: Path, table: LooseTable, place: int, role: str, words: FileWords) -> str:
-    """By the site file, the row of units, the heading; else the SI unit."""
-    quantity = ROLES[role].quantity
-    if role in words.units:
-        return unit_named(words.units[role], quantity) or words.units[role]
-    heading = table.headings[place]
-    known = role_of(heading)
-    by_heading = (known[1] if known else None) or _bracketed(heading) or unit_stated(heading, quantity)
-    stated = table.units[place].strip("[]() ") or by_heading
-    if not stated:
-        return next(iter(UNITS[quantity]))
-    unit = unit_named(stated, quantity)
-    if unit is None:
-        raise InputError(
-            f"{shown_path(path)}: column {heading!r} is headed {stated!r}, which is no unit of "
-            f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file."
-        )
-    return unit
-
-
-def _bracketed(heading: str) -> str:
-    return heading[heading.rfind("[") + 1 : -1] if heading.endswith("]") and "[" in heading else ""
-
-
 def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, list[str]]:
     """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty."""
     values = np.full(len(table.rows), np.nan)
@@ -272,13 +213,18 @@ def _doubted(values: Array, heading: str) -> list[str]:
 
 
 def _components(taken: Taken) -> Taken:
-    """u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to."""
+    """u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to.
+
+    One error for a velocity is that of both components.
+    """
     numbers = taken.numbers
     if not {"speed", "direction"} <= numbers.keys() or "u" in numbers or "east_velocity" in numbers:
         return taken
     to = np.radians(numbers["direction"])
     parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
-    return taken.having(parts, "components from speed and direction").without("speed", "direction")
+    if (error := numbers.get("speed_se")) is not None:
+        parts |= {"u_se": error, "v_se": error}
+    return taken.having(parts, "components from speed and direction").without("speed", "direction", "speed_se")
 
 
 def _without_speed_again(taken: Taken) -> Taken:

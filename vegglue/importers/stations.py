@@ -15,7 +15,7 @@ from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats
 from vegglue.in_short import so_many
-from vegglue.measurements.kinds import KINDS, Kind
+from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 
 # Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
 ONE_PLACE = 0.001
@@ -58,7 +58,9 @@ def station_tables(
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
-        return StationTables([_points(taken, stem, words)], (*no_place, *_lacking(taken, ["u", "z"], np.all)))
+        beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
+        lacking = (*no_place, *_lacking(taken, ["u", "z"], np.all), *beside)
+        return StationTables([_points(taken, stem, words)], lacking)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     return StationTables([table for table in found if table.rows], (*no_place, *no_value))
@@ -145,11 +147,7 @@ def _places(taken: Taken) -> list[PlaceKey]:
 def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     """Points in the vertical; a section is a case of the file, at the middle of its x."""
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"]))
-    optional = [
-        role
-        for role in ("v", "w", "u_std", "duration_s")
-        if role in kept.numbers and np.isfinite(kept.numbers[role]).all()
-    ]
+    optional = _beside_u(kept, words)
     names = [
         f"{experiment}/{section}"
         for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
@@ -159,18 +157,38 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
         here = np.array([one == name for one in names])
         x[here] = np.median(x[here])
     devices = kept.words.get("device", ["ADV"] * kept.size)
-    columns = [x, kept.numbers["y"], kept.numbers["z"], kept.numbers["u"], *(kept.numbers[role] for role in optional)]
+    columns = [x, kept.numbers["y"], kept.numbers["z"], kept.numbers["u"], *optional.values()]
     rows = [
         [name, device or "ADV", *map(_number, values)]
         for name, device, values in zip(names, devices, zip(*columns, strict=True), strict=True)
     ]
+    v = optional.get("v", np.full(kept.size, np.nan))
+    across = {name for name, value in zip(names, v.tolist(), strict=True) if np.isfinite(value)}
     observations = tuple(
-        _section_observation(f"{stem}.csv", name, words, "v" in optional) for name in dict.fromkeys(names)
+        _section_observation(f"{stem}.csv", name, words, name in across) for name in dict.fromkeys(names)
     )
     heading = ("case", "device", "x", "y", "z", "u", *optional)
     return StationTable(
         f"{stem}.csv", heading, rows, observations, f"{len(rows)} points of {len(observations)} sections"
     )
+
+
+def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
+    """What else is known of points: v and w where any has it, standard errors with 0 for unknown, and what all have."""
+    numbers = points.numbers
+    found = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
+    errors = np.nan_to_num(_errors(points, KINDS[STREAMWISE], words))
+    found |= {"u_se": errors} if errors.any() else {}
+    return found | {
+        role: numbers[role] for role in ("u_std", "duration_s") if role in numbers and np.isfinite(numbers[role]).all()
+    }
+
+
+def _errors(taken: Taken, kind: Kind, words: FileWords) -> Array:
+    """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one."""
+    stated = np.full(taken.size, words.standard_error.get(kind.unit, np.nan))
+    column = taken.numbers.get(kind.error_column, stated)
+    return np.where(np.isfinite(column), column, stated)
 
 
 def _section_observation(file: str, name: str, words: FileWords, across: bool) -> Tree:
@@ -193,9 +211,7 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     What was measured at a point stands on the map of its centreline, as a case reads it.
     """
     kept = taken.only(np.isfinite(taken.numbers[kind.column]))
-    errors = kept.numbers.get(kind.error_column)
-    if errors is None:
-        errors = np.full(kept.size, words.standard_error.get(kind.unit, np.nan))
+    errors = _errors(kept, kind, words)
     gathered: dict[PlaceKey, list[RepeatedValue]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
@@ -212,4 +228,5 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
 
 
 def _number(value: float) -> str:
-    return f"{round(float(value), 6):.12g}"
+    """As in a table; nothing for none."""
+    return "" if np.isnan(value) else f"{round(float(value), 6):.12g}"

@@ -86,7 +86,10 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 def _read_points(observation: Observation) -> pd.DataFrame:
     """Rows of the observed case, upwards in each vertical, in the coordinates of the grid."""
     path, wanted = observation.file, observation.case
-    rows = read_table(path, ("case", "device"), ("x", "y", "z", "u"), ("v", "w", "u_std", "duration_s"))
+    optional = ("v", "w", "u_se", "u_std", "duration_s")
+    rows = read_table(path, ("case", "device"), ("x", "y", "z", "u"), optional, gaps=("v", "w"))
+    if "u_se" in rows:
+        refuse_rows(path, rows["u_se"] < 0.0, "expected u_se of at least 0, which is unknown; mend or remove the row")
     for column in {"u_std", "duration_s"} & set(rows.columns):
         refuse_rows(path, rows[column] <= 0.0, f"expected {column} above 0; mend or remove the row")
     refuse_repeated(path, rows, ("case", "x", "y", "z"))
@@ -114,7 +117,7 @@ def across_averages(points: pd.DataFrame) -> pd.DataFrame:
     """
     found = []
     for _, group in points.groupby("y"):
-        wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"])]
+        wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"]) & group["v"].notna()]
         column = _column(wet.assign(u=wet["v"])) if len(wet) else None
         found.append(linear_average(column) if column is not None else (np.nan, np.nan))
     return pd.DataFrame(found, columns=["value", "standard_error"])
@@ -197,14 +200,17 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
 
 
 def _with_errors(points: pd.DataFrame) -> pd.DataFrame:
-    """Sampling error of every point; the integral time scale, which no file gives, is taken as h / U of the vertical.
+    """Standard error of every point: as stated, else its sampling error.
 
-    That is eddies as long as the water is deep, carried past at the mean velocity.
+    The integral time scale, which no file gives, is taken as h / U of the vertical: that is eddies as long as the water
+    is deep, carried past at the mean velocity.
     """
     mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST).to_numpy()
     deviation = points["u_std"].to_numpy() if "u_std" in points else TURBULENCE * mean
     duration = points["duration_s"].to_numpy() if "duration_s" in points else np.full(len(points), DURATION)
     error = sampling_error(deviation, duration, points["depth"].clip(lower=0.0).to_numpy() / mean)
+    if "u_se" in points:
+        error = np.where(points["u_se"] > 0.0, points["u_se"], error)
     return points.assign(standard_error=np.maximum(error, SMALLEST_ERROR), u_std=points.get("u_std", np.nan))
 
 

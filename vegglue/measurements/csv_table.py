@@ -14,12 +14,18 @@ from vegglue.errors import InputError, shown_path
 
 
 def read_table(
-    path: Path, names: Sequence[str], numbers: Sequence[str], optional: Sequence[str] = (), labels: Sequence[str] = ()
+    path: Path,
+    names: Sequence[str],
+    numbers: Sequence[str],
+    optional: Sequence[str] = (),
+    labels: Sequence[str] = (),
+    gaps: Sequence[str] = (),
 ) -> pd.DataFrame:
     """A CSV as a table, its index the number of each row in the file, whose heading is row 1.
 
     names: columns that must be there, as text; numbers: columns that must be there, as float64; optional and labels:
-    numbers and text that are read where there is such a column. Other columns are left out.
+    numbers and text that are read where there is such a column; gaps: those of the numbers whose cells may be empty,
+    which are NaN. Other columns are left out.
     Errors: InputError, naming file and row, when the file cannot be read, has no rows or lacks a column, and for a name
     that is empty or a number that is missing, infinite or none.
     """
@@ -40,7 +46,7 @@ def read_table(
     values = [*numbers, *(column for column in optional if column in raw.columns)]
     return pd.DataFrame(
         {column: _texts(path, raw[column]) for column in texts}
-        | {column: _numbers(path, raw[column]) for column in values}
+        | {column: _numbers(path, raw[column], column in gaps) for column in values}
     )
 
 
@@ -100,9 +106,9 @@ def _texts(path: Path, column: "pd.Series[str]") -> "pd.Series[str]":
     return text
 
 
-def _numbers(path: Path, column: "pd.Series[str]") -> "pd.Series[float]":
+def _numbers(path: Path, column: "pd.Series[str]", gaps: bool) -> "pd.Series[float]":
     values = pd.to_numeric(column.str.strip(), errors="coerce").astype(float)
-    wrong = ~np.isfinite(values)
+    wrong = ~np.isfinite(values) & ~((column.str.strip() == "") & gaps)
     if wrong.any():
         row = wrong.idxmax()
         got = f"expected a number in column {column.name}, got {column[row]!r}"

@@ -174,7 +174,10 @@ def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
 
 
 def _averaged_across(section: Section, observation: Observation) -> pd.DataFrame:
-    """Stations of velocity across from the points of the same verticals. Errors: InputError without a column v."""
+    """Stations of velocity across from the points of the same verticals; none where no point of a vertical has v.
+
+    Errors: InputError without a column v.
+    """
     if "v" not in section.points:
         raise InputError(
             f"{shown_path(observation.file)}, row 1: expected a column v for `across`, got none; add it, or take "
@@ -183,7 +186,8 @@ def _averaged_across(section: Section, observation: Observation) -> pd.DataFrame
     averages = across_averages(section.points)
     profiles = section.profiles.reset_index(drop=True).assign(kind=TRANSVERSE, value=averages["value"])
     error = averages["standard_error"] if observation.standard_error is None else observation.standard_error
-    return profiles.assign(standard_error=error)[list(STATION_COLUMNS)]
+    known = profiles["value"].notna() | ~profiles["used"].astype(bool)
+    return profiles.assign(standard_error=error).loc[known, list(STATION_COLUMNS)]
 
 
 def _kind_in(case: Case, observation: Observation) -> Kind:

@@ -1,0 +1,80 @@
+"""Which column of a table holds what, and in which unit: by the site file, else by its heading."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import ROLES, role_of, unit_stated, words_of
+from vegglue.importers.file_words import FileWords
+from vegglue.importers.loose_table import LooseTable
+from vegglue.importers.unit_words import UNITS, unit_named
+
+# Words of a heading that say across; V alone says none, and may be the velocity.
+WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
+
+
+def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
+    """The place of the column of each role; of two of one role the first. Errors: InputError for one not there."""
+    found: dict[str, int] = {}
+    for role, heading in words.columns.items():
+        if heading not in table.headings:
+            raise InputError(
+                f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
+                f"correct `columns` of this file."
+            )
+        found[role] = table.headings.index(heading)
+    for place, heading in enumerate(table.headings):
+        known = role_of(heading)
+        if known is not None and known[0] not in found and place not in found.values():
+            found[known[0]] = place
+    if "v" not in words.columns and _is_the_speed(found, table.headings):
+        found["u"] = found.pop("v")
+    if "u_se" not in words.columns and (kind := _only_kind(found)) and not _of_one(table.headings[found["u_se"]]):
+        found.setdefault(f"{kind}_se", found.pop("u_se"))
+    # One error for a velocity, not for a component of it, is that of both.
+    across = next((role for role in ("v", "north_velocity") if role in found), None)
+    if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
+        found["v_se"] = found["u_se"]
+    return found
+
+
+def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
+    """Whether a column V stands for the velocity: there is no other, and its name says no direction."""
+    alone = not any(ROLES[role].quantity == "velocity" for role in found if role not in ("v", "u_se", "u_std"))
+    return "v" in found and alone and not WORDS_FOR_ACROSS & set(words_of(headings[found["v"]]).split())
+
+
+def _only_kind(found: Mapping[str, int]) -> str | None:
+    """What a column headed SE is of where no component of velocity stands beside it."""
+    kinds = [role for role in ("speed", "level", "discharge") if role in found]
+    alone = not {"u", "v", "east_velocity", "north_velocity"} & found.keys()
+    return kinds[0] if "u_se" in found and alone and len(kinds) == 1 else None
+
+
+def _of_one(heading: str) -> bool:
+    """Whether the heading of a standard error names a component, `u_se`."""
+    return "u" in words_of(heading).split()
+
+
+def unit_of_column(path: Path, table: LooseTable, place: int, role: str, words: FileWords) -> str:
+    """By the site file, the row of units, the heading; else the SI unit. Errors: InputError for a unit not known."""
+    quantity = ROLES[role].quantity
+    if role in words.units:
+        return unit_named(words.units[role], quantity) or words.units[role]
+    heading = table.headings[place]
+    known = role_of(heading)
+    by_heading = (known[1] if known else None) or _bracketed(heading) or unit_stated(heading, quantity)
+    stated = table.units[place].strip("[]() ") or by_heading
+    if not stated:
+        return next(iter(UNITS[quantity]))
+    unit = unit_named(stated, quantity)
+    if unit is None:
+        raise InputError(
+            f"{shown_path(path)}: column {heading!r} is headed {stated!r}, which is no unit of "
+            f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file."
+        )
+    return unit
+
+
+def _bracketed(heading: str) -> str:
+    return heading[heading.rfind("[") + 1 : -1] if heading.endswith("]") and "[" in heading else ""
