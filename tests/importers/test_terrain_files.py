@@ -135,6 +135,40 @@ def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> N
     assert np.isnan(terrain.level(np.array([10.0]), np.array([6.0]))).all()
 
 
+@pytest.mark.parametrize(("names", "spread"), [(True, 0.2), (True, 0.0), (False, 0.0)])
+def test_sections_of_a_flume_stay_apart(tmp_path: Path, names: bool, spread: float) -> None:
+    """Sections within a metre of one another were made one, and the slope between them was lost."""
+    rows = ["section,x,y,z" if names else "x,y,z"]
+    for number in range(5):
+        for part, z in ((-1, 0.3), (0, 0.1), (1, 0.3)):
+            at = f"{0.5 * number + spread * part:.3f},{0.4 * part},{z - 0.02 * number:.3f}"
+            rows.append(f"S{number},{at}" if names else at)
+    (tmp_path / "sections.csv").write_text("\n".join(rows), encoding="utf-8")
+    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileWords(), sections=True)
+    x = np.linspace(0.0, 2.0, 9)
+    assert np.allclose(terrain.level(x, np.zeros(9)), 0.1 - 0.04 * x)
+    assert "in 5 cross-sections" in terrain.said
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("A,0,-1,1\nA,0,1,1\nB,5,0,1\n", "in each cross-section, got one at x = 5 m; name sections"),
+        ("A,0,-1,1\nA,0,0,1\nB,0,0,1\nB,0,1,1\n", "got two at x = 0 m; give both one name"),
+        ("A,3,-1,1\nA,3,1,1\n", "got one from x = 3 to 3 m"),
+    ],
+)
+def test_sections_that_make_no_bed_are_refused(tmp_path: Path, rows: str, said: str) -> None:
+    """One alone ended in a division by zero."""
+    (tmp_path / "reach").mkdir()
+    (tmp_path / "reach" / "s.csv").write_text(f"section,x,y,z\n{rows}", encoding="utf-8")
+    (tmp_path / "reach" / "u.csv").write_text("x,y,u\n3,0,0.5\n", encoding="utf-8")
+    june = "bed: {file: s.csv, sections: true}\nexperiments: {June: {discharge: 2, level: 1.6}}\n"
+    (tmp_path / "reach" / "site.yaml").write_text(june, encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        vegglue.import_folder(tmp_path / "reach", tmp_path / "reach.yaml")
+
+
 def patches_on_the_map(path: Path) -> None:
     corners = [FRAME.to_map(*corner) for corner in ((12, 0), (16, 0), (16, 2), (12, 2), (12, 0))]
     feature = {"type": "Feature", "properties": {"name": "Willows", "stems": 22}}

@@ -79,6 +79,13 @@ def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) ->
             )
     x, y = (list(one or (round(low, 4), round(high, 4))) for one, low, high in (
         (given.x, west, east), (given.y, south, north)))  # fmt: skip
+    for key, (low, high) in (("x", x), ("y", y)):
+        if not high > low:
+            raise InputError(
+                f"{shown_path(path)}: expected a bed that reaches along and across the channel, got one from {key} = "
+                f"{low:g} to {high:g} m ({terrain.said}); say `grid.{key}` in the site file, or name sections by a "
+                "column `section`."
+            )
     dy = (y[1] - y[0]) / SURVEYED_ROWS
     columns = max(even((x[1] - x[0]) / (dy * LENGTH_OF_CELLS)), 4)
     return {"x": x, "y": y, "cell": list(given.cell or ((x[1] - x[0]) / columns, dy))}

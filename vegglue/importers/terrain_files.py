@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
 from scipy.spatial import QhullError
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
+from vegglue.importers.stations import ONE_PLACE
 from vegglue.site.terrain import Raster, read_raster
 
 # Endings of files of levels on a grid.
@@ -29,6 +30,9 @@ SEPARATE = 2  # of a TIFF whose bands lie one behind the other, not pixel by pix
 Tags = dict[int, tuple[float, ...]]
 # Levels of a raster that are sought along a centreline to tell how far it reaches: it is told in words only.
 MOST_FOR_EXTENT = 5000
+# Points of a cross-section without a name lie within so much of the next one along the channel [m], as surveyed in a
+# stream, unless most points share their x: a tape, or a flume.
+SPREAD_OF_SECTION = 1.0
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,8 @@ def read_terrain(path: Path, place: Placement, words: FileWords, sections: bool)
     ending = path.suffix.lower()
     if ending in RASTERS:
         return _of_raster(read_geotiff(path) if ending in (".tif", ".tiff") else read_raster(path), place)
-    points, said = _points(path, place, words)
-    return _of_sections(points, said) if sections else _of_points(path, points, said)
+    points, names, said = _points(path, place, words)
+    return _of_sections(_sections(path, points, names), said) if sections else _of_points(path, points, said)
 
 
 def read_geotiff(path: Path) -> Raster:
@@ -119,8 +123,11 @@ def _of_raster(raster: Raster, place: Placement) -> Terrain:
     return Terrain(level, _extent(along, across), f"grid of {len(known):,} levels, {raster.size:g} m apart")
 
 
-def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, str]:
-    """x, y, z (points, 3) [m]; three columns without a heading are these."""
+def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list[str], str]:
+    """x, y, z (points, 3) [m], the section of each where a column names it, and what was taken.
+
+    Three columns without a heading are x, y and z.
+    """
     bare = {"x": "1", "y": "2", "z": "3"}
     taken = read_rows(path, words)
     if not {"x", "y", "z"} <= taken.numbers.keys():
@@ -130,10 +137,10 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, str]
         )
     taken = in_the_channel(taken, place, words)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
-    points = points[np.isfinite(points).all(axis=1)]
-    if not points.size:
+    there: Mask = np.asarray(np.isfinite(points).all(axis=1))
+    if not there.any():
         raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
-    return points, taken_in_words(taken)
+    return points[there], list(taken.only(there).words.get("section", [])), taken_in_words(taken)
 
 
 def _of_points(path: Path, points: Array, said: str) -> Terrain:
@@ -147,15 +154,46 @@ def _of_points(path: Path, points: Array, said: str) -> Terrain:
     return Terrain(lambda x, y: np.asarray(surface(x, y)), _extent(points[:, 0], points[:, 1]), said)
 
 
-def _of_sections(points: Array, said: str) -> Terrain:
+def _sections(path: Path, points: Array, names: list[str]) -> list[Array]:
+    """The points (n, 3) of each cross-section, along the channel, and in each one from the right to the left [m].
+
+    As a column names them; else those of one x, where most points share theirs, or those within SPREAD_OF_SECTION.
+    Errors: InputError for sections that make no bed.
+    """
+    ordered = np.argsort(points[:, 0], kind="stable")
+    if names and all(names):
+        parts = [points[np.array(names) == name] for name in dict.fromkeys(names)]
+    else:
+        steps = np.diff(points[ordered, 0])
+        gap = ONE_PLACE if 2 * ((steps > ONE_PLACE).sum() + 1) <= len(points) else SPREAD_OF_SECTION
+        parts = np.split(points[ordered], np.flatnonzero(steps > gap) + 1)
+    parts.sort(key=lambda part: float(part[:, 0].mean()))
+    _refuse_no_bed(path, parts)
+    return [part[np.argsort(part[:, 1], kind="stable")] for part in parts]
+
+
+def _refuse_no_bed(path: Path, sections: list[Array]) -> None:
+    """Errors: InputError for a section without a width, and for two at one place along the channel."""
+    for part in sections:
+        if not np.ptp(part[:, 1]) > 0.0:
+            raise InputError(
+                f"{shown_path(path)}: expected two or more points across in each cross-section, got one at x = "
+                f"{part[0, 0]:.6g} m; name sections by a column `section`, or take it out."
+            )
+    middles = np.array([part[:, 0].mean() for part in sections])
+    if (np.diff(middles) <= ONE_PLACE).any():
+        raise InputError(
+            f"{shown_path(path)}: expected cross-sections at places of their own along the channel, got two at x = "
+            f"{middles[:-1][np.diff(middles) <= ONE_PLACE][0]:.6g} m; give both one name, or take one out."
+        )
+
+
+def _of_sections(sections: list[Array], said: str) -> Terrain:
     """z(x, eta) linear along the channel between neighbouring sections, at one share eta of their widths.
 
     eta = (y - y_left) / (y_right - y_left); so that a thalweg is carried on from one section to the next, where a
-    triangulation would make steps of it. Points of a section are those of one x, within a metre.
+    triangulation would make steps of it.
     """
-    points = points[np.argsort(points[:, 0], kind="stable")]
-    parts = np.split(points, np.flatnonzero(np.diff(points[:, 0]) > 1.0) + 1)
-    sections = [part[np.argsort(part[:, 1], kind="stable")] for part in parts]
     along = np.array([section[:, 0].mean() for section in sections])
     ends = np.array([[section[0, 1], section[-1, 1]] for section in sections])
 
