@@ -14,9 +14,11 @@ from vegglue.cli.loop_commands import import_command
 from vegglue.errors import InputError
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.polygon_files import planted_polygons, read_polygons
 from vegglue.importers.terrain_files import read_geotiff, read_terrain
+from vegglue.site.grid import Grid
 from vegglue.site.gridded_site import build_site
+from vegglue.site.polygons import area_of, in_polygon
 from vegglue.workflow.import_folder import unnamed_banks
 
 FRAME = Frame(origin=(5000.0, 2000.0), angle=30.0)
@@ -209,6 +211,48 @@ def test_polygons_of_a_shapefile_are_those_of_geojson(tmp_path: Path) -> None:
     (same,) = read_polygons(tmp_path / "patches.geojson", FRAME)
     assert (found.name, found.density) == (same.name, same.density) == ("Willows", 22.0)
     assert np.allclose(sorted(found.corners), sorted(same.corners))
+
+
+def square(x: float, y: float, side: float) -> list[list[float]]:
+    """Corners of a square, clockwise as the outer rings of a shapefile run."""
+    return [[x, y], [x, y + side], [x + side, y + side], [x + side, y], [x, y]]
+
+
+@pytest.mark.parametrize("name", ["p.shp", "p.geojson"])
+def test_parts_and_holes_of_a_polygon_are_kept(tmp_path: Path, name: str) -> None:
+    """Of a shapefile only the first part was read, and of holes nothing."""
+    rings = [square(0, 0, 4), square(1, 1, 2)[::-1], square(6, 0, 2)]
+    if name.endswith(".shp"):
+        shapefile = pytest.importorskip("shapefile")
+        with shapefile.Writer(str(tmp_path / name)) as writer:
+            writer.field("STEMS", "N", decimal=1)
+            writer.poly(rings)
+            writer.record(22.0)
+    else:
+        shape = {"type": "MultiPolygon", "coordinates": [rings[:2], rings[2:]]}
+        text = json.dumps({"type": "Feature", "geometry": shape, "properties": {"stems": 22}})
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    found = read_polygons(tmp_path / name, None)
+    assert [one.density for one in found] == [22.0, 22.0]
+    assert [area_of(np.array(one.corners)) for one in found] == pytest.approx([12.0, 4.0])
+    grid = Grid(np.arange(0.25, 9.0, 0.5), np.arange(0.25, 5.0, 0.5), 0.5, 0.5)
+    assert [int(in_polygon(tuple(one.corners), grid).sum()) for one in found] == [48, 16]
+
+
+@pytest.mark.parametrize(("stems", "got"), [(0, "0"), (None, "none"), (-3, "-3")])
+def test_a_patch_without_stems_is_refused_beside_others(tmp_path: Path, stems: float | None, got: str) -> None:
+    """0 ended in a traceback, and nothing was taken for one stem."""
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"stems": one},
+            "geometry": {"type": "Polygon", "coordinates": [square(4, 0, 1)]},
+        }
+        for one in (22, stems)
+    ]
+    (tmp_path / "a.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}), "utf-8")
+    with pytest.raises(InputError, match=rf"expected stems of polygon p2 above 0, up to 1e\+07 1/m2, got {got};"):
+        planted_polygons(tmp_path / "a.geojson", None)
 
 
 def test_degrees_are_refused_where_the_frame_is_in_metres(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ from vegglue.importers.drawn_centreline import drawn_centreline
 from vegglue.importers.field_site import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid
 from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record, write_tables
 from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.polygon_files import planted_polygons
 from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.standing_water import refuse_standing_water
 from vegglue.importers.surveyed_bed import surveyed_bed
@@ -130,7 +130,7 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
             continue
         if not (folder / one.file).is_file():
             raise InputError(f"{shown_path(folder)}: `patches` names {one.file}, which is not there; correct it.")
-        for polygon in read_polygons(folder / one.file, frame):
+        for polygon in planted_polygons(folder / one.file, frame):
             density = polygon.density if polygon.density is not None else one.stems_per_m2
             corners = tuple(polygon.corners)
             found.append(PlantedPatch(name=polygon.name, polygon=corners, stems_per_m2=density))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
@@ -13,6 +15,7 @@ from vegglue.importers.map_files import geojson_features, rounded_place, shapes_
 DENSITIES = ("stems_per_m2", "stems", "density", "stem_density", "stems_m2")
 CLASSES = ("class", "friction_class", "friction", "roughness", "type", "landuse")
 NAMES = ("name", "id", "patch", "fid")
+MOST_STEMS = 1e7  # 1/m2, as in the site file
 Ring = list[tuple[float, float]]
 
 
@@ -27,7 +30,7 @@ class NamedPolygon:
 
 
 def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
-    """The outer rings of all polygons of a file. Errors: InputError for what is no such file or lies in degrees."""
+    """All polygons of a file, each part of one for itself. Errors: InputError for another file, and for degrees."""
     features = list(_of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path))
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
@@ -47,21 +50,58 @@ def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
     return found
 
 
+def planted_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
+    """Polygons of plants. Errors: InputError as in read_polygons, and for one without stems among others that have."""
+    found = read_polygons(path, frame)
+    said = any(one.density is not None for one in found)
+    for one in found:
+        if said and not (one.density is not None and 0.0 < one.density <= MOST_STEMS):
+            got = "none" if one.density is None else f"{one.density:g}"
+            raise InputError(
+                f"{shown_path(path)}: expected stems of polygon {one.name} above 0, up to {MOST_STEMS:g} 1/m2, got "
+                f"{got}; correct them, or take it out where nothing grows."
+            )
+    return found
+
+
 def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
     with geojson_features(path, "polygons") as features:
         for feature in features:
-            geometry, properties = feature["geometry"], dict(feature.get("properties") or {})
-            parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
-            for rings in parts.get(geometry["type"], []):
-                yield _open([(float(corner[0]), float(corner[1])) for corner in rings[0]]), properties
+            properties = dict(feature.get("properties") or {})
+            yield from ((ring, properties) for ring in _outlines(feature["geometry"]))
 
 
 def _of_shapefile(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
     with shapes_and_records(path, "POLYGON") as found:
         for one in found:
-            starts = [*one.shape.parts, len(one.shape.points)]
-            ring = [(float(x), float(y)) for x, y, *_ in one.shape.points[starts[0] : starts[1]]]
-            yield _open(ring), one.record.as_dict()
+            yield from ((ring, one.record.as_dict()) for ring in _outlines(one.shape.__geo_interface__))
+
+
+def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
+    """One outline of each part of a geometry of GeoJSON; nothing of what is no area."""
+    parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
+    for rings in parts.get(geometry["type"], []):
+        if rings:
+            yield _with_holes([_open([(float(corner[0]), float(corner[1])) for corner in ring]) for ring in rings])
+
+
+def _with_holes(rings: Sequence[Ring]) -> Ring:
+    """The outer ring, joined to each hole by a line there and back: a ray crosses such lines twice, or never.
+
+    Holes run the other way round, so that their areas are taken off.
+    """
+    outer, *holes = rings
+    outline = list(outer)
+    for hole in holes:
+        turned = hole[::-1] if (_area(hole) > 0.0) == (_area(outer) > 0.0) else hole
+        outline += [outer[0], *turned, turned[0]]
+    return outline
+
+
+def _area(ring: Ring) -> float:
+    """A = sum((x_i - x_0) (y_(i+1) - y_0) - (x_(i+1) - x_0) (y_i - y_0)) / 2, above 0 counterclockwise."""
+    x, y = (np.array(ring) - ring[0]).T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def _density(path: Path, value: Any) -> float:
