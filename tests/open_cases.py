@@ -25,7 +25,7 @@ WANTED = 0.010
 def imported(name: str, folder: Path) -> Case:
     """An open case, its config written into the folder."""
     target = folder / f"{name}.yaml"
-    target.write_text(yaml.safe_dump(case_from_folder(OPEN_CASES / name, target)), encoding="utf-8")
+    target.write_text(yaml.safe_dump(case_from_folder(OPEN_CASES / name, target).tree), encoding="utf-8")
     return load_case(target)
 
 

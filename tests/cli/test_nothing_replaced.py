@@ -74,6 +74,28 @@ def test_a_second_import_keeps_edits(tmp_path: Path, say: Say) -> None:
     assert say("import", "my-site", "--force") == (0, "")
 
 
+def test_a_second_import_keeps_edited_tables(tmp_path: Path, say: Say) -> None:
+    """Tables were written before it was known whether the config may be, and never asked about."""
+    folder = tmp_path / "mill"
+    folder.mkdir()
+    ground = "bed: {file: bed.csv}\ngrid: {x: [0, 8], y: [-2, 2], cell: [1.0, 0.25]}\n"
+    june = "experiments: {June: {discharge: 2, level: 1.0}}\n"
+    (folder / "site.yaml").write_text(ground + june, encoding="utf-8")
+    (folder / "bed.csv").write_text("x,y,z\n0,-2,0\n0,2,0\n8,-2,0\n8,2,0\n", encoding="utf-8")
+    (folder / "u.csv").write_text("x;y;u;u_se\n4;0;0.4;0.01\n", encoding="utf-8")
+    assert say("import", "mill") == (0, "")
+    for name in ("u-velocity.csv", "bed.asc"):
+        table = tmp_path / "mill-data" / name
+        made = table.read_text()
+        table.write_text(made + "\n")
+        refused(say("import", "mill"), name, "edited since")
+        assert table.read_text() == made + "\n"
+        assert say("import", "mill", "--force") == (0, "")
+        assert table.read_text() == made
+    (folder / "u.csv").write_text("x;y;u;u_se\n4;0;0.5;0.01\n", encoding="utf-8")
+    assert say("import", "mill") == (0, ""), "its own"
+
+
 def test_a_larger_ensemble_stays(tmp_path: Path, say: Say) -> None:
     assert say("simulate", "brook.yaml", "--jobs", 1) == (0, "")
     before = (tmp_path / "runs/brook/ensemble.h5").read_bytes()

@@ -38,7 +38,7 @@ def test_of_a_probe_that_is_off_by_a_factor_nothing_is_left(campaigns: Path) -> 
     velocities = pd.read_csv(folder / "velocities.csv")
     velocities.loc[(velocities["y"] + 0.6).abs() < 0.01, "u"] *= 1.5
     velocities.to_csv(folder / "velocities.csv", index=False)
-    config.write_text(yaml.safe_dump(case_from_folder(folder, config)), encoding="utf-8")
+    config.write_text(yaml.safe_dump(case_from_folder(folder, config).tree), encoding="utf-8")
     found = diagnose(load_case(config), runs=campaigns / "runs", watch=print)
     assert found.verdict.kind == "instrument", found.verdict.sentence
     assert [(one.kind, one.y) for one in found.instruments] == [("probe", -0.6)]

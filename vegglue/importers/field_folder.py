@@ -8,7 +8,8 @@ experiments (discharge_m3_s, downstream_level_m), and, where needed, frame and g
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from vegglue.case.frame import Frame
@@ -31,12 +32,12 @@ from vegglue.importers.config_parts import (
 )
 from vegglue.importers.drawn_centreline import drawn_centreline
 from vegglue.importers.field_site import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid
-from vegglue.importers.measured_files import MeasuredFiles, held_out_files, measured_files, record, write_tables
+from vegglue.importers.measured_files import held_out_files, measured_files, record, texts_of_tables
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import planted_polygons
 from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.standing_water import refuse_standing_water
-from vegglue.importers.surveyed_bed import surveyed_bed
+from vegglue.importers.surveyed_bed import Ground, surveyed_bed
 from vegglue.site.zones import BANK_SLOPE
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
@@ -52,8 +53,16 @@ OF_NO_BANK = 1.0
 BY_EYE = 0.12
 
 
-def case_from_folder(folder: Path, target: Path) -> Tree:
-    """The config, as keys and values, of the measurements in a folder; files are named relative to `target`.
+@dataclass(frozen=True)
+class FolderCase:
+    """tree: keys and values of a config; texts: of the files beside it that it names, by their paths."""
+
+    tree: Tree
+    texts: Mapping[Path, str]
+
+
+def case_from_folder(folder: Path, target: Path) -> FolderCase:
+    """The config of the measurements in a folder, and the files it comes with, named relative to `target`.
 
     Errors: InputError when the site file or every file of measurements is missing or says too little.
     """
@@ -64,21 +73,20 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     drawn = drawn_centreline(folder, given, frame) if given is not None else None
     place = Placement(frame, drawn.line if drawn is not None else None)
     patches = _patches(folder, site.patches, frame)
-    used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
-    used += [given.file] if isinstance(given, FileOfSite) else []
-    measured = measured_files(folder, target, site, place, used)
+    measured = measured_files(folder, target, site, place, _used_elsewhere(site))
     held_out = held_out_files(folder, target, site, place)
     unknown = _viscosity(site)
-    ground = _ground(folder, target, site, place, measured)
+    ground = _ground(folder, target, site, place)
+    measured.imported.extend(ground.imported)
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
-        **ground,
+        **ground.tree,
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
         "eddy_viscosity": VISCOSITY if unknown else site.eddy_viscosity_m2_s,
         "experiments": {name: _experiment(given) for name, given in site.experiments.items()},
-        "parameters": PARAMETERS | roughness_of_banks(ground["friction"]) | unknown,
+        "parameters": PARAMETERS | roughness_of_banks(ground.tree["friction"]) | unknown,
         "observations": measured.observations,
         **FIRST_LOOK,
     }
@@ -94,22 +102,28 @@ def case_from_folder(folder: Path, target: Path) -> Tree:
     if patches:
         tree["plants"] = _plants(patches)
         tree["parameters"] |= {"phi": PHI, "canopy_height": _canopy(site.canopy_height_guess_m)}
-    write_tables(target, [*measured.tables, *held_out.tables])
+    texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
-    return tree | kept | ({"imported": measured.imported} if measured.imported else {})
+    return FolderCase(tree | kept | ({"imported": measured.imported} if measured.imported else {}), texts)
 
 
-def _ground(folder: Path, target: Path, site: FieldSite, place: Placement, measured: MeasuredFiles) -> Tree:
+def _used_elsewhere(site: FieldSite) -> list[str]:
+    """Files that the site file names and that hold no measurements."""
+    line = site.grid.centreline if site.grid is not None else None
+    files = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
+    return files + ([line.file] if isinstance(line, FileOfSite) and line.file is not None else [])
+
+
+def _ground(folder: Path, target: Path, site: FieldSite, place: Placement) -> Ground:
     """Grid, bed and friction: of a survey, or of a channel by its numbers."""
     if site.bed is not None or site.channel is None:
-        ground = surveyed_bed(folder, target, site, place)
-        measured.imported.extend(ground.imported)
-        return ground.tree
+        return surveyed_bed(folder, target, site, place)
     grid = _grid(site, site.channel, place)
     friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
     if (steeper := bank_break(site)) is not None:
         friction = with_banks(friction, min(BANK_SLOPE, steeper))
-    return {"grid": grid, "bed": [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}], "friction": friction}
+    bed = [{"trapezoid": _trapezoid(site.channel, grid["x"][0])}]
+    return Ground({"grid": grid, "bed": bed, "friction": friction}, [], {})
 
 
 def _as_flume(tree: Tree, wall: float) -> Tree:

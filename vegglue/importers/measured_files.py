@@ -13,7 +13,6 @@ from itertools import chain, count
 from pathlib import Path
 
 from vegglue.case.resolved_config import Tree
-from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import observed
 from vegglue.importers.field_site import FieldSite
@@ -75,12 +74,14 @@ def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement
     return _read(paths, _entries(folder, site), target, place, known)
 
 
-def write_tables(target: Path, tables: Sequence[StationTable]) -> None:
-    """Write tables beside the config, when all files were read and none was refused."""
+def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, str]:
+    """What is to be written beside the config of the tables, by its path."""
+    texts = {}
     for table in tables:
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([table.heading, *table.rows])
-        write_text(data_folder(target) / table.file, text.getvalue(), "give another place by --to")
+        texts[data_folder(target) / table.file] = text.getvalue()
+    return texts
 
 
 def _read(

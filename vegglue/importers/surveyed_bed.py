@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
-from vegglue.case.text_files import case_name, write_text
+from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.banks import BANK, bank_break, found_banks, with_banks
 from vegglue.importers.config_parts import MANNING_BED, even
@@ -28,17 +28,20 @@ NO_LEVEL = -9999
 
 @dataclass(frozen=True)
 class Ground:
-    """tree: keys grid, bed and friction of a case; imported: what was taken from which file."""
+    """tree: keys grid, bed and friction of a case; imported: what was taken from which file; texts: of files to be
+    written beside the config, by their paths.
+    """
 
     tree: Tree
     imported: list[Tree]
+    texts: Mapping[Path, str]
 
 
 def surveyed_bed(folder: Path, target: Path, site: FieldSite, place: Placement) -> Ground:
     """The ground of a site whose `bed` names a file: `{file: dtm.tif}`, `{file: sections.csv, sections: true}`.
 
     `grid` (x, y, cell in m, in the frame of the model) is that of the site file, as far as it says, and made of the
-    extent of the survey. The bed is written into the folder beside the config: as bed.asc, and as points along a
+    extent of the survey. The bed belongs into the folder beside the config: as bed.asc, and as points along a
     centreline. Errors: InputError.
     """
     path = _named(folder, site.bed, "bed")
@@ -49,13 +52,17 @@ def surveyed_bed(folder: Path, target: Path, site: FieldSite, place: Placement) 
     grid = _grid_of(path, terrain, site.grid or SiteGrid(), place)
     layer = {"raster": "bed.asc"} if place.line is None else {"points": "bed.csv"}
     (file,) = layer.values()
-    beyond = _write_bed(data_folder(target) / file, terrain, grid, place)
+    text, beyond = _bed_text(terrain, grid, place)
     outside = f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level" if beyond > 0.0 else ""
     friction, imported = _friction(folder, site, place)
     friction, banks = _banked(friction, site, terrain, grid, place)
     named = {form: f"{data_folder(target).name}/{name}" for form, name in layer.items()}
     tree = {"grid": grid, "bed": [named], "friction": friction}
-    return Ground(tree, [record(path, None, f"bed: {terrain.said}{outside}{banks}"), *imported])
+    return Ground(
+        tree,
+        [record(path, None, f"bed: {terrain.said}{outside}{banks}"), *imported],
+        {data_folder(target) / file: text},
+    )
 
 
 def _named(folder: Path, given: FileOfSite | None, key: str) -> Path:
@@ -91,8 +98,8 @@ def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) ->
     return {"x": x, "y": y, "cell": list(given.cell or ((x[1] - x[0]) / columns, dy))}
 
 
-def _write_bed(path: Path, terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> float:
-    """Levels on squares as small as the cells of the grid; returns the share of the grid that no level is known of."""
+def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tuple[str, float]:
+    """Levels on squares as small as the cells of the grid, and the share of the grid that no level is known of."""
     size = float(min(grid["cell"]))
     (west, east), (south, north) = grid["x"], grid["y"]
     x = centres(west - size, size, int(np.ceil((east - west) / size)) + 2)
@@ -105,8 +112,7 @@ def _write_bed(path: Path, terrain: Terrain, grid: Mapping[str, Any], place: Pla
     else:
         rows = np.column_stack([*place.to_case(at_x, at_y), level])
         text = "x,y,z\n" + "".join(f"{at[0]:.4f},{at[1]:.4f},{at[2]:.4f}\n" for at in rows.tolist())
-    write_text(path, text, "give another place by --to")
-    return float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean())
+    return text, float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean())
 
 
 def _ascii(x: Array, y: Array, size: float, level: Array) -> str:

@@ -38,7 +38,8 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
         _write_config(target, folder, tree, force, tables)
         _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target), force)
     else:
-        _write_config(target, folder, case_from_folder(folder, target), force)
+        made = case_from_folder(folder, target)
+        _write_config(target, folder, made.tree, force, made.texts)
     return load_case(target)
 
 
