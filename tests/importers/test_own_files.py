@@ -202,6 +202,22 @@ def test_too_few_repeats_give_no_error(tmp_path: Path) -> None:
     assert table["standard_error"].tolist() == pytest.approx([0.03 / 3**0.5, 0.03], rel=1e-3)
 
 
+def test_an_error_of_0_among_repeats_is_unknown(tmp_path: Path) -> None:
+    """It was averaged as 0, and halved that of the other."""
+    rows = "x,y,u,u_se\n8,0,0.40,0.01\n8,0,0.42,0\n8,1,0.40,0.01\n8,1,0.42,0.01\n"
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=rows)
+    found = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table["standard_error"]
+    assert found.tolist() == pytest.approx([np.nan, 0.01 / 2**0.5], nan_ok=True)
+
+
+def test_small_errors_are_kept(tmp_path: Path) -> None:
+    """0.4 ml/s were rounded to 0 m3/s, which is unknown."""
+    files = "files: {q.csv: {units: {discharge: ml/s}, standard_error: 0.4 ml/s}}\n"
+    folder = folder_of(tmp_path / "flume", CHANNEL + JUNE + files, q__csv="x,Q\n8,250.4\n")
+    found = read_observations(vegglue.import_folder(folder, tmp_path / "flume.yaml")).table
+    assert found[["value", "standard_error"]].to_numpy()[0] == pytest.approx([250.4e-6, 0.4e-6], rel=1e-6)
+
+
 @pytest.mark.parametrize("name", ["holdout__csv", "holdout__txt"])
 def test_what_is_held_out_may_have_any_form(tmp_path: Path, name: str) -> None:
     """It goes where no calibration sees it, in SI and in the channel."""

@@ -157,10 +157,14 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
         here = np.array([one == name for one in names])
         x[here] = np.median(x[here])
     devices = kept.words.get("device", ["ADV"] * kept.size)
-    columns = [x, kept.numbers["y"], kept.numbers["z"], kept.numbers["u"], *optional.values()]
+    places = [x, kept.numbers["y"], kept.numbers["z"]]
+    columns = [
+        *(map(_place, one) for one in places),
+        *(map(_value, one) for one in (kept.numbers["u"], *optional.values())),
+    ]
     rows = [
-        [name, device or "ADV", *map(_number, values)]
-        for name, device, values in zip(names, devices, zip(*columns, strict=True), strict=True)
+        [name, device or "ADV", *texts]
+        for name, device, texts in zip(names, devices, zip(*columns, strict=True), strict=True)
     ]
     v = optional.get("v", np.full(kept.size, np.nan))
     across = {name for name, value in zip(names, v.tolist(), strict=True) if np.isfinite(value)}
@@ -185,10 +189,11 @@ def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
 
 
 def _errors(taken: Taken, kind: Kind, words: FileWords) -> Array:
-    """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one."""
+    """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one, or 0."""
     stated = np.full(taken.size, words.standard_error.get(kind.unit, np.nan))
     column = taken.numbers.get(kind.error_column, stated)
-    return np.where(np.isfinite(column), column, stated)
+    errors = np.where(np.isfinite(column) & (column != 0.0), column, stated)
+    return np.where(errors == 0.0, np.nan, errors)
 
 
 def _section_observation(file: str, name: str, words: FileWords, across: bool) -> Tree:
@@ -218,7 +223,7 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     x, y = np.array([place[2:] for place in gathered]).reshape(-1, 2).T
     x, y = channel.to_case(x, y) if kind.at_point else (x, y)
     rows = [
-        [*place[:2], *map(_number, (*at, *mean))]
+        [*place[:2], *map(_place, at), *map(_value, mean)]
         for place, mean, *at in zip(gathered, means_of_repeats(gathered), x.tolist(), y.tolist(), strict=True)
     ]
     file = f"{stem}-{kind.name}.csv"
@@ -227,6 +232,14 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     return StationTable(file, heading, rows, (observed(kind.name, file),), said)
 
 
-def _number(value: float) -> str:
-    """As in a table; nothing for none."""
-    return "" if np.isnan(value) else f"{round(float(value), 6):.12g}"
+def _place(length: float) -> str:
+    """As in a table, to a thousandth of a millimetre."""
+    return f"{round(float(length), 6):.12g}"
+
+
+def _value(value: float) -> str:
+    """As in a table, to nine digits, as a flume's discharge may be in millilitres; nothing for none.
+
+    Of a component that is none only the error of its rounding is left, which is written as 0.
+    """
+    return "" if np.isnan(value) else f"{round(float(value), 12):.9g}"
