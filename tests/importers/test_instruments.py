@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
 
@@ -108,6 +109,38 @@ def test_records_of_one_point_become_a_vertical(tmp_path: Path) -> None:
     assert observations.table["value"].iloc[1] == pytest.approx(0.02, abs=0.005)
     assert case.imported is not None
     assert "1,000 samples at 25 Hz, 20 left out" in case.imported[0].taken
+
+
+@pytest.mark.parametrize(
+    ("axes", "said", "velocity"),
+    [
+        ("XYZ", "", (0.4, 0.05)),
+        ("", "", (0.4, 0.05)),
+        ("XYZ", ", directions: map", (0.05, -0.4)),
+        ("ENU", "", (0.05, -0.4)),
+    ],
+)
+def test_the_axes_of_a_probe_are_not_those_of_the_map(
+    tmp_path: Path, axes: str, said: str, velocity: tuple[float, float]
+) -> None:
+    """0.4 m/s along a channel that runs north were 0.4 m/s across it."""
+    folder = tmp_path / "flume"
+    folder.mkdir()
+    (folder / "p.dat").write_text(vectrino((0.4, 0.05, 0.0), 0.01, 400, bad=0), encoding="utf-8")
+    of_axes = f"Coordinate system                     {axes}\n" if axes else ""
+    (folder / "p.hdr").write_text(VECTRINO_HEADING + of_axes, encoding="utf-8")
+    more = f"frame: {{origin: [1000, 2000], angle: 90}}\nfiles: {{p.dat: {{position: [1000, 2010, 0.3]{said}}}}}\n"
+    (folder / "site.yaml").write_text(SITE + more, encoding="utf-8")
+    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
+    found = [pd.read_csv(one.file)[column].item() for one, column in zip(case.observations, "uv", strict=True)]
+    assert found == pytest.approx(velocity, abs=0.003)
+
+
+def test_a_record_in_beams_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "p.dat").write_text(vectrino((0.4, 0.0, 0.0), 0.01, 100, bad=0), encoding="utf-8")
+    (tmp_path / "p.hdr").write_text(f"{VECTRINO_HEADING}Coordinate system    BEAM\n", encoding="utf-8")
+    with pytest.raises(InputError, match="expected velocities in XYZ or ENU, got BEAM; export them anew"):
+        read_nortek(tmp_path / "p.dat", FileWords(position=(1.0, 0.0, 0.2)))
 
 
 def test_a_record_without_its_rate_or_place_is_refused(tmp_path: Path) -> None:

@@ -30,7 +30,8 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 class Taken:
     """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
     each role came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns
-    that no role was found for, by heading; lines: the row of the file that each row stands in, none where it has none.
+    that no role was found for, by heading; lines: the row of the file that each row stands in, none where it has none;
+    of_probe: whether u and v are along the axes of a probe, which is set up in the channel and knows no map.
     """
 
     numbers: Mapping[str, Array]
@@ -40,6 +41,7 @@ class Taken:
     said: tuple[str, ...]
     others: Mapping[str, Sequence[str]] = field(default_factory=dict)
     lines: Sequence[int] = ()
+    of_probe: bool = False
 
     @property
     def size(self) -> int:
@@ -115,13 +117,16 @@ def _along_and_across(taken: Taken, place: Placement, words: FileWords) -> Taken
     if pair is None:
         return taken
     first, second = (taken.numbers[role] for role in pair)
-    turn = place.turned and words.directions != "channel" and (pair != ("u", "v") or words.coordinates != "channel")
+    of_map = words.directions == "map" or (words.directions is None and not taken.of_probe)
+    turn = place.turned and of_map and (pair != ("u", "v") or words.coordinates != "channel")
     if turn:
         along = taken.numbers.get("x", np.zeros(taken.size))
         first, second = place.turned_to_channel(along, first, second)
         taken = _errors_turned(taken, place, along)
-    of_map = ("velocities turned with them, as components east and north",) if turn else ()
-    return taken.without(*pair).having({"u": first, "v": second}, *of_map)
+    said = ("velocities turned with them, as components east and north",) if turn else ()
+    if place.turned and taken.of_probe and not turn:
+        said = ("x and y of the probe along and across the channel (else say `directions: map`)",)
+    return taken.without(*pair).having({"u": first, "v": second}, *said)
 
 
 def _errors_turned(taken: Taken, place: Placement, along: Array) -> Taken:

@@ -6,7 +6,7 @@ then amplitudes, ratios and correlations of three beams, pressure and two inputs
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +50,12 @@ def read_nortek(path: Path, words: FileWords) -> Taken:
     """One row: the mean of an ASCII record at its `position`. Errors: InputError naming the file."""
     refuse_nowhere(path, words)
     layout, rows = _rows(path)
+    axes = _in_heading(path, r"Coordinate system\s+(\w+)") or "XYZ"
+    if axes not in ("XYZ", "ENU"):
+        raise InputError(f"{shown_path(path)}: expected velocities in XYZ or ENU, got {axes}; export them anew.")
     velocity = rows[:, layout.velocity : layout.velocity + 3]
-    return record_mean(path, words, layout.name, velocity, rows[:, layout.correlation], _rate(path))
+    mean = record_mean(path, words, layout.name, velocity, rows[:, layout.correlation], _rate(path))
+    return replace(mean, of_probe=axes == "XYZ")
 
 
 def read_vector(path: Path, words: FileWords) -> Taken:
@@ -95,7 +99,7 @@ def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correl
     said = f"{name}, {len(velocity):,} samples at {rate:g} Hz, {len(velocity) - int(trusted.sum()):,} left out"
     device = name.partition(",")[0]
     return Taken(numbers, {"device": [device]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
-                 dict.fromkeys("uvw", "m/s"), (said,))  # fmt: skip
+                 dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)  # fmt: skip
 
 
 def trusted_samples(velocity: Array, correlation: Array) -> Mask:
@@ -143,10 +147,16 @@ def _heading(path: Path) -> Path | None:
 
 
 def _rate(path: Path) -> float:
-    heading = _heading(path)
-    found = re.search(r"^Sampling rate\s+([\d.]+)\s*Hz", readable_text(heading), re.MULTILINE) if heading else None
+    found = _in_heading(path, r"Sampling rate\s+([\d.]+)\s*Hz")
     if found is None:
         raise InputError(
             f"{shown_path(path)}: expected `Sampling rate` in the .hdr beside it, got none; export it too."
         )
-    return float(found[1])
+    return float(found)
+
+
+def _in_heading(path: Path, line: str) -> str | None:
+    """What a line of the .hdr says; None without such a line."""
+    heading = _heading(path)
+    found = re.search(f"^{line}", readable_text(heading), re.MULTILINE) if heading else None
+    return found[1] if found else None

@@ -58,7 +58,7 @@ def _means(words: FileWords, away: Array, velocity: Array, trusted: Mask, rate: 
     numbers |= {"u_std": np.nanstd(samples[..., 0], axis=0, ddof=1), "duration_s": trusted.sum(axis=0) / rate}
     columns = {axis: f"Profiles_Vel{name}" for axis, name in zip("uvw", ("X", "Y", "Z1"), strict=True)}
     device = {"device": ["Vectrino Profiler"] * away.size}
-    return Taken(numbers, device, columns, dict.fromkeys("uvw", "m/s"), (said,))
+    return Taken(numbers, device, columns, dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)
 
 
 def _velocity(data: Any, config: Any) -> Array:
