@@ -490,3 +490,31 @@ def test_an_error_without_a_name_is_of_what_the_table_holds(tmp_path: Path, tabl
     """It was taken for that of u, and dropped."""
     case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
     assert read_observations(case).table["standard_error"].tolist() == pytest.approx(errors)
+
+
+@pytest.mark.parametrize(
+    ("headings", "wanted"),
+    [
+        ("x,N,y,u", {"x": 0, "y": 2, "u": 3}),
+        ("x,N,u", {"x": 0, "u": 2}),
+        ("E,N,u", {"x": 0, "y": 1, "u": 2}),
+        ("E (m),N (m),x,y,u", {"x": 0, "y": 1, "u": 4}),
+        ("N,Easting,u", {"x": 1, "y": 0, "u": 2}),
+        ("N,Easting,Northing,u", {"x": 1, "y": 2, "u": 3}),
+        ("x,y,bed elevation,z,u", {"x": 0, "y": 1, "z": 3, "u": 4}),
+        ("x,y,bed_elevation_m", {"x": 0, "y": 1, "z": 2}),
+        ("x,y,Vel,Vx,Vy", {"x": 0, "y": 1, "u": 3, "v": 4}),
+        ("x,y,Vel (cm/s)", {"x": 0, "y": 1, "u": 2}),
+    ],
+)
+def test_a_name_that_says_less_yields(tmp_path: Path, headings: str, wanted: dict[str, int]) -> None:
+    """The number of samples was y, the bed the height of a point, and the magnitude the velocity along."""
+    numbers = ",".join(str(1 + place) for place in range(headings.count(",") + 1))
+    (tmp_path / "a.csv").write_text(f"{headings}\n{numbers}\n{numbers}.5\n", encoding="utf-8")
+    taken = read_rows(tmp_path / "a.csv", FileWords())
+    assert taken.columns == {role: headings.split(",")[place] for role, place in wanted.items()}
+
+
+def test_north_is_known_beside_a_column_named_as_x(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("Ost,N,u\n1,2,3\n4,5,6\n", encoding="utf-8")
+    assert set(read_rows(tmp_path / "a.csv", FileWords(columns={"x": "Ost"})).numbers) == {"x", "y", "u"}

@@ -65,14 +65,20 @@ _ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
 
 def role_of(heading: str) -> tuple[str, str | None] | None:
     """The role of a column and the unit its heading states, `('u', 'cm/s')` for `U [cm/s]`; None for an unknown one."""
+    known = known_name(heading)
+    return (_ROLE_OF[known[0]], known[1]) if known is not None else None
+
+
+def known_name(heading: str) -> tuple[str, str | None] | None:
+    """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`."""
     bare, unit = _apart(heading)
     if (found := _ROLE_OF.get(words_of(bare))) is not None:
         quantity = ROLES[found].quantity
-        return found, unit_named(unit, quantity) if unit and quantity else None
+        return words_of(bare), unit_named(unit, quantity) if unit and quantity else None
     for name, word in _suffixed(bare):
         found = _ROLE_OF.get(words_of(name))
         if found is not None and ROLES[found].quantity and (said := unit_named(word, ROLES[found].quantity)):
-            return found, said
+            return words_of(name), said
     return None
 
 

@@ -4,17 +4,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, role_of, unit_stated, words_of
+from vegglue.importers.column_names import ROLES, known_name, role_of, unit_stated, words_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
 from vegglue.importers.unit_words import UNITS, unit_named
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
+# Names that stand for a role where no other column has it: beside z of a point there may be the bed, and beside Vx the
+# magnitude of the velocity.
+LESS_SAID = {
+    "z": {"bed level", "z bed", "zb", "bed elevation"},
+    "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "geschwindigkeit", "vitesse"},
+}
+NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 
 
 def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
-    """The place of the column of each role; of two of one role the first. Errors: InputError for one not there."""
+    """The place of the column of each role: of two the first, unless its name says less than that of the other.
+
+    Errors: InputError for one that the site file names and that is not there.
+    """
     found: dict[str, int] = {}
     for role, heading in words.columns.items():
         if heading not in table.headings:
@@ -25,7 +35,9 @@ def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[st
         found[role] = table.headings.index(heading)
     for place, heading in enumerate(table.headings):
         known = role_of(heading)
-        if known is not None and known[0] not in found and place not in found.values():
+        if known is None or _is_passed_over(heading, known[0], table.headings, words):
+            continue
+        if known[0] not in found and place not in found.values():
             found[known[0]] = place
     if "v" not in words.columns and _is_the_speed(found, table.headings):
         found["u"] = found.pop("v")
@@ -36,6 +48,19 @@ def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[st
     if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
         found["v_se"] = found["u_se"]
     return found
+
+
+def _is_passed_over(heading: str, role: str, headings: Sequence[str], words: FileWords) -> bool:
+    """Whether a column holds rather something else: N the number of samples, where nothing is called east."""
+    names = [known[0] for known in map(known_name, headings) if known is not None]
+    own = (known_name(heading) or ("", None))[0]
+    others = [name for name in names if name != own and name in ROLES[role].names]
+    if (role, own) == ("y", "n"):
+        x = words.columns.get("x")
+        east = bool(NAMES_OF_EAST & set(names)) or (x is not None and role_of(x) is None)
+        return "e" not in names and (bool(others) or not east)
+    less = LESS_SAID.get(role, set())
+    return own in less and any(name not in less for name in others)
 
 
 def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
