@@ -10,7 +10,7 @@ from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.noise import noise_of
+from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import Rung, homogeneity, improvement, rung
 
@@ -48,6 +48,22 @@ def test_a_parameter_that_differs_between_experiments_is_named(slope: Array) -> 
     assert min(apart, key=lambda name: apart[name]) == named
     assert apart[named] < 1e-6
     assert min(p for name, p in apart.items() if name != named) > 1e-3
+
+
+def test_an_error_that_experiments_share_makes_no_difference_of_theirs(slope: Array) -> None:
+    """Taken for independent, equal values looked more alike than they may, and real differences were overlooked."""
+    table, random = stations(), np.random.default_rng(8)
+    columns = 0.1 * slope[:, :1]  # as friction that is a little off everywhere acts like the roughness of the bed
+    base = calibrated(np.zeros(len(table)), slope)
+    noise = with_model_error(base.noise, columns)
+    lower = np.linalg.cholesky(covariance_of(noise))
+    found = []
+    for _ in range(300):
+        values = lower @ random.standard_normal(len(table))
+        one = at_best(CASE, table, values, slope)
+        found.append(homogeneity(replace(one, noise=replace(noise, value=values)))[next(iter(CASE.parameters))])
+    assert 0.02 < np.mean(np.array(found) < 0.05) < 0.1
+    assert np.median(found) == pytest.approx(0.5, abs=0.1)
 
 
 def test_what_an_experiment_does_not_tell_is_left_out(slope: Array) -> None:

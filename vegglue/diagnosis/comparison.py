@@ -18,7 +18,7 @@ from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.in_short import so_many
-from vegglue.inference.homogeneity import equal_values_test, without_prior
+from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 
@@ -168,12 +168,17 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)
     names = base.model.station["experiment"].to_numpy()[noise.rows]
-    told = []
+    told, estimates = [], []
     for experiment in dict.fromkeys(names):
-        step, spread = _step(noise, slope, left, point.z, np.flatnonzero(names == experiment))
+        rows = np.flatnonzero(names == experiment)
+        step, spread = _step(noise, slope, left, point.z, rows)
         told.append(without_prior(base.model.case, point.z + step, np.diag(spread)))
+        estimates.append((rows, slope[rows], spread))
     value, error = (np.array(part) for part in zip(*told, strict=True))
-    chances = {name: equal_values_test(value[:, j], error[:, j])[2] for j, name in enumerate(base.model.names)}
+    alike = correlations_of_estimates(noise, estimates, point.z.size)
+    chances = {
+        name: equal_values_test(value[:, j], error[:, j], alike[j])[2] for j, name in enumerate(base.model.names)
+    }
     return {name: p for name, p in chances.items() if np.isfinite(p)}
 
 

@@ -1,10 +1,12 @@
 """Homogeneity: whether a parameter has one value for all experiments, each of them calibrated alone.
 
-    chi2 = sum_e (x_e - x)^2 / s_e^2,   x = sum_e (x_e / s_e^2) / sum_e (1 / s_e^2),   one degree of freedom less than e
+    chi2 = (x - m)' S^-1 (x - m),   m = 1' S^-1 x / 1' S^-1 1,   S_ef = s_e s_f rho_ef
 
-x_e and s_e are the estimate of a parameter from the data of experiment e alone, without its prior, and its standard
-error. All parameters at once are tested by the fall of chi2 when each experiment has its own. The size of the errors is
-estimated from the separate fits: the residual of the joint one would hold the differences that are tested.
+of one degree of freedom less than experiments e. x_e and s_e are the estimate of a parameter from the data of
+experiment e alone, without its prior, and its standard error; rho_ef is the correlation of two estimates by errors
+that experiments share, those of the model and of the grid. All parameters at once are tested by the fall of chi2 when
+each experiment has its own. The size of the errors is estimated from the separate fits: the residual of the joint one
+would hold the differences that are tested.
 """
 
 from collections.abc import Sequence
@@ -13,6 +15,7 @@ from functools import partial
 
 import numpy as np
 import scipy.stats
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, covariance, fit, squared_misfit
@@ -28,6 +31,8 @@ from vegglue.results.posterior import Transfer
 # Posterior over prior variance of z [-] above which an experiment does not determine a parameter. Chosen, not measured:
 # a higher one compares more parameters, whose estimates without the prior rest on less and less data.
 UNINFORMED = 0.5
+# Of one experiment: rows among the used stations (n,), slopes (n, p) and covariance of z (p, p).
+Estimate = tuple[NDArray[np.int64], Array, Array]
 
 
 def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer | None:
@@ -55,7 +60,8 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
     gain = float(np.nansum(np.array(together) - np.array(alone)) / scale**2)
     separate = sum(determined(one.covariance) for one in fits if one is not None)
     more = max(round(separate - determined(covariance(noise, joint))), 1)
-    tested = [equal_values_test(value[:, j], error[:, j]) for j in range(len(model.names))]
+    alike = _alike(noise, model, here, [part for _, part in parts], fits)
+    tested = [equal_values_test(value[:, j], error[:, j], alike[j]) for j in range(len(model.names))]
     return Transfer(
         scale=scale,
         gain=gain,
@@ -71,6 +77,18 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         misfit_alone=np.array(alone) / scale**2,
         stations=np.array([part.rows.size for _, part in parts]),
     )
+
+
+def _alike(
+    noise: Noise, model: Model, here: Sequence[str], parts: Sequence[Noise], fits: Sequence[MapEstimate | None]
+) -> Array:
+    """rho_ef of each parameter (p, e, e), of experiments `here` that were fitted alone."""
+    names = model.station["experiment"].to_numpy()[noise.rows]
+    estimates = [
+        None if fitted is None else (np.flatnonzero(names == name), part.used(fitted.point.slope), fitted.covariance)
+        for name, part, fitted in zip(here, parts, fits, strict=True)
+    ]
+    return correlations_of_estimates(noise, estimates, len(model.names))
 
 
 def _scale(fits: Sequence[MapEstimate | None], stations: Sequence[int], least: float) -> float:
@@ -99,14 +117,38 @@ def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
     return middle + slope * z * (own / variance - 1.0), np.abs(slope) * np.sqrt(own)
 
 
-def equal_values_test(value: Array, error: Array) -> tuple[float, int, float]:
-    """chi2, degrees of freedom and p of equal values; error NaN or 0: unknown; NaN for fewer than two known."""
+def correlations_of_estimates(noise: Noise, estimates: Sequence[Estimate | None], parameters: int) -> Array:
+    """rho_ef of each parameter (p, e, e): diag(A_e C_ef A_f') over its roots at e = f, A_e = V_e J_e' C_ee^-1.
+
+    estimates: of each experiment its rows among the used stations, slopes J_e (n_e, p) and covariance V_e (p, p) of z,
+    or None; C: covariance of the errors. Source: error propagation of the linear least-squares estimate.
+    """
+    errors, count = covariance_of(noise), len(estimates)
+    pulled = [
+        None if one is None else one[2] @ np.linalg.solve(errors[np.ix_(one[0], one[0])], one[1]).T for one in estimates
+    ]
+    shared = np.tile(np.eye(count), (parameters, 1, 1))
+    for e, f in np.ndindex(count, count):
+        one, other, a, b = estimates[e], estimates[f], pulled[e], pulled[f]
+        if one is not None and other is not None and a is not None and b is not None:
+            shared[:, e, f] = np.einsum("pi,ij,pj->p", a, errors[np.ix_(one[0], other[0])], b)
+    own = np.sqrt(np.maximum(np.einsum("pee->pe", shared), np.finfo(float).tiny))
+    return np.asarray(shared / (own[:, :, None] * own[:, None, :]))
+
+
+def equal_values_test(value: Array, error: Array, alike: Array | None = None) -> tuple[float, int, float]:
+    """chi2, degrees of freedom and p of equal values (e,); error NaN or 0: unknown; NaN for fewer than two known.
+
+    alike: rho (e, e), independent where it is not given.
+    """
     known = np.isfinite(value) & (error > 0)  # zero at an end of its support, where no step leads
     if known.sum() < 2:
         return float("nan"), 0, float("nan")
-    weight = 1.0 / error[known] ** 2
-    mean = np.sum(weight * value[known]) / weight.sum()
-    separation = float(np.sum(weight * (value[known] - mean) ** 2))
+    correlation = np.eye(value.size) if alike is None else alike
+    covariance_of_values = np.outer(error[known], error[known]) * correlation[np.ix_(known, known)]
+    weight = np.linalg.inv(covariance_of_values)
+    off = value[known] - (weight @ value[known]).sum() / weight.sum()
+    separation = float(off @ weight @ off)
     freedom = int(known.sum()) - 1
     return separation, freedom, float(scipy.stats.chi2.sf(separation, freedom))
 
