@@ -15,9 +15,12 @@ from vegglue.measurements.observations import read_observations
 FLOOR_THERE, EXPECTED_THERE = -0.008, 0.95 + (0.0295 - 0.008)
 ADV = "{kind: adv, file: adv.csv, experiment: June, section: A, case: A, average: profile%s}"
 LEVELS = "  - {kind: level, file: levels.csv, experiment: June}\n"
+TWO_GAUGES = "4,0,1.00\n12,0,0.98\n"
 
 
-def section_at_8(folder: Path, more: str = "", levels: bool = False, header: str = "x,y,z,u,v") -> Case:
+def section_at_8(
+    folder: Path, more: str = "", levels: bool = False, header: str = "x,y,z,u,v", gauges: str = TWO_GAUGES
+) -> Case:
     """The brook with ADV points at x = 8 m, z in the datum of the bed; v is a tenth of u."""
     rows = [f"case,device,{header}"]
     for y in (-1.0, -0.5, 0.0, 0.5, 1.0):
@@ -25,7 +28,7 @@ def section_at_8(folder: Path, more: str = "", levels: bool = False, header: str
             u = 0.1 * np.log((z - FLOOR_THERE) / 0.002)
             rows.append(f"A,ADV,8,{y},{z},{u:.6f}" + (f",{0.1 * u:.6f}" if "v" in header else ""))
     (folder / "adv.csv").write_text("\n".join(rows), encoding="utf-8")
-    (folder / "levels.csv").write_text("x,y,level\n4,0,1.00\n12,0,0.98\n", encoding="utf-8")
+    (folder / "levels.csv").write_text(f"x,y,level\n{gauges}", encoding="utf-8")
     line = "{kind: velocity, file: velocities.csv, experiment: June}"
     config = write_reach(folder, (f"  - {line}\n", f"  - {ADV % more}\n" + (LEVELS if levels else "")))
     return load_case(config)
@@ -40,6 +43,15 @@ def test_the_bed_and_the_expected_level_hold(tmp_path: Path) -> None:
 def test_measured_levels_hold_before_expected_ones(tmp_path: Path) -> None:
     points = read_observations(section_at_8(tmp_path, levels=True)).points
     assert np.allclose(points["depth"], 0.99 - FLOOR_THERE)
+
+
+@pytest.mark.parametrize(
+    ("gauges", "level"), [("28,0,0.96\n", 0.98), ("2,0,0.98\n", 0.974), ("20,0,0.98\n28,0,0.97\n", 0.992)]
+)
+def test_beyond_the_gauges_the_surface_falls_as_the_floor_does(tmp_path: Path, gauges: str, level: float) -> None:
+    """It was flat: of a single gauge down a steep reach most points lay above the water."""
+    points = read_observations(section_at_8(tmp_path, levels=True, gauges=gauges)).points
+    assert np.allclose(points["depth"], level - FLOOR_THERE)
 
 
 def test_a_level_that_is_given_holds_before_all(tmp_path: Path) -> None:

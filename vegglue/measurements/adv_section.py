@@ -39,6 +39,7 @@ SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing 
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
 TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
 DURATION = 60.0  # s
+SECTIONS_OF_FLOOR = 50  # chosen, not measured: some in every pool and on every riffle of a reach
 
 
 @dataclass(frozen=True)
@@ -136,16 +137,29 @@ def _in_the_file(case: Case, observation: Observation, x: float, level: Array) -
 
 
 def _surface(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> float:
-    """Water level at x in z of the file [m]: as given, else between the gauges of the experiment, else as expected."""
+    """Water level at x in z of the file [m]: as given, else of the gauges of the experiment, else as expected.
+
+    Between gauges z is linear; beyond them it falls as the floor does, z = z_gauge - S (x - x_gauge).
+    """
     if observation.surface is not None:
         return observation.surface
     own = gauges[(gauges["experiment"] == observation.experiment) & (gauges["kind"] == WATER_LEVEL)]
     if len(own):
         along = own.groupby("x")["value"].mean()
-        level = float(np.interp(x, along.index.to_numpy(float), along.to_numpy(float)))
+        at = along.index.to_numpy(float)
+        within = float(np.clip(x, at.min(), at.max()))
+        fall = _floor_slope(case, str(observation.experiment)) * (x - within) if x != within else 0.0
+        level = float(np.interp(within, at, along.to_numpy(float))) - fall
     else:
         level = _expected_level(case, str(observation.experiment), x)
     return float(_in_the_file(case, observation, x, np.array(level)))
+
+
+def _floor_slope(case: Case, experiment: str) -> float:
+    """S = max(-dz/dx, 0) of the line through the lowest beds of the sections of the grid [-]: pools are no slope."""
+    x = np.linspace(*case.grid.x, SECTIONS_OF_FLOOR + 2)[1:-1]
+    grid = Grid(x, _across(case), float(x[1] - x[0]), GRID_STEP, centreline_in(case))
+    return max(-float(np.polyfit(x, bed_levels(case, grid, experiment).min(axis=1), 1)[0]), 0.0)
 
 
 def _expected_level(case: Case, experiment: str, x: float) -> float:
