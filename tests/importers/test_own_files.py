@@ -518,3 +518,26 @@ def test_a_name_that_says_less_yields(tmp_path: Path, headings: str, wanted: dic
 def test_north_is_known_beside_a_column_named_as_x(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Ost,N,u\n1,2,3\n4,5,6\n", encoding="utf-8")
     assert set(read_rows(tmp_path / "a.csv", FileWords(columns={"x": "Ost"})).numbers) == {"x", "y", "u"}
+
+
+@pytest.mark.parametrize(
+    ("table", "role", "error"),
+    [
+        ("x,y,U [cm/s],u_se\n1,2,40,0.3\n", "u_se", 0.003),
+        ("x,y,U [cm/s],u_se [m/s]\n1,2,40,0.003\n", "u_se", 0.003),
+        ("x,y,Ve (cm/s),Vn (cm/s),SE\n1,2,40,3,0.3\n", "v_se", 0.003),
+        ("x,y,level [mm],SE\n1,2,950,2\n", "level_se", 0.002),
+        ("x,y,u,u_se\n1,2,0.4,0.003\n", "u_se", 0.003),
+    ],
+)
+def test_an_error_without_a_unit_has_that_of_its_values(tmp_path: Path, table: str, role: str, error: float) -> None:
+    """0.3 beside U [cm/s] was 0.3 m/s."""
+    (tmp_path / "a.csv").write_text(table, encoding="utf-8")
+    assert read_rows(tmp_path / "a.csv", FileWords()).numbers[role].tolist() == pytest.approx([error])
+
+
+def test_an_error_follows_the_unit_that_the_site_file_says(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("x,y,u,u_se\n1,2,40,0.3\n", encoding="utf-8")
+    taken = read_rows(tmp_path / "a.csv", FileWords(units={"u": "cm/s"}))
+    assert taken.numbers["u_se"].tolist() == pytest.approx([0.003])
+    assert taken.units["u_se"] == "cm/s"

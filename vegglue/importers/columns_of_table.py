@@ -17,6 +17,15 @@ LESS_SAID = {
     "z": {"bed level", "z bed", "zb", "bed elevation"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "geschwindigkeit", "vitesse"},
 }
+# What errors and scatters are of, and so in the unit of where they state none.
+VALUES_OF = {
+    "u_se": ("u", "east_velocity"),
+    "v_se": ("v", "north_velocity"),
+    "u_std": ("u", "east_velocity"),
+    "speed_se": ("speed",),
+    "level_se": ("level",),
+    "discharge_se": ("discharge",),
+}
 NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 
 
@@ -81,9 +90,12 @@ def _of_one(heading: str) -> bool:
     return "u" in words_of(heading).split()
 
 
-def unit_of_column(path: Path, table: LooseTable, place: int, role: str, words: FileWords) -> str:
-    """By the site file, the row of units, the heading; else the SI unit. Errors: InputError for a unit not known."""
-    quantity = ROLES[role].quantity
+def unit_of_column(path: Path, table: LooseTable, columns: Mapping[str, int], role: str, words: FileWords) -> str:
+    """By the site file, the row of units, the heading; else, of an error or a scatter, that of its values; else SI.
+
+    columns: place of the column of each role. Errors: InputError for a unit not known.
+    """
+    quantity, place = ROLES[role].quantity, columns[role]
     if role in words.units:
         return unit_named(words.units[role], quantity) or words.units[role]
     heading = table.headings[place]
@@ -91,7 +103,8 @@ def unit_of_column(path: Path, table: LooseTable, place: int, role: str, words: 
     by_heading = (known[1] if known else None) or _bracketed(heading) or unit_stated(heading, quantity)
     stated = table.units[place].strip("[]() ") or by_heading
     if not stated:
-        return next(iter(UNITS[quantity]))
+        values = next((one for one in VALUES_OF.get(role, ()) if one in columns), None)
+        return unit_of_column(path, table, columns, values, words) if values else next(iter(UNITS[quantity]))
     unit = unit_named(stated, quantity)
     if unit is None:
         raise InputError(

@@ -84,7 +84,7 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
         if not ROLES[role].quantity:
             texts[role] = fields
             continue
-        units[role] = unit_of_column(path, table, place, role, words)
+        units[role] = unit_of_column(path, table, columns, role, words)
         values, absent = _numbers(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
         if ROLES[role].quantity == "velocity":
