@@ -12,6 +12,10 @@ SITE: dict[str, Any] = {
     "holdout": {"high": {"discharge_m3_s": 2.0, "downstream_level_m": 0.9}},
 }
 
+# A channel and an experiment as a site file has them.
+CHANNEL = "channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
+JUNE = "experiments: {June: {discharge: 2000 l/s, level: 95 cm}}\n"
+
 
 def field_folder(folder: Path, **changes: Any) -> Path:
     """What a field team would hand over."""
@@ -21,3 +25,12 @@ def field_folder(folder: Path, **changes: Any) -> Path:
     (folder / "levels.csv").write_text("experiment,x,y,level,level_se\nlow,10,0,0.74,0.002\n", encoding="utf-8")
     (folder / "holdout.csv").write_text("experiment,section,x,y,u\nhigh,A,12,0.5,0.6\n", encoding="utf-8")
     return folder
+
+
+def folder_of(path: Path, site: str, **files: str) -> Path:
+    """A folder of measurements; names of files with __ for the point."""
+    path.mkdir()
+    (path / "site.yaml").write_text(site, encoding="utf-8")
+    for name, text in files.items():
+        (path / name.replace("__", ".")).write_text(text, encoding="utf-8")
+    return path
