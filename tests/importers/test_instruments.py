@@ -111,6 +111,20 @@ def test_records_of_one_point_become_a_vertical(tmp_path: Path) -> None:
     assert "1,000 samples at 25 Hz, 20 left out" in case.imported[0].taken
 
 
+def test_records_of_one_vertical_keep_errors_of_their_own(tmp_path: Path) -> None:
+    """All had that of the first."""
+    folder = tmp_path / "flume"
+    folder.mkdir()
+    entries = []
+    for number, error in enumerate((", standard_error: 1 cm/s", "", ", standard_error: 4 cm/s")):
+        (folder / f"p{number}.dat").write_text(vectrino((0.3, 0.02, 0.0), 0.03, 400, bad=0), encoding="utf-8")
+        (folder / f"p{number}.hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
+        entries.append(f"p{number}.dat: {{position: [12, 0.5, {0.1 + 0.2 * number:.1f}], section: A{error}}}")
+    (folder / "site.yaml").write_text(f"{SITE}files: {{{', '.join(entries)}}}\n", encoding="utf-8")
+    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
+    assert pd.read_csv(case.observations[0].file)["u_se"].tolist() == [0.01, 0.0, 0.04]
+
+
 @pytest.mark.parametrize(
     ("axes", "said", "velocity"),
     [

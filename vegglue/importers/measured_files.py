@@ -23,7 +23,7 @@ from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
 from vegglue.importers.site_file import HELD_OUT, held_out_file, site_file
-from vegglue.importers.stations import StationTable, station_tables
+from vegglue.importers.stations import StationTable, errors_of_rows, station_tables
 from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
 
@@ -202,8 +202,17 @@ def _brought(
     read = [with_experiments(reader_of(path)(path, words), known.names) for path, words in group]
     placed = [in_the_channel(one, place, words) for one, (_, words) in zip(read, group, strict=True)]
     path, words = group[0]
+    if len(group) > 1:
+        placed = [_with_own_errors(one, own) for one, (_, own) in zip(placed, group, strict=True)]
+        words = replace(words, standard_error={})
     made = station_tables(joined_rows(placed), path.stem, words, known, place, shown_path(path))
     said = [
         f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)
     ]
     return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
+
+
+def _with_own_errors(taken: Taken, words: FileWords) -> Taken:
+    """The rows of one file of a group with its own standard errors, NaN where neither it nor the site file has one."""
+    kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
+    return taken.having({kind.error_column: errors_of_rows(taken, kind, words) for kind in kinds})

@@ -181,14 +181,14 @@ def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
     """What else is known of points: v and w where any has it, standard errors with 0 for unknown, and what all have."""
     numbers = points.numbers
     found = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
-    errors = np.nan_to_num(_errors(points, KINDS[STREAMWISE], words))
+    errors = np.nan_to_num(errors_of_rows(points, KINDS[STREAMWISE], words))
     found |= {"u_se": errors} if errors.any() else {}
     return found | {
         role: numbers[role] for role in ("u_std", "duration_s") if role in numbers and np.isfinite(numbers[role]).all()
     }
 
 
-def _errors(taken: Taken, kind: Kind, words: FileWords) -> Array:
+def errors_of_rows(taken: Taken, kind: Kind, words: FileWords) -> Array:
     """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one, or 0."""
     stated = np.full(taken.size, words.standard_error.get(kind.unit, np.nan))
     column = taken.numbers.get(kind.error_column, stated)
@@ -216,7 +216,7 @@ def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Pl
     What was measured at a point stands on the map of its centreline, as a case reads it.
     """
     kept = taken.only(np.isfinite(taken.numbers[kind.column]))
-    errors = _errors(kept, kind, words)
+    errors = errors_of_rows(kept, kind, words)
     gathered: dict[PlaceKey, list[RepeatedValue]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
