@@ -13,7 +13,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.safe_yaml import safe_yaml
 from vegglue.errors import InputError
-from vegglue.importers.site_file import read_site
+from vegglue.importers.site_file import read_site, site_file
 from vegglue.workflow.import_folder import assumptions_of, import_folder
 
 ODD = (
@@ -176,3 +176,17 @@ def test_a_viscosity_that_is_not_surely_known_is_calibrated(
 def test_a_factor_below_one_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="eddy_viscosity_factor"):
         import_folder(field_folder(tmp_path / "site", eddy_viscosity_factor=0.5), tmp_path / "site.yaml")
+
+
+def test_a_second_file_of_what_is_held_out_is_told(tmp_path: Path) -> None:
+    """It was left out without a word."""
+    folder = field_folder(tmp_path / "site")
+    (folder / "holdout.txt").write_text("x y u\n1 2 3\n", encoding="utf-8")
+    assert "holdout.txt is not read, as holdout.csv is: put the rows of both into one." in assumptions_of(folder)
+
+
+def test_a_frame_that_points_nowhere_is_refused(tmp_path: Path) -> None:
+    """Towards its own origin was east."""
+    folder = field_folder(tmp_path / "site", frame={"origin": [10, 20], "towards": [10, 20]})
+    with pytest.raises(InputError, match="`frame` expected `towards` a point further down the x axis"):
+        read_site(site_file(folder))

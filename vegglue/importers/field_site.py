@@ -168,6 +168,8 @@ class SiteFrame(_Said):
     def _one_direction(self) -> Self:
         if self.angle is not None and self.towards is not None:
             raise ValueError(ONE_DIRECTION)
+        if self.towards == self.origin:
+            raise ValueError("`towards` a point further down the x axis, another one than `origin`")
         return self
 
     @property

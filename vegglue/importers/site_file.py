@@ -25,8 +25,12 @@ def site_file(folder: Path) -> Path:
 
 def held_out_file(folder: Path) -> Path | None:
     """The file of measurements that a folder holds out: holdout.csv, else the first other table of that name."""
-    found = sorted(path for path in folder.iterdir() if path.is_file() and path.stem.lower() == HELD_OUT)
-    return next((path for path in found if path.name == "holdout.csv"), next(iter(found), None))
+    return next(iter(_held_out_files(folder)), None)
+
+
+def _held_out_files(folder: Path) -> list[Path]:
+    found = (path for path in folder.iterdir() if path.is_file() and path.stem.lower() == HELD_OUT)
+    return sorted(found, key=lambda path: (path.name != "holdout.csv", path.name))
 
 
 def read_site(path: Path) -> FieldSite:
@@ -77,6 +81,8 @@ def left_open(folder: Path) -> list[str]:
     told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
     if (held_out := held_out_file(folder)) is not None and not site.holdout:
         told.append(f"{held_out.name} is not read: {path.name} names no experiment under `holdout`.")
+    first, *others = _held_out_files(folder) or [path]
+    told += [f"{other.name} is not read, as {first.name} is: put the rows of both into one." for other in others]
     return told
 
 
