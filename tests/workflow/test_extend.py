@@ -223,6 +223,8 @@ def test_what_is_not_kept_is_told() -> None:
         (("--add", "unlisted_object[x1.2.3,y0]"), "expected a place such as"),
         (("--add", "streamlining", "--shape", "width=2"), "`width` is no shape"),
         ((), "either --auto or --add"),
+        (("--auto", "--to", "child.yaml"), "expected --to with --add only, got it with --auto"),
+        (("--auto", "--shape", "width=2"), "expected --shape with --add only, got it with --auto"),
     ],
 )
 def test_what_cannot_be_added_is_refused(

@@ -122,6 +122,9 @@ def extend_command(
     shapes = dict(number_given(text) for text in shape or [])
     if auto == bool(add):
         raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
+    if auto and (to is not None or shape):
+        given = "--to" if to is not None else "--shape"
+        raise InputError(f"extend: expected {given} with --add only, got it with --auto, which finds its own; drop it.")
     case = opened_case(config, trust) if auto else vegglue.load_case(config, trust)
     if auto:
         with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
