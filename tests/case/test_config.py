@@ -210,6 +210,37 @@ def test_what_is_wrong_is_said_in_one_sentence(old, new, expected):
     assert "\n" not in said
 
 
+@pytest.mark.parametrize(
+    ("flow", "observation", "expected"),
+    [
+        ("discharge: 2, level: nosuch", "", "`validation.experiments.high.level` names the parameter `nosuch`"),
+        ("discharge: -2, level: 1", "", "`validation.experiments.high.discharge.upstream` expected a number above 0"),
+        ("discharge: {west: 2}, level: 1", "", "names the inflow `west`, which is not declared"),
+        ("discharge: 2, level: 1, plants: [p9]", "", "names the patch `p9`, which is not declared"),
+        ("discharge: 2, level: 1, stands: {rush: {phi: 1}}", "", "names the stand `rush`, which is not declared"),
+        (
+            "discharge: 2, level: 1, stands: {reed: {phi: 0}}",
+            "",
+            "`validation.experiments.high.stands.reed.phi` expected",
+        ),
+        ("discharge: 2, level: 1", ", experiment: low", "`validation.observations[0].experiment` names the experiment"),
+    ],
+)
+def test_what_is_wrong_in_the_validation_is_said_too(flow: str, observation: str, expected: str) -> None:
+    """It passed `check` and ended `compare` in a KeyError."""
+    write("x,y,level\n10,0,1\n", "unseen.csv")
+    seen = f"observations: [{{kind: level, file: unseen.csv{observation}}}]"
+    said = sentence(changed("name: small", f"name: small\nvalidation: {{experiments: {{high: {{{flow}}}}}, {seen}}}"))
+    assert expected in said
+
+
+def test_a_parameter_of_the_validation_alone_is_used() -> None:
+    write("x,y,level\n10,0,1\n", "unseen.csv")
+    unseen = "{experiments: {high: {discharge: 2, level: h}}, observations: [{kind: level, file: unseen.csv}]}"
+    text = SMALL.replace("name: small", f"name: small\nvalidation: {unseen}")
+    assert "h" in load_case(write(f"{text}  h: {{distribution: uniform, low: 0.9, high: 1.1, unit: m}}\n")).parameters
+
+
 def test_numbers_of_yaml_1_2_are_numbers():
     case = load_case(changed("name: small", "name: small\nnumerics: {tolerance: 1e-7, film_depth: 2E-3}"))
     assert (case.numerics.tolerance, case.numerics.film_depth) == (1e-7, 2e-3)

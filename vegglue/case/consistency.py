@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
 from vegglue.case.parts import Interval, Value
 from vegglue.case.prior_tails import share_below
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, Experiment, Observation
 from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Inflow, Stand, StandOverride
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import shown_path
@@ -35,19 +35,35 @@ def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
     if case.friction.walls is not None:
         yield from _coefficients(("friction", "walls"), case.friction.walls)
     owners: list[tuple[KeyPath, Mapping[str, Stand | StandOverride]]] = [(("plants",), case.plants.stands)]
-    owners += [(("experiments", name), experiment.stands) for name, experiment in case.experiments.items()]
+    owners += [(at, experiment.stands) for at, experiment in _experiments(case)]
     for place, stands in owners:
         for name, stand in stands.items():
             for key in ("phi", "canopy_height", "bare_chezy"):
                 yield (*place, "stands", name, key), getattr(stand, key), True
-    for name, experiment in case.experiments.items():
+    for at, experiment in _experiments(case):
         for inflow, discharge in experiment.discharge.items():
-            yield ("experiments", name, "discharge", inflow), discharge, True
-        yield ("experiments", name, "level"), experiment.level, False
+            yield (*at, "discharge", inflow), discharge, True
+        yield (*at, "level"), experiment.level, False
     yield ("eddy_viscosity",), case.eddy_viscosity, True
     for name, entry in case.effects.items():
         for key, value in entry.values.items():
             yield ("effects", name, "values", key), value, False
+
+
+def _experiments(case: Case) -> Iterator[tuple[KeyPath, Experiment]]:
+    """Every experiment and where it stands: those that are calibrated to, then those of the validation."""
+    yield from ((("experiments", name), one) for name, one in case.experiments.items())
+    if case.validation is not None:
+        yield from ((("validation", "experiments", name), one) for name, one in case.validation.experiments.items())
+
+
+def _observations(case: Case) -> Iterator[tuple[KeyPath, Observation, Iterable[str]]]:
+    """Every observation, where it stands, and the names of the experiments that it may be of."""
+    yield from ((("observations", i), one, case.experiments) for i, one in enumerate(case.observations))
+    if case.validation is not None:
+        unseen = case.validation.experiments
+        for i, one in enumerate(case.validation.observations):
+            yield ("validation", "observations", i), one, unseen
 
 
 def _coefficients(place: KeyPath, law: FrictionClass) -> Iterator[tuple[KeyPath, Value | None, bool]]:
@@ -71,8 +87,7 @@ def _names(case: Case) -> Iterator[Refusal]:
         yield from _unknown(("plants", "patches", i, "stand"), patch.stand, stands, "stand")
         if patch.name in patches[:i]:
             yield Refusal(("plants", "patches", i, "name"), f"is `{patch.name}` a second time: rename one of them")
-    for name, experiment in case.experiments.items():
-        at = ("experiments", name)
+    for at, experiment in _experiments(case):
         for inflow in experiment.discharge:
             yield from _unknown((*at, "discharge"), inflow, case.inflows, "inflow")
         for inflow in case.inflows.keys() - experiment.discharge.keys():
@@ -81,10 +96,9 @@ def _names(case: Case) -> Iterator[Refusal]:
             yield from _unknown((*at, "stands"), stand, stands, "stand")
         for present in experiment.plants if isinstance(experiment.plants, tuple) else ():
             yield from _unknown((*at, "plants"), present, patches, "patch")
-    for i, observation in enumerate(case.observations):
-        place = ("observations", i, "experiment")
+    for at, observation, experiments in _observations(case):
         if observation.experiment is not None:
-            yield from _unknown(place, observation.experiment, case.experiments, "experiment")
+            yield from _unknown((*at, "experiment"), observation.experiment, experiments, "experiment")
     for name, entry in case.effects.items():
         for word in entry.experiments or ():
             yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
@@ -181,11 +195,9 @@ def _files(case: Case) -> Iterator[Refusal]:
     for i, layer in enumerate(case.bed):
         named += [(("bed", i, "raster"), layer.raster), (("bed", i, "points"), layer.points)]
     named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
-    named += [(("observations", i, "file"), observation.file) for i, observation in enumerate(case.observations)]
+    named += [((*at, "file"), observation.file) for at, observation, _ in _observations(case)]
     named += [(("survey", "file"), case.survey.file)] if case.survey else []
     named += [(("effect_file",), case.effect_file)]
-    unseen = case.validation.observations if case.validation else ()
-    named += [(("validation", "observations", i, "file"), observation.file) for i, observation in enumerate(unseen)]
     for place, file in named:
         if file is None:
             continue

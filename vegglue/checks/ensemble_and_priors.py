@@ -86,6 +86,8 @@ def remarks_on_units_of_effects(case: Case) -> Iterator[str]:
 def _acts(place: KeyPath, classes: set[str], growing: set[str]) -> bool:
     if place[:2] == ("friction", "classes"):
         return place[2] in classes
+    if place[0] == "validation":
+        return False
     return place[-2] in growing if "stands" in place[:-2] else True
 
 
