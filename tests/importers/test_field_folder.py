@@ -12,6 +12,7 @@ from vegglue.case.config import load_case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
+from vegglue.workflow.import_folder import import_folder
 
 
 @pytest.mark.slow
@@ -61,3 +62,10 @@ def test_a_folder_that_says_too_little_is_refused(
     assert said in error
     assert not (tmp_path / "site-data").exists()
     assert len(error.strip().splitlines()) == 1
+
+
+def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:
+    """It fitted the experiments alone, and a flow held out at 1.6 m reached its sides."""
+    high = {"high": {"discharge_m3_s": 6.0, "downstream_level_m": 1.6}}
+    case = import_folder(field_folder(tmp_path / "site", holdout=high), tmp_path / "site.yaml")
+    assert case.grid.y[1] > 1.5 + 1.6 / 0.6667

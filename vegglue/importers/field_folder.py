@@ -188,7 +188,7 @@ def _grid(site: FieldSite, channel: Channel, place: Placement) -> Tree:
     x = list(given.x or (0.0, round(along, 4) if channel.length_m is None else channel.length_m))
     length, width = x[1] - x[0], channel.bottom_width_m
     fall = channel.bed_slope * length
-    highest = max(one.downstream_level_m for one in site.experiments.values())
+    highest = max(one.downstream_level_m for one in (*site.experiments.values(), *site.holdout.values()))
     # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
