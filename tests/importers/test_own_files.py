@@ -310,6 +310,17 @@ def test_what_cannot_be_taken_is_said_in_one_sentence(
     assert len(error.strip().splitlines()) == 1
 
 
+def test_a_file_of_a_folder_within_is_read(tmp_path: Path) -> None:
+    """It was looked for, and never read."""
+    site = CHANNEL + JUNE + "files: {adcp/b.csv: {section: B}}\n"
+    folder = folder_of(tmp_path / "brook", site, b__csv="x;y;section;u\n1;0;A;0.1\n")
+    (folder / "adcp").mkdir()
+    for name in ("b.csv", "unnamed.csv"):
+        (folder / "adcp" / name).write_text("x;y;u\n2;0;0.2\n", encoding="utf-8")
+    table = read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml")).table
+    assert table[["section", "value"]].to_numpy().tolist() == [["A", 0.1], ["B", 0.2]]
+
+
 def test_words_for_units_and_columns() -> None:
     assert unit_named("cm s^-1", "velocity") == "cm/s"
     assert unit_named("m³/s", "discharge") == "m3/s"

@@ -85,7 +85,7 @@ def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, 
 
 
 def _read(
-    paths: Sequence[Path], said: Mapping[str, FileWords], target: Path, place: Placement, known: KnownExperiments
+    paths: Sequence[Path], said: Mapping[Path, FileWords], target: Path, place: Placement, known: KnownExperiments
 ) -> MeasuredFiles:
     """Tables that a case can name stay where they are; others are brought into that form beside the config."""
     found: list[Tree] = []
@@ -94,11 +94,11 @@ def _read(
     others = []
     for path in paths:
         kind = KIND_OF_FILE.get(path.name)
-        if kind is not None and path.name not in said and not place.turned and _is_plain(path, kind):
+        if kind is not None and path not in said and not place.turned and _is_plain(path, kind):
             _check_plain(path, kind, known)
             found.append(observed(kind.name, named_from(path, target)))
         else:
-            others.append((path, said.get(path.name, FileWords())))
+            others.append((path, said.get(path, FileWords())))
     for group in _groups(others):
         tables, records = _brought(group, place, known)
         for table in tables:
@@ -134,17 +134,21 @@ def record(path: Path, taken: Taken | None, said: str) -> Tree:
     return tree
 
 
-def _entries(folder: Path, site: FieldSite) -> dict[str, FileWords]:
+def _entries(folder: Path, site: FieldSite) -> dict[Path, FileWords]:
+    """What the site file says about single files, by their paths, which may lead into folders of the folder."""
     entries = {}
     for name, given in site.files.items():
         if not (folder / name).is_file():
             raise InputError(f"{shown_path(folder)}: `files` names {name}, which is not there; correct it.")
-        entries[str(name)] = file_words(given or {}, f"{shown_path(folder)}: `files.{name}`")
+        entries[folder / name] = file_words(given or {}, f"{shown_path(folder)}: `files.{name}`")
     return entries
 
 
-def _candidates(folder: Path, said: Mapping[str, FileWords], used: Sequence[str]) -> list[Path]:
-    """Files of every kind in their order, then others by name; no raw record whose export lies beside it."""
+def _candidates(folder: Path, said: Mapping[Path, FileWords], used: Sequence[str]) -> list[Path]:
+    """Files of every kind in their order, then others by name; no raw record whose export lies beside it.
+
+    Of folders within the folder only those files that have words of their own.
+    """
     order = {kind.file: place for place, kind in enumerate(KINDS.values())}
     free = [path for path in folder.iterdir() if path.is_file() and path.name not in used]
     texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
@@ -152,10 +156,11 @@ def _candidates(folder: Path, said: Mapping[str, FileWords], used: Sequence[str]
         path
         for path in free
         if path.stem.lower() != HELD_OUT
-        and (path.name in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
-        and (path.name in said or not _is_raw_of(path, texts))
+        and (path in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
+        and (path in said or not _is_raw_of(path, texts))
     ]
-    return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name))
+    within = [path for path in said if path.parent != folder and path not in {folder / name for name in used}]
+    return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name)) + sorted(within)
 
 
 def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
