@@ -147,6 +147,18 @@ def test_a_raw_record_beside_its_export_is_left_alone(tmp_path: Path) -> None:
     assert [one.name for one in case.imported] == ["t_ASC.TXT"]
 
 
+def test_a_raw_record_beside_the_export_of_another_is_read(tmp_path: Path) -> None:
+    """mill_1 was left out beside mill_10_ASC, whose name begins alike."""
+    folder = tmp_path / "brook"
+    folder.mkdir()
+    words = "{start: [10, -1], section: A}"
+    (folder / "site.yaml").write_text(f"{SITE}files: {{mill_10_ASC.TXT: {words}}}\n", encoding="utf-8")
+    (folder / "mill_10_ASC.TXT").write_text(winriver(*TRACK, 2.0, (0.64, -0.48), 0.05), encoding="utf-8")
+    (folder / "mill_1.vno").write_bytes(bytes(100))
+    with pytest.raises(InputError, match=r"mill_1\.vno: expected an export as text"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
 @pytest.mark.parametrize(
     ("name", "begins", "said"),
     [

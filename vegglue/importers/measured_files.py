@@ -7,6 +7,7 @@ import csv
 import hashlib
 import io
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count
@@ -165,7 +166,8 @@ def _candidates(folder: Path, said: Mapping[Path, FileWords], used: Sequence[str
 
 def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
     """Whether a file is the raw record that one of the texts was exported from: `mill_000` of `mill_000_ASC`."""
-    return path.suffix.lower() in BINARY_ENDINGS and any(text.startswith(path.stem) for text in texts)
+    of_path = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")
+    return path.suffix.lower() in BINARY_ENDINGS and any(of_path.match(text) for text in texts)
 
 
 def _is_plain(path: Path, kind: Kind) -> bool:
