@@ -255,6 +255,23 @@ def test_a_patch_without_stems_is_refused_beside_others(tmp_path: Path, stems: f
         planted_polygons(tmp_path / "a.geojson", None)
 
 
+@pytest.mark.parametrize(
+    ("other", "got"),
+    [
+        ({"type": "LineString", "coordinates": [[0, 0], [4, 1]]}, "a LineString"),
+        ({"type": "GeometryCollection", "geometries": []}, "a GeometryCollection"),
+        (None, "one of no place"),
+    ],
+)
+def test_what_is_no_area_is_refused_among_polygons(tmp_path: Path, other: dict[str, object] | None, got: str) -> None:
+    """A patch drawn as a line was left out without a word."""
+    shapes = [{"type": "Polygon", "coordinates": [square(4, 0, 1)]}, other]
+    features = [{"type": "Feature", "properties": {"stems": 22}, "geometry": shape} for shape in shapes]
+    (tmp_path / "a.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}), "utf-8")
+    with pytest.raises(InputError, match=rf"expected polygons alone, got {got} as feature 2; take it out"):
+        read_polygons(tmp_path / "a.geojson", None)
+
+
 def test_degrees_are_refused_where_the_frame_is_in_metres(tmp_path: Path) -> None:
     text = json.dumps(
         {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [[[8, 47], [8, 48], [9, 47]]]}}

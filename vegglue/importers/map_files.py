@@ -20,6 +20,8 @@ def geojson_features(path: Path, what: str) -> Iterator[list[Any]]:
     try:
         tree = json.loads(readable_text(path))
         yield tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+    except InputError:  # a ValueError that says what it is
+        raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise InputError(f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}).") from None
 

@@ -15,6 +15,7 @@ from vegglue.importers.map_files import geojson_features, rounded_place, shapes_
 DENSITIES = ("stems_per_m2", "stems", "density", "stem_density", "stems_m2")
 CLASSES = ("class", "friction_class", "friction", "roughness", "type", "landuse")
 NAMES = ("name", "id", "patch", "fid")
+AREAS = ("Polygon", "MultiPolygon")  # geometries of GeoJSON
 MOST_STEMS = 1e7  # 1/m2, as in the site file
 Ring = list[tuple[float, float]]
 
@@ -66,9 +67,16 @@ def planted_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
 
 def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
     with geojson_features(path, "polygons") as features:
-        for feature in features:
+        for number, feature in enumerate(features, 1):
             properties = dict(feature.get("properties") or {})
-            yield from ((ring, properties) for ring in _outlines(feature["geometry"]))
+            geometry = feature["geometry"]
+            if geometry is None or geometry["type"] not in AREAS:
+                got = "one of no place" if geometry is None else f"a {str(geometry['type'])[:40]}"
+                raise InputError(
+                    f"{shown_path(path)}: expected polygons alone, got {got} as feature {number}; take it out, or save "
+                    "it as the area that it stands for."
+                )
+            yield from ((ring, properties) for ring in _outlines(geometry))
 
 
 def _of_shapefile(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
