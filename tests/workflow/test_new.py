@@ -47,7 +47,13 @@ def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("option", "value", "said"),
-    [("--depth", "0", "--depth: expected a number above 0"), ("--length", "5", "four times")],
+    [
+        ("--depth", "0", "--depth: expected a number above 0"),
+        ("--length", "5", "four times"),
+        ("--width", "nan", "--width: expected a number above 0, got nan"),
+        ("--length", "inf", "--length: expected a number above 0, got inf"),
+        ("--slope", "nan", "--slope: expected a number, got nan"),
+    ],
 )
 def test_senseless_numbers_are_refused(
     tmp_path: Path,

@@ -80,8 +80,10 @@ def _clear(growing: Path) -> None:
 
 def _refuse_senseless(reach: Reach) -> None:
     for name in ("length", "width", "depth", "discharge"):
-        if getattr(reach, name) <= 0.0:
+        if not 0.0 < getattr(reach, name) < np.inf:
             raise InputError(f"--{name}: expected a number above 0, got {getattr(reach, name):g}; correct it.")
+    if not np.isfinite(reach.slope):
+        raise InputError(f"--slope: expected a number, got {reach.slope:g}; correct it.")
     if reach.length < 4.0 * reach.width:
         raise InputError(
             f"--length: expected at least four times the width, {4.0 * reach.width:g} m, got {reach.length:g}; a "
