@@ -15,6 +15,7 @@ from vegglue.cli.main import main
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Step
 from vegglue.screening.candidates import cause_of, with_effect
 from vegglue.screening.score_test import project
@@ -23,7 +24,7 @@ from vegglue.twins.hidden_effect import TwinBase
 from vegglue.twins.reveal import guess_in_words, marks
 from vegglue.twins.sealed_answer import Answer, Hidden, opened_answer, sealed_answer
 from vegglue.twins.twin import errors_named, measured_twin, true_place, twin_base
-from vegglue.twins.twin_files import config_in, write_twin
+from vegglue.twins.twin_files import config_in, in_rows_of_twin, write_twin
 from vegglue.workflow.run_folder import model_in
 
 pytestmark = pytest.mark.slow
@@ -228,6 +229,19 @@ def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:
     assert model.names == ground.model.names
     with pytest.raises(InputError, match="expected one config"):
         config_in(tmp_path)
+
+
+def test_a_bad_probe_is_named_by_its_row_in_the_twin(tmp_path: Path) -> None:
+    """It was that of the case, whose gauges may come first, and some of whose stations may not be in use."""
+    case = load_case(CONFIG)
+    table = read_observations(case).table.iloc[::-1].reset_index(drop=True)
+    station = table.assign(used=table.index != 20, value=np.arange(len(table)) / 100.0)
+    answer = in_rows_of_twin(an_answer(Hidden("wind", 8.0, {}, 6.0), Hidden("bad_probe", 9.0, {}, 0.0, 40)), station)
+    twin = load_case(write_twin(case, tmp_path / "riddle", station, sealed_answer(answer)))
+    wind, probe = answer.hidden
+    assert wind.station == -1
+    assert read_observations(twin).table["value"][probe.station] == pytest.approx(station["value"][40])
+    assert probe.station != 40
 
 
 def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 """The folder of a twin: measurements, a config that extends the one it is a twin of, and the sealed answer."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.measurements.kinds import KINDS, Kind, kind_of
 from vegglue.site.centreline import on_map
 from vegglue.site.grid import centreline_in
+from vegglue.twins.sealed_answer import Answer
 
 SEAL = "answer.sealed"
 
@@ -41,6 +43,17 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     named = texts | {SEAL: seal, target.name: note + as_yaml(tree)}
     write_made({folder / file: text for file, text in named.items()}, "give another folder by --to", force)
     return target
+
+
+def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
+    """The answer with bad probes by their rows in what the files of the twin hold: used stations alone, by kind.
+
+    station: that of the case, in which they were chosen.
+    """
+    used, kinds = station["used"].to_numpy(bool), station["kind"].to_numpy()
+    order = [int(row) for kind in KINDS.values() for row in np.flatnonzero(used & (kinds == kind.name))]
+    hidden = [replace(one, station=order.index(one.station)) if one.station >= 0 else one for one in answer.hidden]
+    return replace(answer, hidden=tuple(hidden))
 
 
 def _on_the_map(case: Case, station: pd.DataFrame) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.twins.reveal import guess_in_words
 from vegglue.twins.sealed_answer import opened_answer, sealed_answer
 from vegglue.twins.twin import measured_twin, true_place, twin_base
-from vegglue.twins.twin_files import SEAL, config_in, write_twin
+from vegglue.twins.twin_files import SEAL, config_in, in_rows_of_twin, write_twin
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.run_folder import model_in
 
@@ -39,8 +39,9 @@ def make_twin(
     model = model_in(case)
     refuse_without_parameters(case)
     station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
+    seal = sealed_answer(in_rows_of_twin(answer, station))
     # The twin names the effect file of its case, which was trusted when that was read.
-    return load_case(write_twin(case, Path(to), station, sealed_answer(answer), force), case.effect_file is not None)
+    return load_case(write_twin(case, Path(to), station, seal, force), case.effect_file is not None)
 
 
 def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False) -> list[str]:
