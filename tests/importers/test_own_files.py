@@ -292,6 +292,18 @@ def test_the_unit_of_a_heading_counts_whatever_its_name_is(tmp_path: Path, headi
         ("files: {a.csv: {missing: none}}", "x,y,u\n1,2,3\n", "`files.a.csv`.missing expected a number"),
         ("files: {a.csv: {flip: z}}", "x,y,u\n1,2,3\n", "flip expected one of x, y, got 'z'"),
         ("files: {a.csv: {line: 3}}", "x,y,u\n1,2,3\n", "line expected two points"),
+        (
+            "files: {a.csv: {start: [1, 2]}}",
+            "x,y,u\n1,2,3\n",
+            "expected no `start` in its entry of `files`, which is for",
+        ),
+        ("files: {a.csv: {line: [[1, 2], [3, 4]]}}", "x,y,u\n1,2,3\n", "expected no `line` in its entry"),
+        ("files: {a.csv: {draft: 0.1}}", "x,y,u\n1,2,3\n", "expected no `draft` in its entry"),
+        (
+            "files: {a.csv: {declination: 3}}",
+            "x,y,u\n1,2,3\n",
+            "`declination` in its entry of `files`, which is for raw",
+        ),
         ("frame: {origin: [1, 2]}", "x,y,u\n1,2,3\n", "either `angle` or `towards: [east, north]`"),
     ],
 )

@@ -22,6 +22,14 @@ from vegglue.in_short import so_many
 MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
+# What an entry of `files` may say of other files, and does nothing to a table.
+OF_RECORDS = {
+    "start": "transects of a boat",
+    "line": "tables along a tape",
+    "position": "records of a probe",
+    "draft": "raw records of a boat",
+    "declination": "raw records of a boat",
+}
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -68,7 +76,13 @@ class Taken:
 
 
 def read_rows(path: Path, words: FileWords) -> Taken:
-    """What a file of columns holds, in SI. Errors: InputError, naming file, row and column."""
+    """What a file of columns holds, in SI. Errors: InputError, naming file, row and column, and for words of others."""
+    idle = next((key for key, what in OF_RECORDS.items() if getattr(words, key) not in (None, 0.0)), None)
+    if idle is not None:
+        raise InputError(
+            f"{shown_path(path)}: expected no `{idle}` in its entry of `files`, which is for {OF_RECORDS[idle]}, got a "
+            "table that says its own places and directions; take it out."
+        )
     return rows_of_table(path, without_copies(read_loosely(path, words.sheet)), words)
 
 
