@@ -333,6 +333,14 @@ def test_a_file_of_a_folder_within_is_read(tmp_path: Path) -> None:
     assert table[["section", "value"]].to_numpy().tolist() == [["A", 0.1], ["B", 0.2]]
 
 
+def test_a_file_beside_the_folder_is_not_read(tmp_path: Path) -> None:
+    """A site file may be a stranger's."""
+    (tmp_path / "secret.csv").write_text("x;y;u\n2;0;0.2\n", encoding="utf-8")
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + "files: {../secret.csv: {}}\n", b__csv="x;y;u\n1;0;0.1\n")
+    with pytest.raises(InputError, match=r"names \.\./secret\.csv, which leads out of the folder"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
 def test_words_for_units_and_columns() -> None:
     assert unit_named("cm s^-1", "velocity") == "cm/s"
     assert unit_named("m³/s", "discharge") == "m3/s"

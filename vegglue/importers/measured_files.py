@@ -141,6 +141,10 @@ def _entries(folder: Path, site: FieldSite) -> dict[Path, FileWords]:
     for name, given in site.files.items():
         if not (folder / name).is_file():
             raise InputError(f"{shown_path(folder)}: `files` names {name}, which is not there; correct it.")
+        if not (folder / name).resolve().is_relative_to(folder.resolve()):
+            raise InputError(
+                f"{shown_path(folder)}: `files` names {name}, which leads out of the folder; copy the file into it."
+            )
         entries[folder / name] = file_words(given or {}, f"{shown_path(folder)}: `files.{name}`")
     return entries
 
