@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,9 +25,8 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons
 from vegglue.importers.terrain_files import read_terrain
 
-WORDS = FileWords(
-    experiment="low", standard_error=0.01, line=((0.0, 0.0), (0.0, 9.0)), start=(0.0, 0.0), position=(1.0, 0.0, 0.3)
-)
+OF_TABLES = FileWords(experiment="low", standard_error={"m/s": 0.01})
+WORDS = replace(OF_TABLES, line=((0.0, 0.0), (0.0, 9.0)), start=(0.0, 0.0), position=(1.0, 0.0, 0.3))
 PLACES, DEPTHS, VELOCITIES = [1.0, 2.0, 3.0], [0.5, 0.7, 0.6], [0.3, 0.4, 0.2]
 SQUARE = [[0.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 0.0], [0.0, 0.0]]
 GEOJSON = (
@@ -104,13 +104,13 @@ def _beside(path: Path) -> object:
 SHAPES = _shapes()
 EAST, NORTH = np.linspace(0.0, 8.0, 20), np.zeros(20)
 IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
-    ("table.xlsx", _workbook(), lambda path: read_rows(path, WORDS)),
-    ("table.txt", b"x;y;u\nm;m;cm/s\n1,5;0;30\n1,5;1;40\n", lambda path: read_rows(path, WORDS)),
-    ("bed.tif", _geotiff(), lambda path: read_terrain(path, Placement(), WORDS, False)),
+    ("table.xlsx", _workbook(), lambda path: read_rows(path, OF_TABLES)),
+    ("table.txt", b"x;y;u\nm;m;cm/s\n1,5;0;30\n1,5;1;40\n", lambda path: read_rows(path, OF_TABLES)),
+    ("bed.tif", _geotiff(), lambda path: read_terrain(path, Placement(), OF_TABLES, False)),
     (
         "sections.csv",
         b"x,y,z\n0,-1,1\n0,1,1\n9,-1,1\n9,1,1\n",
-        lambda path: read_terrain(path, Placement(), WORDS, True),
+        lambda path: read_terrain(path, Placement(), OF_TABLES, True),
     ),
     ("patches.shp", SHAPES[".shp"], _beside),
     ("patches.dbf", SHAPES[".dbf"], _beside),
