@@ -22,13 +22,13 @@ from vegglue.calibration.baseline import (
     with_own_error,
 )
 from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_under
-from vegglue.case.parameter_space import theta_at, z_of
+from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise, linearise_from
+from vegglue.normal_range import NORMAL95
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import Suspect
-from vegglue.screening import score_test
 from vegglue.screening.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 
 # Steps that a refit may take. Chosen, not measured: most need four.
@@ -133,8 +133,6 @@ def _with(model: Model, tried: RefitTrial | Refit) -> Model:
 
 # An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
 NEEDED = 2.0
-# Step of z for the slope of an amplitude [-].
-SMALL_STEP = 1e-3
 
 
 def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, list[str]]:
@@ -142,7 +140,7 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
     unneeded: list[str] = []
     for name in earlier:
         one = candidate_in_case(base.model.case, name)
-        if _away_from_off(base, one) > NEEDED:
+        if not is_near_off(interval95(base.model, base.fitted, one.parameter), one.effect.amplitude.off):
             continue
         watch(Progress(f"{name} is no longer needed"))
         fewer = without_effect(base, one)
@@ -151,24 +149,13 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
     return base, unneeded
 
 
-def _away_from_off(base: Baseline, one: Candidate) -> float:
-    """How far the amplitude of an effect in the model is from off [its standard errors].
+def is_near_off(interval: tuple[float, float, float], off: float) -> bool:
+    """Whether an amplitude lies within NEEDED standard errors of off; interval: it and its 95 % range.
 
-    One that has a single sign is pushed away from off by its prior, which ends there: of that one, where the data alone
-    would have it, to first order (T of the score test at off).
+    Not on the scale of z, where off is the far end of the prior of an effect that has one sign only.
     """
-    j, amplitude, point = base.model.names.index(one.parameter), one.effect.amplitude, base.fitted.point
-    if not amplitude.only_sign:
-        off = z_of(base.model.case.parameters[one.parameter], amplitude.off)
-        return float(abs(point.z[j] - off) / np.sqrt(base.fitted.covariance[j, j]))
-    z = np.repeat(point.z[None], 3, axis=0)
-    z[:, j] += SMALL_STEP * np.array([-1.0, 0.0, 1.0])
-    before, gain, after = (amplitude.gain(float(value)) for value in theta_at(base.model.case, z)[one.parameter])
-    slope, others = base.noise.whiten(base.noise.used(point.slope)), np.arange(point.z.size) != j
-    trace = slope[:, [j]] * (2.0 * SMALL_STEP / max(after - before, np.finfo(float).tiny))
-    residual = base.noise.whiten(base.noise.residual(point.prediction)) + trace[:, 0] * gain
-    projected = score_test.project(slope[:, others], residual, point.z[others], trace)
-    return float(score_test.scores(projected, np.array([amplitude.only_sign]))[0] * amplitude.only_sign)
+    middle, low, high = interval
+    return abs(middle - off) <= NEEDED * (high - low) / (2.0 * NORMAL95)
 
 
 def without_effect(base: Baseline, one: Candidate) -> Baseline | None:

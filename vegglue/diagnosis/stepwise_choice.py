@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vegglue.diagnosis.comparison import By, Rung, held_out_rmse, improvement
-from vegglue.diagnosis.refits import NEEDED
-from vegglue.normal_range import NORMAL95
+from vegglue.diagnosis.refits import is_near_off
 
 # Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
 CLEAR = 2.0
@@ -151,8 +150,7 @@ def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: 
 
 def is_off(one: Nominee, rung: Rung) -> bool:
     """Whether the amplitude lies within NEEDED standard errors of the value that does nothing."""
-    middle, low, high = rung.values[one.parameter]
-    return abs(middle - one.off) <= NEEDED * (high - low) / (2.0 * NORMAL95)
+    return is_near_off(rung.values[one.parameter], one.off)
 
 
 def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold: Untold | None = None) -> str:
