@@ -104,6 +104,25 @@ def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
     assert np.mean(found) == pytest.approx(rho, abs=0.12)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("rho", "grid"), [(0.0, 0.0), (0.5, 0.0), (0.0, 0.02), (0.5, 0.005)])
+def test_errors_smaller_than_allowed_do_not_look_correlated(rho: float, grid: float) -> None:
+    """Half of the stated errors, and an error of the grid (m/s) that is not there."""
+    random, physics = np.random.default_rng(11), smooth()
+    wary = with_grid_error(noise_of(stations()), np.full(SECTIONS * STATIONS, grid))
+    found = [estimate_noise(wary, correlated(rho, random, error=0.005), physics) for _ in range(6)]
+    assert np.mean([one.correlation for one in found]) == pytest.approx(rho, abs=0.15)
+    assert [one.scale for one in found] == [1.0] * 6, "errors are never taken as smaller than stated"
+
+
+def test_what_a_section_shows_by_chance_is_no_correlation() -> None:
+    """Of independent errors the best correlation is seldom zero, and seldom likelier than none."""
+    random, physics = np.random.default_rng(12), np.zeros((SECTIONS * STATIONS, 1))
+    found = [estimate_noise(noise_of(stations()), correlated(0.0, random), physics) for _ in range(10)]
+    assert sum(one.correlation > 0.0 for one in found) <= 1
+    assert all(one.correlation_chances[1, 1:].sum() > 0.0 for one in found), "it is doubted all the same"
+
+
 def test_one_reading_a_section_tells_nothing_of_neighbours() -> None:
     """However alike the readings are."""
     alone = stations()[:6].assign(section=list("abcdef"), x=10.0 * np.arange(6))

@@ -10,8 +10,9 @@ g is the error of discretisation and c its correlation between two stations. M i
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -37,12 +38,15 @@ SCALE_EVIDENCE = 6.6
 # Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
 # Chosen, not measured: more pairs cost time and guard against a local maximum.
 START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
+# rho is searched below this [-]: a covariance of rho = 1 has no inverse.
+LARGEST_RHO = 0.98
 # What an instrument that is off adds, over the largest standard error of its readings [-]: so large that it is free,
 # and the covariance can still be factored.
 UNKNOWN_ERROR = 1e3
 # Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
 # decide between some correlation and none. Chosen, not measured: closer levels only cost time.
-CORRELATION_LEVELS, UNCORRELATED_CHANCE = np.linspace(0.05, 0.95, 19), 0.5
+LEVEL_STEP, UNCORRELATED_CHANCE = 0.05, 0.5
+CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
 
 
 @dataclass(frozen=True)
@@ -167,36 +171,58 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
 
     systematic: F (n, k), changes of the predictions that calibration and missing effects could make, each of plausible
     size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only when
-    the likelihood rejects the stated errors at 1 %.
+    the likelihood rejects the stated errors at 1 %, and is never below 1.
+
+    Errors that are smaller than stated look correlated where s is 1: a covariance with rho near 1 expects smaller
+    differences. So the chances of each rho are those of the s that fits best, where this is below 1; rho is the median
+    of these chances, 0 unless some correlation is likelier than none.
     """
-    known = _deviance_of(noise, residual, systematic)
-    neighbours = _has_neighbours(noise)
-
-    def deviance(rho: float, scale: float, log_t: float) -> float:
-        return known(rho if neighbours else 0.0, scale, log_t)
-
-    pairs = itertools.product(START_CORRELATIONS, START_SIZES)
-    _, *start = min((deviance(rho, 1.0, np.log(t)), np.log(rho / (0.98 - rho)), np.log(t)) for rho, t in pairs)
-
-    def best(scale_free: bool) -> tuple[float, float, float, float]:
-        def unfold(x: Array) -> tuple[float, float, float]:
-            rho, scale = 0.98 * scipy.special.expit(x[0]), np.exp(np.clip(x[2], -3.0, 3.0)) if scale_free else 1.0
-            return float(rho), float(scale), float(np.clip(x[1], -20.0, 10.0))
-
-        end = scipy.optimize.minimize(
-            lambda x: deviance(*unfold(x)),
-            np.array([*start, 0.0][: 3 if scale_free else 2]),
-            method="Nelder-Mead",
-            options={"xatol": 0.02, "fatol": 0.02},
-        )
-        return float(end.fun), *unfold(end.x)
-
-    fixed, free = in_threads(best, [(False,), (True,)])
-    _, rho, scale, log_t = free if fixed[0] - free[0] > SCALE_EVIDENCE and free[2] > 1.0 else fixed
-    found = with_correlation(noise, rho if rho > 0.05 and neighbours else 0.0, scale)
+    deviance, neighbours = _deviance_of(noise, residual, systematic), _has_neighbours(noise)
+    fit = partial(_likeliest, deviance)
+    without, correlations = [0.0], START_CORRELATIONS if neighbours else [0.0]
+    tasks = [(correlations, False), (correlations, True), (without, False), (without, True)]
+    stated, free, stated_without, free_without = in_threads(fit, tasks)
+    rejected = stated.deviance - free.deviance > SCALE_EVIDENCE and free.scale > 1.0
+    scale = free.scale if rejected else 1.0
     if not neighbours:
-        return found
-    return replace(found, correlation_chances=_correlation_chances(lambda level: deviance(level, scale, log_t)))
+        return with_correlation(noise, 0.0, scale)
+    best, none = (free, free_without) if rejected or free.scale < 1.0 else (stated, stated_without)
+    chances = _correlation_chances(lambda rho: deviance(rho, best.scale, best.log_size), none.deviance)
+    rho = _median(chances)
+    found = with_correlation(noise, rho if rho > LEVEL_STEP else 0.0, scale)
+    return replace(found, correlation_chances=chances)
+
+
+@dataclass(frozen=True)
+class _Likeliest:
+    """The maximum of the likelihood: -2 ln L up to a constant, rho, s and ln t there."""
+
+    deviance: float
+    correlation: float
+    scale: float
+    log_size: float
+
+
+def _likeliest(
+    deviance: Callable[[float, float, float], float],
+    correlations: Sequence[float],
+    scale_free: bool,
+) -> _Likeliest:
+    """The least of -2 ln L by Nelder and Mead, from the best pair of rho and ln t; rho stays 0 where that is given."""
+    pairs = itertools.product(correlations, np.log(START_SIZES))
+    _, rho, size = min((deviance(rho, 1.0, size), rho, size) for rho, size in pairs)
+    correlated = rho > 0.0
+
+    def unfold(x: Array) -> tuple[float, float, float]:
+        scale = np.exp(np.clip(x[1], -3.0, 3.0)) if scale_free else 1.0
+        found = LARGEST_RHO * scipy.special.expit(x[-1]) if correlated else 0.0
+        return float(found), float(scale), float(np.clip(x[0], -20.0, 10.0))
+
+    begin = [size, *([0.0] if scale_free else []), *([np.log(rho / (LARGEST_RHO - rho))] if correlated else [])]
+    end = scipy.optimize.minimize(
+        lambda x: deviance(*unfold(x)), np.array(begin), method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.02}
+    )
+    return _Likeliest(float(end.fun), *unfold(end.x))
 
 
 def _has_neighbours(noise: Noise) -> bool:
@@ -225,13 +251,22 @@ def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[
     return deviance
 
 
-def _correlation_chances(deviance: Callable[[float], float]) -> Array:
-    """Values of rho, 0 the first, and the posterior probability of each (2, k); deviance: rho -> -2 ln likelihood."""
-    levels = np.concatenate([[0.0], CORRELATION_LEVELS])
-    costs = np.array([deviance(float(level)) for level in levels])
-    prior = np.where(levels == 0.0, UNCORRELATED_CHANCE, (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size)
-    chance = prior * np.exp(-0.5 * (costs - costs.min()))
-    return np.stack([levels, chance / chance.sum()])
+def _correlation_chances(deviance: Callable[[float], float], uncorrelated: float) -> Array:
+    """Values of rho, 0 the first, and the posterior probability of each (2, k).
+
+    deviance: rho -> -2 ln likelihood; uncorrelated: the least one with rho = 0, whose s and t are its own.
+    """
+    costs = np.array([uncorrelated, *(deviance(float(level)) for level in CORRELATION_LEVELS)])
+    share = (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size
+    chance = np.array([UNCORRELATED_CHANCE, *[share] * CORRELATION_LEVELS.size]) * np.exp(-0.5 * (costs - costs.min()))
+    return np.stack([np.concatenate([[0.0], CORRELATION_LEVELS]), chance / chance.sum()])
+
+
+def _median(chances: Array) -> float:
+    """Median rho [-] of values, 0 the first, and their chances (2, k); each other value stands for what is nearest."""
+    (_, *levels), below = chances[0], np.cumsum(chances[1])
+    edges = [levels[0] - 0.5 * LEVEL_STEP, *(np.array(levels) + 0.5 * LEVEL_STEP)]
+    return 0.0 if below[0] >= 0.5 else float(np.interp(0.5, below, edges))
 
 
 def draw_whitened_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
