@@ -8,6 +8,7 @@ from vegglue.measurements.vertical_profile import (
     Column,
     ProfileFit,
     average_weights,
+    few_points_average,
     fit_canopy_height,
     fit_log_law,
     fit_two_layers,
@@ -68,6 +69,26 @@ def test_no_profile_is_claimed_where_none_shows(fit):
     noise = np.random.default_rng(5).normal(0.0, 0.01, HEIGHT.size)
     assert fit(Column(HEIGHT, noise, np.full(HEIGHT.size, 0.01), DEPTH)) is None
     assert fit(Column(HEIGHT[:3], HEIGHT[:3], np.full(3, 0.01), DEPTH)) is None
+
+
+@pytest.mark.parametrize("chezy", [31.0, 63.0])
+@pytest.mark.parametrize(("shares", "within"), [((0.4,), 0.01), ((0.2, 0.8), 0.02), ((0.2, 0.4, 0.8), 0.02)])
+def test_few_points_are_averaged_as_a_log_law(chezy, shares, within):
+    """Points at 0.6, 0.2 and 0.8 of the depth from the surface, over beds from coarse to smooth."""
+    truth = ProfileFit(0.0, 0.1, DEPTH * np.exp(-1.0 - 0.4 * chezy / np.sqrt(9.81)), np.eye(3), 1.0)
+    height = DEPTH * np.array(shares)
+    column = Column(height, truth.velocity(height), np.full(height.size, 1e-6), DEPTH)
+    average, error = few_points_average(column, among_plants=False)
+    assert average == pytest.approx(truth.average(DEPTH)[0], rel=within)
+    assert abs(average - truth.average(DEPTH)[0]) < error < 0.08 * average
+    assert linear_average(column)[0] < 0.97 * truth.average(DEPTH)[0], "what zero at the bed makes of it"
+
+
+def test_few_points_among_plants_stand_for_what_is_below_them():
+    column = Column(np.array([0.4, 0.8]), np.array([0.2, 0.2]), np.full(2, 0.01), 1.0)
+    average, error = few_points_average(column, among_plants=True)
+    assert average == pytest.approx(0.2)
+    assert error == pytest.approx(np.hypot(linear_average(column)[1], 0.04 / np.sqrt(3.0)))
 
 
 def test_linear_rule_is_zero_at_the_bed_and_constant_above_the_highest_point():

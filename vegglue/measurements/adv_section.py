@@ -21,8 +21,10 @@ from vegglue.measurements.section_discharge import (
     section_discharges,
 )
 from vegglue.measurements.vertical_profile import (
+    FEWEST_POINTS,
     CanopyHeight,
     Column,
+    few_points_average,
     fit_canopy_height,
     fit_log_law,
     fit_two_layers,
@@ -113,14 +115,19 @@ def _across(case: Case) -> Array:
 def across_averages(points: pd.DataFrame) -> pd.DataFrame:
     """Depth average of v in each vertical and its standard error, columns value and standard_error [m/s].
 
-    Linear between points, zero at the bed, constant above the highest: no law says how secondary flow is spread.
+    Linear between points, zero at the bed, constant above the highest: no law says how secondary flow is spread. Of few
+    points as along the channel, so that they keep their direction.
     points: rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
     """
     found = []
     for _, group in points.groupby("y"):
         wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"]) & group["v"].notna()]
-        column = _column(wet.assign(u=wet["v"])) if len(wet) else None
-        found.append(linear_average(column) if column is not None else (np.nan, np.nan))
+        if wet.empty:
+            found.append((np.nan, np.nan))
+            continue
+        column = _column(wet.assign(u=wet["v"]))
+        few = len(wet) < FEWEST_POINTS
+        found.append(few_points_average(column, bool(wet["plants"].iloc[0])) if few else linear_average(column))
     return pd.DataFrame(found, columns=["value", "standard_error"])
 
 
@@ -269,6 +276,9 @@ def _profile(points: pd.DataFrame) -> dict[str, object]:
     fit = fit_two_layers(column) if first["plants"] else fit_log_law(column)
     linear, linear_error = linear_average(column, fit.scatter if fit else 1.0)
     row |= {"linear": linear, "linear_error": linear_error}
+    if len(wet) < FEWEST_POINTS:
+        average, error = few_points_average(column, bool(first["plants"]))
+        return row | {"fitted": average, "fitted_error": error, "law": "few points"}
     if fit is None:
         return row | {"fitted": linear, "fitted_error": linear_error, "law": "linear"}
     fitted, fitted_error = fit.average(column.depth)
