@@ -37,6 +37,15 @@ def _upwind_downstream(flux: float, far_left: float, left: float, right: float) 
 
 
 @compiled
+def _straight_on(out, last, before_it):
+    """Values (rows, m) one cell beyond the last: second order where a further neighbour is missing."""
+    rows, m = out.shape
+    for j in range(rows):
+        for k in range(m):
+            out[j, k] = 2.0 * last[j, k] - before_it[j, k]
+
+
+@compiled
 def _carrier(out, flux, depth, other_flux, other_depth):
     """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
     rows, m = out.shape
@@ -91,17 +100,56 @@ def _beside_y(bend, i, j, per_x):
 
 
 @compiled
+def _neighbours_of_u(far, near, east, f, u, flux, cell):
+    """u [m/s] two faces and one west of face f and one east of it, (ny, m) each; where a side is nearer, into
+    what is given.
+
+    On the west side the depth is not known, so that the first cell counts by the velocity in its middle.
+    """
+    nx, rows, m = cell.shape
+    if f == nx:
+        _straight_on(east, u[nx], u[nx - 1])
+    if f == 1:
+        for j in range(rows):
+            for k in range(m):
+                near[j, k] = (flux[0, j, k] + flux[1, j, k]) / cell[0, j, k] - u[1, j, k]
+    west = u[f - 1] if f > 1 else near
+    if f <= 2:
+        _straight_on(far, west, u[f])
+    return u[f - 2] if f > 2 else far, west, u[f + 1] if f < nx else east
+
+
+@compiled
+def _neighbours_of_v(far, near, east, i, v):
+    """v [m/s] two columns and one west of column i and one east of it, (ny + 1, m) each; where a side is nearer, into
+    what is given.
+
+    Water enters through the west side with no velocity across: beyond it v has the other sign.
+    """
+    last = v.shape[0] - 1
+    if i == last:
+        _straight_on(east, v[i], v[max(i - 1, 0)])
+    if i == 0:
+        near[:] = -v[0]
+        _straight_on(far, near, v[0])
+    if i == 1:
+        far[:] = -v[0]
+    return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
+
+
+@compiled
 def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend):
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     nx, ny, m = level.shape
     west, east, before, behind = np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m))
-    side, shear = np.empty((ny + 1, m)), np.empty((ny + 1, m))
+    side, shear, ends = np.empty((ny + 1, m)), np.empty((ny + 1, m)), np.empty((3, ny, m))
     _carrier(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
     _strain_along(behind, first, u, v, viscosity, cell, per_x, bend)
     for f in range(first + 1, stop + 1):
-        a, b, f1, f2 = f - 1, min(f, nx - 1), max(f - 2, 0), min(f + 1, nx)
+        a, b, f2 = f - 1, min(f, nx - 1), min(f + 1, nx)
+        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, flux_x, cell)
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
         _strain_along(behind, f, u, v, viscosity, cell, per_x, bend)
@@ -116,8 +164,8 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
             for k in range(m):
                 here = u[f, j, k]
                 c_w, c_e, c_s, c_n = west[j, k], east[j, k], side[j, k], side[j + 1, k]
-                u_w = _upwind_downstream(c_w, u[f1, j, k], u[f - 1, j, k], here)
-                u_e = _upwind_downstream(c_e, u[f - 1, j, k], here, u[f2, j, k])
+                u_w = _upwind_downstream(c_w, u1[j, k], u2[j, k], here)
+                u_e = _upwind_downstream(c_e, u2[j, k], here, u3[j, k])
                 u_s = _upwind(c_s, u[f, j1, k], u[f, j2, k], here, u[f, j3, k])
                 u_n = _upwind(c_n, u[f, j2, k], here, u[f, j3, k], u[f, j4, k])
                 carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_length + (
@@ -130,11 +178,10 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                 if bend is not None:
                     carried -= bend.at_faces[f] * dx * per_length * here * across
                 speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
-                per_pair = 1.0 / (cell[a, j, k] + cell[b, j, k])
                 stress = drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]
                 drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
                 moved = carried * afloat(face_x[f, j, k], half_per_film)
-                pulled = (stress * speed * here - 2.0 * mixed) * per_pair
+                pulled = (stress * speed * here - 2.0 * mixed) / (cell[a, j, k] + cell[b, j, k])
                 out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_length + pulled
 
 
@@ -143,13 +190,14 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
     """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
-    nx, ny, m = level.shape
+    _, ny, m = level.shape
     west, east, side = np.empty((ny - 1, m)), np.empty((ny - 1, m)), np.empty((ny, m))
     before, behind, strain = np.empty((ny + 1, m)), np.empty((ny + 1, m)), np.empty((ny, m))
+    ends = np.empty((3, ny + 1, m))
     _carrier(east, flux_x[first, :-1], face_x[first, :-1], flux_x[first, 1:], face_x[first, 1:])
     _shear(behind, first, u, v, viscosity, corner, per_x, per_y, bend)
     for i in range(first, stop):
-        i1, i2, i3, f = max(i - 2, 0), max(i - 1, 0), min(i + 1, nx - 1), i + 1
+        f, (v1, v2, v3) = i + 1, _neighbours_of_v(ends[0], ends[1], ends[2], i, v)
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f, :-1], face_x[f, :-1], flux_x[f, 1:], face_x[f, 1:])
         _shear(behind, f, u, v, viscosity, corner, per_x, per_y, bend)
@@ -164,9 +212,8 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                 c_s, c_n, c_w, c_e = side[j - 1, k], side[j, k], west[j - 1, k], east[j - 1, k]
                 v_s = _upwind(c_s, v[i, j1, k], v[i, j - 1, k], here, v[i, j + 1, k])
                 v_n = _upwind(c_n, v[i, j - 1, k], here, v[i, j + 1, k], v[i, j4, k])
-                # Water enters through the west side with no velocity across.
-                v_w = _upwind_downstream(c_w, v[i1, j, k], v[i2, j, k], here) if i > 0 else 0.0
-                v_e = _upwind_downstream(c_e, v[i2, j, k], here, v[i3, j, k])
+                v_w = _upwind_downstream(c_w, v1[j, k], v2[j, k], here)
+                v_e = _upwind_downstream(c_e, v2[j, k], here, v3[j, k])
                 carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_length + (
                     c_n * (v_n - here) - c_s * (v_s - here)
                 ) * per_y
@@ -178,11 +225,10 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
                     carried += bend.at_cells[i] * dx * per_length * along * along
                     mixed += bend.at_cells[i] * dx * per_length * 0.5 * (strain[j, k] + strain[j - 1, k])
                 speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
-                per_pair = 1.0 / (cell[i, j, k] + cell[i, j - 1, k])
                 stress = drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k]
                 slope = (level[i, j, k] - level[i, j - 1, k]) * per_y
                 moved = carried * afloat(face_y[i, j, k], half_per_film)
-                pulled = (stress * speed * here - 2.0 * mixed) * per_pair
+                pulled = (stress * speed * here - 2.0 * mixed) / (cell[i, j, k] + cell[i, j - 1, k])
                 out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + pulled
 
 

@@ -1,0 +1,63 @@
+"""Flow that speeds up or slows down right at the inflow and the outlet, against Bernoulli's equation."""
+
+import numpy as np
+import pytest
+from channels import GRAVITY, centres, make_problem, order, shown, solved
+from scipy.optimize import brentq
+
+from vegglue.flow.equations import residual
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL
+from vegglue.resistance import bed_laws
+
+LENGTH, FLUX, OUTLET = 24.0, 0.6, 0.9  # m, m2/s, m
+SMOOTH = (bed_laws.CHEZY, 1e5)  # loses a micrometre over the length
+
+
+def bed(x, rises):
+    """A bed that goes on rising, or falling, by 0.2 m through both ends."""
+    return (0.2 if rises else -0.2) * x / LENGTH
+
+
+def level(x, rises):
+    """z with z + q^2 / (2 g h^2) = E, subcritical, E from the level at the outlet."""
+
+    def head(z, at):
+        return z + 0.5 * (FLUX / (z - bed(at, rises))) ** 2 / GRAVITY
+
+    energy = head(OUTLET, LENGTH)
+    return np.array([brentq(lambda z, at=at: head(z, at) - energy, bed(at, rises) + 0.45, 2.0) for at in x])
+
+
+def errors(cells, rises):
+    """Largest error of levels [m] and of velocities [m/s] over all columns, the outlet among them."""
+    x, size = centres(LENGTH, cells), LENGTH / cells
+    problem = make_problem(
+        np.repeat(bed(x, rises)[:, None], 3, axis=1), (size, 1.0), 3.0 * FLUX, OUTLET, SMOOTH, film=1e-6
+    )
+    state = solved(problem)[..., 0]
+    face = x + 0.5 * size
+    velocity = FLUX / (level(face, rises) - bed(face, rises))
+    return (
+        np.abs(state[:, LEVEL] - level(x, rises)[:, None]).max(),
+        np.abs(state[:, ALONG] - velocity[:, None]).max(),
+    )
+
+
+@pytest.mark.parametrize("rises", [True, False])
+def test_momentum_is_carried_to_second_order_through_both_ends(rises):
+    """Measured order 2.0 of levels and velocities, with cells of 2 to 0.5 m."""
+    found = np.array([errors(cells, rises) for cells in (12, 24, 48)])
+    for number, name in enumerate(("level", "velocity")):
+        print(f"{name}: {shown(list(found[:, number]))}")
+        assert order(list(found[:, number])) > 1.8
+
+
+def test_velocity_across_that_grows_along_x_is_carried_exactly():
+    """u dv/dx of v = a x and an even u over an even depth, in every column, in a row that no wall is near."""
+    a, speed, cells = 0.01, 0.5, 12
+    problem = make_problem(np.zeros((cells, 8)), (2.0, 1.0), 8.0 * speed, 1.0, (bed_laws.CHEZY, 1e6), film=1e-6)
+    state = np.zeros((cells, 3, 8, 1))
+    state[:, LEVEL], state[:, ALONG] = 1.0, speed
+    state[:, ACROSS, 1:] = a * centres(24.0, cells)[:, None, None]
+    rate = residual(problem, state)[:, ACROSS, 4, 0]
+    assert rate == pytest.approx(np.full(cells, a * speed), rel=1e-6)
