@@ -29,4 +29,5 @@ def test_what_a_later_step_accepted_is_no_rival_any_more() -> None:
     suspects = {name: a_suspect(name) for name in ("viscosity", "elder", "floor_level_error")}
     _, (first, second) = with_rivals_again(base, steps, suspects, silent)
     assert "floor_level_error" not in first.rivals
-    assert second == steps[1]
+    assert first.chances != steps[0].chances, "the others are compared again"
+    assert second == steps[1], "without rivals there is nothing to compare"

@@ -89,8 +89,10 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             break
         found, base = following.found, following.base
         if following.what != "instrument":
-            base, steps = with_rivals_again(base, found.steps, suspects, watch)
-            found = _with_steps(found, steps)
+            newest = 1 if following.what == "effect" else 0
+            earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
+            base, again = with_rivals_again(base, earlier, suspects, watch)
+            found = _with_steps(found, (*again, *last))
         else:  # amplitudes that were calibrated with these readings are no longer true
             suspects = {step.accepted: suspects[step.accepted] for step in found.steps}
         for step in found.steps:

@@ -20,13 +20,16 @@ from vegglue.screening.candidates import candidate_in_case, candidates_of
 def with_rivals_again(
     base: Baseline, steps: Sequence[Step], suspects: Mapping[str, Suspect], watch: Watch
 ) -> tuple[Baseline, tuple[Step, ...]]:
-    """The model with the best rival of every step but the last, and the steps with the chances as they are now."""
+    """The model with the best rival of every step, and the steps with the chances as they are now.
+
+    steps: of effects that were accepted before what was last, be that an effect or something at a place.
+    """
     kept: list[Step] = []
-    for step in steps[:-1]:
+    for step in steps:
         found = _again(base, step, suspects, watch) if len(step.rivals) > 1 else None
         base, step = found or (base, step)
         kept.append(step)
-    return base, (*kept, *steps[-1:])
+    return base, tuple(kept)
 
 
 def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], watch: Watch) -> tuple[Baseline, Step] | None:
