@@ -1,5 +1,7 @@
 """Names of any signs are drawn as they are: none is a formula but those of symbols and units."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from drawings import texts
@@ -7,7 +9,7 @@ from matplotlib.figure import Figure
 
 from vegglue.figures.measured import draw_quantiles, draw_residuals
 from vegglue.figures.posterior import DrawnParameter, draw_cylinder, draw_joint
-from vegglue.figures.style import formula_labels, styled
+from vegglue.figures.style import canvas, formula_labels, save, styled
 from vegglue.figures.typography import symbol_math, unit_math
 
 NASTY = (
@@ -49,3 +51,11 @@ def test_symbols_and_units_stay_formulae() -> None:
     assert symbol_math("$n_b$") == r"\$n_b\$"
     assert unit_math("$ m^2") == r"\$ m$^{2}$"
     assert formula("$n_{b}$").axes[0].xaxis.label.get_parse_math()
+
+
+def test_signs_that_no_font_has_make_no_complaints(tmp_path: Path) -> None:
+    """Warnings are errors in these tests."""
+    figure, axes = canvas()
+    axes.set_title("\U000131f2")  # a hieroglyph
+    save(figure, tmp_path / "hieroglyph.png", 50)
+    assert (tmp_path / "hieroglyph.png").stat().st_size > 0

@@ -6,6 +6,7 @@ same values become CSS variables, which the page sets for light and for dark.
 
 import html
 import re
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -97,8 +98,12 @@ def _settings() -> dict[str, Any]:
 
 @contextmanager
 def _styled_context() -> Iterator[None]:
-    """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX."""
-    with matplotlib.rc_context():
+    """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX.
+
+    Signs that no font here has are drawn as boxes, which says enough: matplotlib would complain of each in a line.
+    """
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_settings())  # type: ignore[arg-type]  # its keys are a literal type of 300 names
         yield
