@@ -126,11 +126,20 @@ def side_discharges(problem: Problem, depth: Array) -> Array:
 
 def _inflow_flux(problem: Problem, inflow: InflowSegment, depth: Array) -> Array:
     """q [m2/s] in each cell of an inflow, of their depths (cell, m)."""
-    weight = (depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread
-    if inflow.side == "west":
-        return np.asarray(inflow.discharge * weight / (weight.sum(axis=0) * problem.dy))
-    weighted = weight * _stretch_of(problem, inflow, 0.0)
-    return np.asarray(inflow.discharge * weight / (weighted.sum(axis=0) * problem.dx))
+    width = problem.dy if inflow.side == "west" else problem.dx
+    together = inflow_parts(problem, inflow, depth).sum(axis=0) * width
+    return np.asarray(inflow.discharge * _inflow_weight(inflow, depth) / together)
+
+
+def inflow_parts(problem: Problem, inflow: InflowSegment, depth: Array) -> Array:
+    """What the discharge of each cell of an inflow is in proportion to, w J (cell, m), of their depths (cell, m)."""
+    weight = _inflow_weight(inflow, depth)
+    return weight if inflow.side == "west" else weight * _stretch_of(problem, inflow, 0.0)
+
+
+def _inflow_weight(inflow: InflowSegment, depth: Array) -> Array:
+    """w (cell, m), see `side_fluxes`."""
+    return np.asarray((depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread)
 
 
 def _stretch_of(problem: Problem, inflow: InflowSegment, rows: float) -> Array:

@@ -23,8 +23,7 @@ SPARSE = 4
 def collect(blocks, far, base, rates, colours, step):
     """Spread the changes of the colours' lanes (kind, column, row) over the entries of the Jacobian they belong to.
 
-    blocks (nx, 3, n, n): columns i - 1, i, i + 1 of row block i; far (nx, n): the diagonal coupling to i - 2. What a
-    row beside the sides changes in all others, through an inflow that is shared out by depth, is put down to it.
+    blocks (nx, 3, n, n): columns i - 1, i, i + 1 of row block i; far (nx, n): the diagonal coupling to i - 2.
     """
     nx, _, ny = base.shape
     for i in range(nx):
@@ -39,8 +38,7 @@ def collect(blocks, far, base, rates, colours, step):
                 if column == i - 2:
                     far[i, source] = (rates[i, kind, row, lane] - base[i, kind, row]) / step
                     continue
-                lowest = 0 if row < ACROSS_PERIOD else row - ROWS_REACH
-                highest = ny if row >= ny - ACROSS_PERIOD else row + ROWS_REACH + 1
+                lowest, highest = max(row - ROWS_REACH, 0), min(row + ROWS_REACH + 1, ny)
                 for e in range(3):
                     for j in range(lowest, highest):
                         change = (rates[i, e, j, lane] - base[i, e, j]) / step

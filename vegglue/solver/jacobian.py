@@ -7,8 +7,15 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.flow import thin_water
 from vegglue.flow.chord_equations import slope_of_friction, thickness
-from vegglue.flow.equations import residual
-from vegglue.flow.problem import Problem, take
+from vegglue.flow.equations import cell_depths, residual
+from vegglue.flow.problem import LEVEL, Problem, take
+from vegglue.flow.shared_inflow import (
+    answer_to_discharge,
+    cells_of,
+    changes_of_whole,
+    shared_inflows,
+    with_kept_shares,
+)
 from vegglue.solver import block_elimination
 
 # Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
@@ -69,7 +76,7 @@ def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
     Single precision is enough: the factors only lead to the root, the residual in double precision says where it is.
     """
     nx, _, ny, _ = state.shape
-    base = residual(problem, state)[..., 0]
+    base, depth = residual(problem, state)[..., 0], cell_depths(problem, state)
     columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
     colours = np.array(list(np.ndindex(3, block_elimination.ALONG_PERIOD, block_elimination.ACROSS_PERIOD)))
     many = take(problem, np.zeros(COLOUR_LANES, dtype=np.int64))
@@ -80,8 +87,28 @@ def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
             lanes[column :: block_elimination.ALONG_PERIOD, kind, row :: block_elimination.ACROSS_PERIOD, lane] += (
                 COLOUR_STEP
             )
-        block_elimination.collect(columns, far, base, residual(many, lanes), group, COLOUR_STEP)
+        rates = residual(with_kept_shares(many, depth, cell_depths(many, lanes)), lanes)
+        block_elimination.collect(columns, far, base, rates, group, COLOUR_STEP)
+    _add_sharing(columns, problem, state, depth)
     return columns, far
+
+
+def _add_sharing(columns: Single, problem: Problem, state: Array, depth: Array) -> None:
+    """- dR/d ln Q (d ln W/dx)' of inflows shared by depth, see `shared_inflow`, in the blocks (nx, 3, n, n).
+
+    All of it is there for an inflow from the west. Through a side, what blocks cannot hold, levels of columns further
+    off, is put down to the nearest that they can.
+    """
+    ny, raised = state.shape[2], state.copy()
+    raised[:, LEVEL] += COLOUR_STEP
+    for inflow in shared_inflows(problem):
+        answer = answer_to_discharge(problem, state, inflow)
+        slope = changes_of_whole(problem, inflow, depth, cell_depths(problem, raised))[:, 0] / COLOUR_STEP
+        column, row = cells_of(problem, inflow)
+        for i in np.flatnonzero(answer.any(axis=(1, 2))):
+            of_levels = np.zeros((3, ny))
+            np.add.at(of_levels, (np.clip(column - i + 1, 0, 2), row), slope)
+            columns[i, :, :, :ny] -= answer[i].reshape(-1)[:, None] * of_levels[:, None]
 
 
 def factors(problem: Problem, state: Array) -> Factors:
