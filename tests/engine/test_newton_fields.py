@@ -79,19 +79,22 @@ def test_beds_of_all_cells_are_those_of_floor_and_banks(model: Model, point: Poi
 
 # The effect that changes a term, and how small a change is a small one, in its unit.
 IN_ONE_CELL = {
-    "drag": ("unlisted_object", 0.02), "bed": ("unlisted_bed", 0.002),
+    "drag": ("unlisted_object", 0.005), "bed": ("unlisted_bed", 0.002),
     "inflow": ("unlisted_inflow", 1e-5), "viscosity": ("unlisted_viscosity", 0.002),
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("x", [0.5, 8.5])
 @pytest.mark.parametrize("term", TERMS)
 def test_the_response_of_one_cell_is_the_difference_of_two_flows(
-    model: Model, point: Point, cells: dict[Term, Array], term: Term
+    model: Model, point: Point, cells: dict[Term, Array], term: Term, x: float
 ) -> None:
-    """A spot so small that it fills one cell and no other: its middle is that of the cell."""
+    """A spot so small that it fills one cell and no other: its middle is that of the cell. Beside the inflow, too,
+    where it changes how the discharge is shared over all rows: what a bed there does was off by as much as it is.
+    """
     name, size = IN_ONE_CELL[term]
     grid = model.site.grid
-    i, j = int(np.argmin(np.abs(grid.x - 8.5))), int(np.argmin(np.abs(grid.y - 0.25)))
+    i, j = int(np.argmin(np.abs(grid.x - x))), int(np.argmin(np.abs(grid.y - 0.25)))
     shapes = {"x": float(grid.x[i]), "y": float(grid.y[j]), "length": 0.05, "width": 0.05}
     candidate = place_candidate(library()[name], shapes)
     with_it = replace(model, case=with_effect(CASE, candidate, shapes))
@@ -101,4 +104,4 @@ def test_the_response_of_one_cell_is_the_difference_of_two_flows(
     per_unit = np.pi * shapes["length"] * shapes["width"] if term == "inflow" else 1.0
     difference = (moved.prediction - point.prediction) / size * per_unit
     assert np.abs(difference).max() > 0.0
-    assert cells[term][:, i, j] == pytest.approx(difference, abs=0.03 * np.abs(difference).max())
+    assert cells[term][:, i, j] == pytest.approx(difference, abs=0.01 * np.abs(difference).max())

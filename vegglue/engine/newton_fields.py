@@ -4,12 +4,14 @@
 
 A change in a cell reaches the residual of its neighbours only, so that every CELL_STRIDE-th cell along and across is
 changed at once, and each answer is told from the next by its place (Curtis, Powell and Reid 1974,
-doi:10.1093/imamat/13.1.117; not checked against it). Beside the inflow, where a
-bed changes how water is spread over the whole inflow, this is not so: there an answer is that of the cells around it
-together.
+doi:10.1093/imamat/13.1.117; not checked against it). Where a bed changes how discharge is shared over all cells of an
+inflow, that part is an answer of its own, see `shared_inflow`:
+
+    + (l_n . dR/d ln Q) d ln W/da_c
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,11 +19,18 @@ from vegglue.arrays import Array, Single
 from vegglue.case.parameter_space import theta_at
 from vegglue.compilation import compiled
 from vegglue.engine.interface import Model, Point
-from vegglue.flow.equations import residual
+from vegglue.flow.equations import cell_depths, residual
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.problem import Problem, crop
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import reading_weights
+from vegglue.flow.shared_inflow import (
+    answer_to_discharge,
+    cells_of,
+    changes_of_whole,
+    shared_inflows,
+    with_kept_shares,
+)
 from vegglue.site.channel_geometry import ChannelGeometry, channel_geometry, rows_of
 from vegglue.solver.tangent import adjoints
 from vegglue.solver.wet_band import widen
@@ -38,6 +47,16 @@ SMALL_CHANGE: dict[Term, float] = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Change:
+    """A term changed in each cell: dR/da at shares of the inflows as they are, in every CELL_STRIDE-th cell at once
+    (nx, 3, ny, CELL_STRIDE^2), and d ln W/da of each inflow that shares by depth, (cell,) each.
+    """
+
+    local: Single
+    of_whole: tuple[Array, ...]
+
+
 def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
     """See `Engine.responses_to_cells`; in single precision, one solve for each station."""
     flow, grid, station = point.flows[experiment], model.site.grid, model.station_of(experiment)
@@ -45,23 +64,32 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
     state, rows = widen(flow.state, flow.rows, flow.band), slice(*flow.band)
     part = crop(problem, *flow.band)
     geometry = rows_of(channel_geometry(model.case, model.site, experiment), *flow.band)
-    changes = {term: _changes(part, flow.state, geometry, term) for term in terms}
+    changes = {term: _change(part, flow.state, geometry, term) for term in terms}
+    inflows = shared_inflows(part)
+    discharges = [answer_to_discharge(part, flow.state, inflow).astype(np.float32) for inflow in inflows]
     found = {term: np.zeros((len(station), grid.x.size, grid.y.size), np.float32) for term in terms}
     for first in range(0, len(station), STATIONS_TOGETHER):
         some = slice(first, first + STATIONS_TOGETHER)
         weights = reading_weights(problem, state, grid, station.iloc[some])
         sensitivity = adjoints(flow.factors, weights[:, :, rows]).astype(np.float32)
+        of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
         for term, change in changes.items():
-            found[term][some, :, rows] = _told_apart(sensitivity, change)
+            answers = _told_apart(sensitivity, change.local)
+            for inflow, of_discharge, of_whole in zip(inflows, of_discharges, change.of_whole, strict=True):
+                column, row = cells_of(part, inflow)
+                answers[:, column, row] += np.outer(of_discharge, of_whole)
+            found[term][some, :, rows] = answers
     return found
 
 
-def _changes(part: Problem, state: Array, geometry: ChannelGeometry, term: Term) -> Single:
-    """dR/da of the term in every CELL_STRIDE-th cell at once, (nx, 3, ny, CELL_STRIDE^2)."""
-    small = SMALL_CHANGE[term]
+def _change(part: Problem, state: Array, geometry: ChannelGeometry, term: Term) -> _Change:
+    small, states = SMALL_CHANGE[term], np.repeat(state, CELL_STRIDE**2, axis=3)
     many = with_changed_term(part, geometry, term, small * _lattice(*part.shape))
-    rates = residual(many, np.repeat(state, CELL_STRIDE**2, axis=3))
-    return ((rates - residual(part, state)) / small).astype(np.float32)
+    before, after = cell_depths(part, state), cell_depths(many, states)
+    rates = residual(with_kept_shares(many, before, after), states)
+    # The depth of a cell changes in the one member only in which the cell itself is changed.
+    of_whole = [changes_of_whole(part, one, before, after).sum(axis=1) / small for one in shared_inflows(part)]
+    return _Change(((rates - residual(part, state)) / small).astype(np.float32), tuple(of_whole))
 
 
 def _lattice(nx: int, ny: int) -> Array:
@@ -87,13 +115,10 @@ def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
     nx, equations, ny, n = sensitivity.shape
     half = CELL_STRIDE // 2
     for i in range(nx):
-        # Beside an edge the window is shifted inwards, so that every change is counted once.
-        first = 0 if i < CELL_STRIDE else i - half
-        last = nx if i >= nx - CELL_STRIDE else i + half + 1
+        first, last = max(i - half, 0), min(i + half + 1, nx)
         for j in range(ny):
             member = (i % CELL_STRIDE) * CELL_STRIDE + j % CELL_STRIDE
-            lowest = 0 if j < CELL_STRIDE else j - half
-            highest = ny if j >= ny - CELL_STRIDE else j + half + 1
+            lowest, highest = max(j - half, 0), min(j + half + 1, ny)
             for a in range(first, last):
                 for b in range(lowest, highest):
                     for k in range(equations):
