@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from channels import centres, changed, river
+from channels import centres, changed, make_problem, river, sloping
 
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
-from vegglue.flow.problem import ALONG, LEVEL
+from vegglue.flow.problem import ALONG, LEVEL, InflowSegment
 from vegglue.flow.sensor import read_sensors, reading_weights
 from vegglue.flow.stretch import Bend
 from vegglue.site.grid import Grid
@@ -112,8 +112,21 @@ def test_adjoint_weighs_every_cause_as_the_tangent_does(solved):
     problem, state, shared = solved
     weights = np.zeros_like(state)
     weights[40, ALONG, 8:16] = 0.125
-    adjoint = adjoints(shared, weights)
+    adjoint = adjoints(problem, state, shared, weights)
     for cause in CAUSES:
         rates = difference(problem, cause, lambda changed: residual(changed, state))
         told = float((weights * tangents(problem, state, shared, rates)).sum())
         assert -float((adjoint * rates).sum()) == pytest.approx(told, rel=5e-3)
+
+
+def test_adjoints_know_how_an_inflow_through_a_side_is_shared():
+    """Of water that enters beside it: levels of columns further off than blocks reach share, too."""
+    inflows = (InflowSegment("south", 0, 10, np.array([1.5])),)
+    problem = make_problem(sloping(20.0, 20, 6, 0.001), (1.0, 0.5), 1.5, 0.8, viscosity=np.array([0.02]))
+    problem = changed(problem, inflows=inflows)
+    state = newton(problem, backwater(problem), 1e-10, time_step=1e2).state
+    weights, rates = np.zeros((2, *state.shape))
+    weights[4, ALONG, 1], rates[2, LEVEL, 0] = 1.0, 1.0
+    shared = factors(problem, state)
+    told = -float((adjoints(problem, state, shared, weights) * rates).sum())
+    assert told == pytest.approx(tangents(problem, state, shared, rates)[4, ALONG, 1, 0], rel=2e-3)

@@ -71,7 +71,7 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
     for first in range(0, len(station), STATIONS_TOGETHER):
         some = slice(first, first + STATIONS_TOGETHER)
         weights = reading_weights(problem, state, grid, station.iloc[some])
-        sensitivity = adjoints(flow.factors, weights[:, :, rows]).astype(np.float32)
+        sensitivity = adjoints(part, flow.state, flow.factors, weights[:, :, rows]).astype(np.float32)
         of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
         for term, change in changes.items():
             answers = _told_apart(sensitivity, change.local)

@@ -6,17 +6,40 @@ w_c is the weight of a cell, b_c its width, see `equations.side_fluxes`. All els
 but through W each cell of an inflow reaches all others: a product of two vectors for each inflow.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.flow.equations import inflow_parts, residual
-from vegglue.flow.problem import InflowSegment, Problem, take
+from vegglue.flow.equations import cell_depths, inflow_parts, residual
+from vegglue.flow.problem import LEVEL, InflowSegment, Problem, take
 
 # Step of ln Q in a central difference [-]: chosen, not measured; small against 1 and large against rounding.
 DISCHARGE_STEP = 1e-5
+# Step of levels [m] in the difference of ln W: chosen, not measured, as that of the Jacobian.
+RAISE = 1e-6
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """How levels act through W, -(dR/d ln Q) (d ln W/dz)': column and row of each cell of the inflow (cell,), slopes d
+    ln W/dz of their levels (cell,) [1/m], and answer dR/d ln Q (nx, 3, ny) [m/s, m/s2].
+    """
+
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
+    slope: Array
+    answer: Array
+
+
+def sharing_at(problem: Problem, state: Array, inflow: InflowSegment) -> Sharing:
+    """Of one inflow at a state (nx, 3, ny, 1) of one member."""
+    raised = state.copy()
+    raised[:, LEVEL] += RAISE
+    before, after = cell_depths(problem, state), cell_depths(problem, raised)
+    slope = changes_of_whole(problem, inflow, before, after)[:, 0] / RAISE
+    return Sharing(*cells_of(problem, inflow), slope, answer_to_discharge(problem, state, inflow))
 
 
 def shared_inflows(problem: Problem) -> tuple[InflowSegment, ...]:

@@ -3,19 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
 from vegglue.flow import thin_water
 from vegglue.flow.chord_equations import slope_of_friction, thickness
 from vegglue.flow.equations import cell_depths, residual
-from vegglue.flow.problem import LEVEL, Problem, take
-from vegglue.flow.shared_inflow import (
-    answer_to_discharge,
-    cells_of,
-    changes_of_whole,
-    shared_inflows,
-    with_kept_shares,
-)
+from vegglue.flow.problem import Problem, take
+from vegglue.flow.shared_inflow import shared_inflows, sharing_at, with_kept_shares
 from vegglue.solver import block_elimination
 
 # Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
@@ -89,26 +84,28 @@ def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
             )
         rates = residual(with_kept_shares(many, depth, cell_depths(many, lanes)), lanes)
         block_elimination.collect(columns, far, base, rates, group, COLOUR_STEP)
-    _add_sharing(columns, problem, state, depth)
+    _add_sharing(columns, problem, state)
     return columns, far
 
 
-def _add_sharing(columns: Single, problem: Problem, state: Array, depth: Array) -> None:
+def _add_sharing(columns: Single, problem: Problem, state: Array) -> None:
     """- dR/d ln Q (d ln W/dx)' of inflows shared by depth, see `shared_inflow`, in the blocks (nx, 3, n, n).
 
-    All of it is there for an inflow from the west. Through a side, what blocks cannot hold, levels of columns further
-    off, is put down to the nearest that they can.
+    All of it is there for an inflow from the west. Through a side, what blocks cannot hold is put down to levels that
+    they can, see `column_held`.
     """
-    ny, raised = state.shape[2], state.copy()
-    raised[:, LEVEL] += COLOUR_STEP
+    ny = state.shape[2]
     for inflow in shared_inflows(problem):
-        answer = answer_to_discharge(problem, state, inflow)
-        slope = changes_of_whole(problem, inflow, depth, cell_depths(problem, raised))[:, 0] / COLOUR_STEP
-        column, row = cells_of(problem, inflow)
-        for i in np.flatnonzero(answer.any(axis=(1, 2))):
+        one = sharing_at(problem, state, inflow)
+        for i in np.flatnonzero(one.answer.any(axis=(1, 2))):
             of_levels = np.zeros((3, ny))
-            np.add.at(of_levels, (np.clip(column - i + 1, 0, 2), row), slope)
-            columns[i, :, :, :ny] -= answer[i].reshape(-1)[:, None] * of_levels[:, None]
+            np.add.at(of_levels, (column_held(one.column, int(i)) - i + 1, one.row), one.slope)
+            columns[i, :, :, :ny] -= one.answer[i].reshape(-1)[:, None] * of_levels[:, None]
+
+
+def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
+    """The nearest to a column among those that a row block is coupled to."""
+    return np.clip(column, block - 1, block + 1)
 
 
 def factors(problem: Problem, state: Array) -> Factors:
