@@ -46,7 +46,7 @@ def test_points_without_a_second_component_cost_no_other_its_own(tmp_path: Path)
     table = verticals_of(tmp_path, "", "0.01")
     across = table[table["kind"] == "velocity_across"]
     assert across["y"].tolist() == [0.0]
-    assert 0.015 < across["value"].item() < 0.02
+    assert across["value"].item() == pytest.approx(0.02, rel=0.05)  # what both points read
     assert len(table[table["kind"] == "velocity"]) == 2
 
 
