@@ -80,7 +80,7 @@ def test_beds_of_all_cells_are_those_of_floor_and_banks(model: Model, point: Poi
 # The effect that changes a term, and how small a change is a small one, in its unit.
 IN_ONE_CELL = {
     "drag": ("unlisted_object", 0.005), "bed": ("unlisted_bed", 0.002),
-    "inflow": ("unlisted_inflow", 1e-5), "viscosity": ("unlisted_viscosity", 0.002),
+    "inflow": ("unlisted_inflow", 1e-5), "viscosity": ("unlisted_viscosity", 0.001),
 }  # fmt: skip
 
 
