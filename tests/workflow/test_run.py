@@ -1,6 +1,7 @@
 """The loop through the command line: a hidden effect gets a name, and the whole way is gone once."""
 
 import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,50 +20,56 @@ TWIN = load_case(ROOT / "configs" / "twin.yaml")
 WITH_LAW = TWIN.model_copy(update={"name": "twin-law", "source": TWIN.source.with_name("twin+law.yaml")})
 
 
+@pytest.fixture(scope="module")
+def went(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder after `vegglue run` on a channel in which something is hidden, and what it said; no test changes it."""
+    folder, config = tmp_path_factory.mktemp("went"), ROOT / "configs" / "twin.yaml"
+    vegglue(folder, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
+    told = "extends: hidden.yaml\nname: small\nsimulate: {members: 16}\ninfer: {method: glue}\n"
+    (folder / "hidden" / "small.yaml").write_text(told, encoding="utf-8")
+    return folder, vegglue(folder, "run", "hidden/small.yaml").stdout
+
+
 @pytest.mark.slow
-def test_a_hidden_effect_is_named_added_and_the_error_falls(tmp_path: Path) -> None:
-    config = ROOT / "configs" / "twin.yaml"
-    vegglue(tmp_path, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
-    said = json.loads(vegglue(tmp_path, "diagnose", "hidden/hidden.yaml", "--json").stdout)
+def test_a_hidden_effect_is_named_added_and_the_error_falls(went: tuple[Path, str], tmp_path: Path) -> None:
+    """The diagnosis that `run` has left is read; child and comparison are made anew, as by a user who goes on alone."""
+    folder = shutil.copytree(went[0], tmp_path, dirs_exist_ok=True)  # as deep: configs name each other
+    child = next((folder / "hidden").glob("small+*.yaml"))
+    child.unlink()
+    said = json.loads(vegglue(folder, "diagnose", "hidden/small.yaml", "--json").stdout)
     assert said["verdict"] in ("identified", "one-of")
     assert "discharge_error[high]" in said["set"]
     accused = next(one for one in said["effects"] if one["name"] == "discharge_error[high]")
     assert accused["p_family"] < 0.01
-    vegglue(tmp_path, "extend", "hidden/hidden.yaml", "--auto")
-    child = next((tmp_path / "hidden").glob("hidden+*.yaml"))
-    rungs = json.loads(vegglue(tmp_path, "compare", "hidden/hidden.yaml", child, "--json").stdout)["rungs"]
+    vegglue(folder, "extend", "hidden/small.yaml", "--auto")
+    rungs = json.loads(vegglue(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
     assert rungs[1]["held_out_sections"] < rungs[0]["held_out_sections"]
     assert rungs[1]["chi2"] < 0.8 * rungs[0]["chi2"]
-    by_hand = f"extends: hidden.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
+    by_hand = f"extends: small.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
     child.write_text(by_hand, encoding="utf-8")
-    again = vegglue(tmp_path, "extend", "hidden/hidden.yaml", "--auto", succeed=False)
+    again = vegglue(folder, "extend", "hidden/small.yaml", "--auto", succeed=False)
     assert (again.returncode, len(again.stderr.splitlines())) == (2, 1)
     assert "--force" in again.stderr
     assert child.read_text(encoding="utf-8") == by_hand, "what was written by hand is not replaced"
 
 
 @pytest.mark.slow
-def test_one_command_goes_the_whole_way_and_is_not_repeated(tmp_path: Path) -> None:
-    config = ROOT / "configs" / "twin.yaml"
-    vegglue(tmp_path, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
-    small = tmp_path / "hidden" / "small.yaml"
-    told = "extends: hidden.yaml\nname: small\nsimulate: {members: 16}\ninfer: {method: glue}\n"
-    small.write_text(told, encoding="utf-8")
-    said = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
-    assert "discharge_error[high] of -0.0" in said, "names in brackets are no markup"
+def test_one_command_goes_the_whole_way_and_is_not_repeated(went: tuple[Path, str], tmp_path: Path) -> None:
+    folder = shutil.copytree(went[0], tmp_path, dirs_exist_ok=True)  # as deep: configs name each other
+    assert "discharge_error[high] of -0.0" in went[1], "names in brackets are no markup"
     child = "small-discharge_error_high"
-    made = {path.name for path in (tmp_path / "runs" / child).iterdir()}
+    made = {path.name for path in (folder / "runs" / child).iterdir()}
     assert made >= {"ensemble.h5", "posterior.h5", "report.html"}
-    assert not (tmp_path / "runs" / "small" / "posterior.h5").exists(), "that model is known to be wrong"
-    parent = vegglue(tmp_path, "report", "hidden/small.yaml", succeed=False).stderr
+    assert not (folder / "runs" / "small" / "posterior.h5").exists(), "that model is known to be wrong"
+    parent = vegglue(folder, "report", "hidden/small.yaml", succeed=False).stderr
     assert f"the run went on to {child}, whose report is runs/{child}/report.html" in parent
-    vegglue(tmp_path, "overview", "hidden/small.yaml")
-    assert f"{child}/report.html" in (tmp_path / "runs" / "overview.html").read_text(encoding="utf-8")
-    assert (tmp_path / "runs" / child / "ladder.png").exists()
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}
-    again = vegglue(tmp_path, "run", "hidden/small.yaml").stdout
+    vegglue(folder, "overview", "hidden/small.yaml")
+    assert f"{child}/report.html" in (folder / "runs" / "overview.html").read_text(encoding="utf-8")
+    assert (folder / "runs" / child / "ladder.png").exists()
+    before = {path: path.stat().st_mtime_ns for path in (folder / "runs").rglob("*.h5")}
+    again = vegglue(folder, "run", "hidden/small.yaml").stdout
     assert "up to date" in again
-    assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.h5")}
+    assert before == {path: path.stat().st_mtime_ns for path in (folder / "runs").rglob("*.h5")}
 
 
 def gone(
