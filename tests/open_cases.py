@@ -20,6 +20,7 @@ from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 OPEN_CASES = Path(__file__).parents[1] / "data" / "open_cases"
 # Largest error of velocities that no calibration has seen, once the effect is added [m/s].
 WANTED = 0.010
+EDDIES = {"viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures", "edge_mixing"}
 
 
 def imported(name: str, folder: Path) -> Case:
@@ -37,6 +38,16 @@ def looked_into(name: str, folder: Path) -> Diagnosis:
 def extended(name: str, folder: Path) -> StepwiseExtension:
     """An open case with what its diagnosis names, which is read where there is one in this folder."""
     return extend_stepwise(imported(name, folder), runs=folder / "runs", watch=print)
+
+
+def assert_found(found: Diagnosis, hidden: str, true: float) -> None:
+    """What is hidden is found by itself or among a few like it, and its true size lies in the interval."""
+    assert found.verdict.kind in ("identified", "one-of"), found.verdict.sentence
+    assert len(found.steps) == 1, found.verdict.sentence
+    assert hidden in found.set, found.verdict.sentence
+    assert len(found.set) == 1 or set(found.set) <= EDDIES, found.verdict.sentence
+    low, high = found.suspect(hidden).amplitude.interval95
+    assert low <= true <= high
 
 
 def assert_better(grown: StepwiseExtension, added: int) -> None:

@@ -11,12 +11,15 @@ from pathlib import Path
 import pytest
 import typer
 import yaml
+from open_cases import WANTED, assert_found
 from reach import ENVIRONMENT, ROOT, block, command, write_reach
 
 import vegglue
+from vegglue.case.resolved_config import case_hash
 from vegglue.cli.main import app
 from vegglue.effects.library import library
 from vegglue.screening.candidates import NOT_SEARCHED
+from vegglue.storage.kept_words import ladder_that_fits
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.
@@ -143,15 +146,42 @@ def test_the_folder_of_the_page_becomes_a_case(tmp_path: Path) -> None:
     assert len(case.plants.patches) == 1
 
 
+def shown_on_first_pages() -> list[Shown]:
+    return [one for page in SHOWN for one in shown_in(page)]
+
+
+@pytest.fixture(scope="module")
+def willows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, list[str]]]:
+    """The folder in which all commands of the first pages were run, and what each of them printed."""
+    folder = tmp_path_factory.mktemp("first_pages")
+    shutil.copytree(ROOT / "data" / "open_cases" / "open-b", folder / "willows")
+    lines = dict.fromkeys(one.command for one in shown_on_first_pages())  # each once, where it is shown first
+    return folder, {line: printed(line, folder) for line in lines}
+
+
 @pytest.mark.slow
-def test_commands_print_what_is_shown(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "data" / "open_cases" / "open-b", tmp_path / "willows")
-    shown = [one for page in SHOWN for one in shown_in(page)]
-    assert len(shown) > 4
-    for line in dict.fromkeys(one.command for one in shown):  # each once, where it is shown first
-        said = printed(line, tmp_path)
-        for wanted in [each for one in shown if one.command == line for each in one.lines]:
-            assert any(is_said(wanted, each) for each in said), "\n".join([f"$ {line}", f"shown: {wanted}", *said])
+def test_commands_print_what_is_shown(willows: tuple[Path, dict[str, list[str]]]) -> None:
+    _, said = willows
+    assert len(shown_on_first_pages()) > 4
+    for one in shown_on_first_pages():
+        for wanted in one.lines:
+            lines = said[one.command]
+            assert any(is_said(wanted, each) for each in lines), "\n".join(
+                [f"$ {one.command}", f"shown: {wanted}", *lines]
+            )
+
+
+@pytest.mark.slow
+def test_what_the_tutorial_hides_is_found_and_added(willows: tuple[Path, dict[str, list[str]]]) -> None:
+    """Of open-b what `test_open_effects` asks of its neighbours, in the files that the commands left."""
+    folder, _ = willows
+    case, runs = vegglue.load_case(folder / "willows.yaml"), folder / "runs"
+    assert (runs / "willows" / "diagnosis.h5").is_file()
+    assert_found(vegglue.diagnose(case, runs=runs), "secondary_current", 0.010)
+    ladder = ladder_that_fits(runs / "willows", case_hash(case))
+    assert ladder is not None
+    before, after = ladder.steps
+    assert after.unseen < min(before.unseen, WANTED)
 
 
 @pytest.mark.slow
