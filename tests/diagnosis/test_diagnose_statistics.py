@@ -7,22 +7,19 @@ here. What is hidden is drawn from the whole library; searches start where a use
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from coarse_twin import coarse_twin
 
-from vegglue.case.config import load_case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import candidates_of
 from vegglue.twins.hidden_effect import TwinBase, VisibilityError
 from vegglue.twins.twin import measured_twin, true_place, twin_base
-from vegglue.workflow.run_folder import model_in
 
-CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 # The size of this one is counted in cells: on the truth's grid the same number is another effect.
 OF_THE_GRID = "smagorinsky"
 pytestmark = pytest.mark.slow
@@ -30,7 +27,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return model_in(load_case(CONFIG))
+    """On larger cells: how often a diagnosis is right does not hang on them, for the truth is made on smaller ones."""
+    return coarse_twin()[0]
 
 
 @pytest.fixture(scope="module")
