@@ -15,13 +15,18 @@ LONGEST = [
         "test_documents.py",
         "end_to_end/test_open_pair.py",
         "engine/test_engines.py",
-        "workflow/test_run.py",
+        "discovery/test_search.py",
         "end_to_end/test_open_effects.py",
         "end_to_end/test_open_places.py",
+        "workflow/test_run.py",
         "importers/test_confluence.py",
         "diagnosis/test_diagnose_statistics.py",
         "end_to_end/test_open_instruments.py",
         "verification/test_independent_code.py",
+        "verification/test_banks.py",
+        "cli/test_results_told.py",
+        "ensemble/test_another_processor.py",
+        "end_to_end/test_faults.py",
     )
 ]
 assert all(path.is_file() for path in LONGEST)
