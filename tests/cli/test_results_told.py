@@ -42,6 +42,12 @@ def told(folder: Path) -> list[dict[str, Any]]:
     return objects
 
 
+@pytest.fixture(scope="module")
+def quiet(folder: Path, told: list[dict[str, Any]]) -> str:
+    """What an inference prints with `--quiet`, once all steps were taken."""
+    return vegglue(folder, "infer", "brook.yaml", "--quiet").stdout
+
+
 @pytest.mark.slow
 def test_every_step_tells_an_object(folder: Path, told: list[dict[str, Any]]) -> None:
     checked, simulated, again, inferred, diagnosed, extended, reported = told
@@ -57,8 +63,8 @@ def test_every_step_tells_an_object(folder: Path, told: list[dict[str, Any]]) ->
 
 
 @pytest.mark.slow
-def test_an_inference_fits_one_screen_and_says_where_the_rest_is(folder: Path, told: list[dict[str, Any]]) -> None:
-    said = vegglue(folder, "infer", "brook.yaml", "--quiet").stdout.splitlines()
+def test_an_inference_fits_one_screen_and_says_where_the_rest_is(folder: Path, quiet: str) -> None:
+    said = quiet.splitlines()
     assert len(said) <= LINES
     assert max(map(len, said)) <= COLUMNS
     assert re.search(r"runs/brook/posterior\.h5.* vegglue report brook\.yaml", said[-1])
@@ -83,9 +89,9 @@ def doubtful(posterior: Any) -> Any:
 
 
 @pytest.mark.slow
-def test_quiet_leaves_out_how_far_a_command_is(folder: Path, told: list[dict[str, Any]]) -> None:
+def test_quiet_leaves_out_how_far_a_command_is(folder: Path, quiet: str) -> None:
     assert "... " in vegglue(folder, "infer", "brook.yaml", "--method", "refine").stdout
-    assert "... " not in vegglue(folder, "infer", "brook.yaml", "--quiet").stdout
+    assert "... " not in quiet
     assert "Next: " not in vegglue(folder, "extend", "brook.yaml", "--add", "streamlining", "-q").stdout
 
 
