@@ -82,17 +82,17 @@ def test_the_example_is_ten_lines():
 
 
 @pytest.mark.slow
-def test_an_effect_of_ones_own_works_in_every_command(tmp_path):
-    """In several processes too: the ensemble with it differs from the one without."""
+def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, capsys):
+    """In several processes too, where the effect is known to none: the ensemble is made by two, the page by another."""
     config = own_case(tmp_path)
-    assert "--trust" in vegglue(tmp_path, "check", config, succeed=False).stderr
-    assert "as `slow_stones`" in vegglue(tmp_path, "effects", "slow_stones", "--config", config, "--trust").stdout
-    for arguments in (
-        ("check",),
-        ("simulate", "--members", 8, "--jobs", 2),
-        ("infer", "--members", 8, "--method", "glue"),
-    ):
-        vegglue(tmp_path, *arguments, config, "--trust")
+    monkeypatch.chdir(tmp_path)
+    assert "--trust" in said_to(monkeypatch, capsys, "check", config)[1]
+    told = said_to_text(monkeypatch, capsys, "effects", "slow_stones", "--config", config, "--trust")
+    assert "as `slow_stones`" in told
+    assert said_to(monkeypatch, capsys, "check", config, "--trust")[0] == 0
+    vegglue(tmp_path, "simulate", "--members", 8, "--jobs", 2, config, "--trust")
+    inferred = said_to(monkeypatch, capsys, "infer", "--members", 8, "--method", "glue", config, "--trust")
+    assert inferred[0] == 0
     page = vegglue(tmp_path, "report", config, "--members", 8, "--trust")
     assert "Report" in page.stdout
     assert "slow_stones" in (tmp_path / "runs" / "brook" / "report.html").read_text(encoding="utf-8")
