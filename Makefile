@@ -23,7 +23,7 @@ export OMP_NUM_THREADS := 1
 # Where Python may keep no bytecode, every process compiles all libraries anew: 8 s of a core for each of the tests' own.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo paper test check bench blind laws faults confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper checked test check bench blind laws faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -65,14 +65,15 @@ runs/%/posterior.h5: runs/%/ensemble.h5
 runs/%/report.html: runs/%/posterior.h5
 	$(VEGGLUE) report configs/$*.yaml
 
-test: $(TESTABLE)  # everything that must pass
+# Loops of the solver are compiled while types are checked, and not by each process of the tests for itself.
+checked: $(TESTABLE)
 	$(BIN)/ruff check vegglue tests
-	$(BIN)/mypy
+	@$(BIN)/python tests/compiled_loops.py & loops=$$!; $(BIN)/mypy; types=$$?; wait $$loops && exit $$types
+
+test: checked  # everything that must pass
 	$(PYTEST)
 
-check: $(TESTABLE)  # the fast part
-	$(BIN)/ruff check vegglue tests
-	$(BIN)/mypy
+check: checked  # the fast part
 	$(PYTEST) -m 'not slow'
 
 bench: $(TESTABLE)  # measured speed: members/s, cell-steps/s, share of the kernel
