@@ -8,6 +8,7 @@ import pytest
 from field_folders import CHANNEL, JUNE, folder_of
 
 import vegglue
+from vegglue.case.schema import Case
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import read_rows
 from vegglue.measurements.observations import read_observations
@@ -48,6 +49,33 @@ def test_points_without_a_second_component_cost_no_other_its_own(tmp_path: Path)
     assert across["y"].tolist() == [0.0]
     assert across["value"].item() == pytest.approx(0.02, rel=0.05)  # what both points read
     assert len(table[table["kind"] == "velocity"]) == 2
+
+
+def brook_with(tmp_path: Path, *points: str) -> Case:
+    """The brook, imported with these points x,y,z,u,u_se."""
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv="\n".join(["x,y,z,u,u_se", *points]))
+    return vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+def test_verticals_of_one_point_stand_beside_those_of_two(tmp_path: Path) -> None:
+    """As is usual where water is shallow; their table was taken for repeats of depth averages."""
+    single = [f"8,{y},0.4,0.5,0.01" for y in (-1, 1, 1.2)]
+    double = [f"8,{y},{z},{u},0.01" for y in (-0.5, 0, 0.5) for z, u in ((0.2, 0.45), (0.8, 0.6))]
+    found = read_observations(brook_with(tmp_path, *single, *double))
+    assert found.profiles.sort_values("y")["points"].tolist() == [1, 2, 2, 2, 1, 1]
+    # Two points leave 3.5 % open, one 7.5 %.
+    assert (found.table["standard_error"] / found.table["value"]).between(0.03, 0.09).all()
+
+
+def test_a_point_measured_again_is_averaged_with_itself(tmp_path: Path) -> None:
+    """It was written twice, and `check` refused the table that import had made."""
+    points = [f"8,{y},{z},{u},0.02" for y in (0, 1) for z, u in ((0.1, 0.4), (0.3, 0.5), (0.6, 0.6))]
+    case = brook_with(tmp_path, *points, "8,0,0.1,0.44,0.02", "8,0,0.1,0.42,0.02", "8,0,0.1,0.42,0.02")
+    assert case.imported is not None
+    assert "6 points of 1 section, 3 repeats averaged" in case.imported[0].taken
+    again = read_observations(case).points.query("y == 0 and z == 0.1")
+    assert again["u"].tolist() == pytest.approx([0.42])
+    assert again["standard_error"].tolist() == pytest.approx([0.01])
 
 
 def test_stated_errors_of_points_in_the_vertical_count(tmp_path: Path) -> None:

@@ -4,14 +4,20 @@ The scatter of three values alone may come out ten times too small by chance, an
 others: sums of squares of residuals have no mean with two degrees of freedom.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import sqrt
+from typing import Any
 
 import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.importers.measured_rows import Taken
 
 # Experiment, section, x, y of a place [m]; and a value with its stated standard error, NaN where there is none.
 PlaceKey = tuple[str, str, float, float]
 RepeatedValue = tuple[float, float]
+# Of what counts as one: begins as the key of a place, and may go on.
+Key = Any
 # How much of a key names a place, its section and its experiment: the narrowest that has ENOUGH is asked.
 NARROW_TO_WIDE = (4, 2, 1)
 # Degrees of freedom nu of a scatter. chi^2 is nu / (nu - 2) times too large on average with it: 7 % with 30. The whole
@@ -20,7 +26,7 @@ ENOUGH, LEAST_OF_FILE = 30, 10
 Scatter = Mapping[tuple[object, ...], tuple[float, int]]
 
 
-def means_of_repeats(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
+def means_of_repeats(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
     """Mean of each place and its standard error: from those stated, else s / sqrt(n); 0 for unknown.
 
     s: root of sum (u - mean u)^2 / sum (n - 1), of the values without stated errors of the narrowest of place, section
@@ -32,7 +38,7 @@ def means_of_repeats(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> li
     ]
 
 
-def said_of_repeats(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> str:
+def said_of_repeats(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> str:
     """How many values were averaged, and where they are too few for a standard error that is missing."""
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
     repeats = sum(len(values) - 1 for values in gathered.values())
@@ -41,17 +47,54 @@ def said_of_repeats(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> str
     return (f", {repeats} repeats averaged" if repeats else "") + too_few
 
 
+def without_repeats(points: Taken, keys: Sequence[tuple[object, ...]], errors: Array) -> tuple[Taken, str]:
+    """Each point once, where `keys` (rows,) say which rows are one, and what is said of it; errors (rows,) [m/s].
+
+    u is the mean with its error, see `means_of_repeats`; v and w are means, u_std is the root of the mean square, and
+    durations add up. Without repeats the points are as they were.
+    """
+    rows: dict[tuple[object, ...], list[int]] = {}
+    for row, key in enumerate(keys):
+        rows.setdefault(key, []).append(row)
+    if len(rows) == points.size:
+        return points, ""
+    u = points.numbers["u"]
+    gathered = {key: [(float(u[row]), float(errors[row])) for row in some] for key, some in rows.items()}
+    value, error = np.array(means_of_repeats(gathered)).T
+    together = {
+        role: np.array([how(points.numbers[role][some]) for some in rows.values()])
+        for role, how in TOGETHER.items()
+        if role in points.numbers
+    }
+    first = np.isin(np.arange(points.size), [some[0] for some in rows.values()])
+    return points.only(first).having({"u": value, "u_se": error, **together}), said_of_repeats(gathered)
+
+
+def _mean_of_known(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+# How what stands beside u is put together of repeats.
+TOGETHER: Mapping[str, Callable[[Array], float]] = {
+    "v": _mean_of_known,
+    "w": _mean_of_known,
+    "u_std": lambda values: float(np.sqrt(np.mean(values**2))),
+    "duration_s": lambda values: float(np.sum(values)),
+}
+
+
 def _stated(values: Sequence[RepeatedValue]) -> bool:
     return all(np.isfinite(error) for _, error in values)
 
 
-def _error(place: PlaceKey, values: Sequence[RepeatedValue], scatter: Scatter) -> float:
+def _error(place: Key, values: Sequence[RepeatedValue], scatter: Scatter) -> float:
     if _stated(values):
         return sqrt(sum(error**2 for _, error in values)) / len(values)
     return sqrt(_variance(place, scatter) / len(values))
 
 
-def _variance(place: PlaceKey, scatter: Scatter) -> float:
+def _variance(place: Key, scatter: Scatter) -> float:
     """s^2 of one value at a place; 0 for unknown."""
     for width in NARROW_TO_WIDE:
         squares, freedom = scatter.get(place[:width], (0.0, 0))
@@ -61,7 +104,7 @@ def _variance(place: PlaceKey, scatter: Scatter) -> float:
     return squares / freedom if freedom >= LEAST_OF_FILE else 0.0
 
 
-def _scatter(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> Scatter:
+def _scatter(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> Scatter:
     """Sum of squares about the means of the places, and degrees of freedom, by the beginning of their keys."""
     found: dict[tuple[object, ...], tuple[float, int]] = {}
     for place, values in gathered.items():
@@ -72,5 +115,5 @@ def _scatter(gathered: Mapping[PlaceKey, Sequence[RepeatedValue]]) -> Scatter:
     return found
 
 
-def _groups_of(place: PlaceKey) -> Iterator[tuple[object, ...]]:
+def _groups_of(place: Key) -> Iterator[tuple[object, ...]]:
     return (place[:width] for width in (*NARROW_TO_WIDE, 0))

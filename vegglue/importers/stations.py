@@ -13,12 +13,15 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
-from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats
+from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
 from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 
 # Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
 ONE_PLACE = 0.001
+# Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
+# that were read again, with another level of the bed or of the probe beside it.
+VERTICALS = 0.2
 # Stations of one section lie within so much of one another along the channel [m], where no section is named.
 SECTION_GAP = 0.25
 Row = list[str]
@@ -130,12 +133,16 @@ def _sections(x: Array) -> list[str]:
 
 
 def _in_verticals(taken: Taken) -> bool:
-    """Whether places have velocities at more than one height."""
+    """Whether VERTICALS of the places have velocities at several heights: shallow ones are often measured at one."""
     if not {"z", "u"} <= taken.numbers.keys():
         return False
     there = np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"])
-    keys = [key for key, kept in zip(_places(taken), there, strict=True) if kept]
-    return len(set(keys)) * 2 <= len(keys)
+    heights: dict[PlaceKey, set[float]] = {}
+    for place, z, kept in zip(_places(taken), np.round(taken.numbers["z"], 2).tolist(), there, strict=True):
+        if kept:
+            heights.setdefault(place, set()).add(z)
+    several = sum(len(some) > 1 for some in heights.values())
+    return several > 0 and several >= VERTICALS * len(heights)
 
 
 def _places(taken: Taken) -> list[PlaceKey]:
@@ -146,18 +153,14 @@ def _places(taken: Taken) -> list[PlaceKey]:
 
 def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     """Points in the vertical; a section is a case of the file, at the middle of its x."""
-    kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"]))
+    kept, said = _at_their_heights(taken, words)
     optional = _beside_u(kept, words)
     names = [
         f"{experiment}/{section}"
         for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
     ]
-    x = kept.numbers["x"].copy()
-    for name in set(names):
-        here = np.array([one == name for one in names])
-        x[here] = np.median(x[here])
     devices = kept.words.get("device", ["ADV"] * kept.size)
-    places = [x, kept.numbers["y"], kept.numbers["z"]]
+    places = [kept.numbers[role] for role in ("x", "y", "z")]
     columns = [
         *(map(_place, one) for one in places),
         *(map(_value, one) for one in (kept.numbers["u"], *optional.values())),
@@ -173,8 +176,26 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     )
     heading = ("case", "device", "x", "y", "z", "u", *optional)
     return StationTable(
-        f"{stem}.csv", heading, rows, observations, f"{len(rows)} points of {len(observations)} sections"
+        f"{stem}.csv",
+        heading,
+        rows,
+        observations,
+        f"{len(rows)} points of {so_many(len(observations), 'section')}{said}",
     )
+
+
+def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
+    """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
+    kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"]))
+    sections = list(zip(kept.words["experiment"], kept.words["section"], strict=True))
+    x = kept.numbers["x"].copy()
+    for one in set(sections):
+        here = np.array([section == one for section in sections])
+        x[here] = np.median(x[here])
+    kept = kept.having({"x": x})
+    z = np.round(kept.numbers["z"] / ONE_PLACE).tolist()
+    heights = [(*place, height) for place, height in zip(_places(kept), z, strict=True)]
+    return without_repeats(kept, heights, errors_of_rows(kept, KINDS[STREAMWISE], words))
 
 
 def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
