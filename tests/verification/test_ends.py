@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from channels import GRAVITY, centres, make_problem, order, shown, solved
+from channels import GRAVITY, centres, changed, filled, make_problem, order, shown, solved
 from scipy.optimize import brentq
 
 from vegglue.flow.equations import residual
-from vegglue.flow.problem import ACROSS, ALONG, LEVEL
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment
 from vegglue.resistance import bed_laws
 
 LENGTH, FLUX, OUTLET = 24.0, 0.6, 0.9  # m, m2/s, m
@@ -61,3 +61,23 @@ def test_velocity_across_that_grows_along_x_is_carried_exactly():
     state[:, ACROSS, 1:] = a * centres(24.0, cells)[:, None, None]
     rate = residual(problem, state)[:, ACROSS, 4, 0]
     assert rate == pytest.approx(np.full(cells, a * speed), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", [ALONG, ACROSS], ids=["along", "across"])
+def test_what_disturbs_water_that_flows_in_at_the_outlet_does_not_grow(kind):
+    """Carried from upstream, it would grow by |c| / dx = 0.5 1/s."""
+    problem = changed(make_problem(np.zeros((12, 8)), (1.0, 1.0), 0.0, 1.0, (bed_laws.CHEZY, 1e9)), inflows=())
+    calm = filled(problem, 1.0)
+    calm[:, ALONG] = -0.5
+    disturbed = calm.copy()
+    disturbed[-1, kind, 4] += 1e-3
+    rate = (residual(problem, disturbed) - residual(problem, calm))[-1, kind, 4, 0] / 1e-3
+    assert rate > -1e-6
+
+
+def test_an_eddy_may_reach_through_the_outlet():
+    """Water enters through a third of the width, and some flows back in at the outlet, at up to 0.08 m/s."""
+    problem = make_problem(np.zeros((20, 12)), (0.5, 0.5), 2.0, 1.0, (bed_laws.CHEZY, 80.0), viscosity=np.full(1, 0.005))
+    outlet = solved(changed(problem, inflows=(InflowSegment("west", 0, 4, np.full(1, 2.0)),)))[-1, ALONG, :, 0]
+    assert outlet.min() == pytest.approx(-0.083, abs=0.005)
+    assert outlet.max() == pytest.approx(0.993, abs=0.005)

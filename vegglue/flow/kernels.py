@@ -46,6 +46,18 @@ def _straight_on(out, last, before_it):
 
 
 @compiled
+def _beyond_outlet(out, last, before_it, carrier):
+    """Values (rows, m) one cell beyond the outlet: straight on where water leaves; where it enters, as in the last.
+
+    Straight on, water that enters would be carried from upstream, and whatever disturbs it would grow by |c| / dx.
+    """
+    rows, m = out.shape
+    for j in range(rows):
+        for k in range(m):
+            out[j, k] = 2.0 * last[j, k] - before_it[j, k] if carrier[j, k] > 0.0 else last[j, k]
+
+
+@compiled
 def _carrier(out, flux, depth, other_flux, other_depth):
     """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
     rows, m = out.shape
@@ -100,7 +112,7 @@ def _beside_y(bend, i, j, per_x):
 
 
 @compiled
-def _neighbours_of_u(far, near, east, f, u, flux, cell):
+def _neighbours_of_u(far, near, east, f, u, carrier, flux, cell):
     """u [m/s] two faces and one west of face f and one east of it, (ny, m) each; where a side is nearer, into
     what is given.
 
@@ -108,7 +120,7 @@ def _neighbours_of_u(far, near, east, f, u, flux, cell):
     """
     nx, rows, m = cell.shape
     if f == nx:
-        _straight_on(east, u[nx], u[nx - 1])
+        _beyond_outlet(east, u[nx], u[nx - 1], carrier)
     if f == 1:
         for j in range(rows):
             for k in range(m):
@@ -120,7 +132,7 @@ def _neighbours_of_u(far, near, east, f, u, flux, cell):
 
 
 @compiled
-def _neighbours_of_v(far, near, east, i, v):
+def _neighbours_of_v(far, near, east, i, v, carrier):
     """v [m/s] two columns and one west of column i and one east of it, (ny + 1, m) each; where a side is nearer, into
     what is given.
 
@@ -128,7 +140,7 @@ def _neighbours_of_v(far, near, east, i, v):
     """
     last = v.shape[0] - 1
     if i == last:
-        _straight_on(east, v[i], v[max(i - 1, 0)])
+        _beyond_outlet(east[1:-1], v[i, 1:-1], v[max(i - 1, 0), 1:-1], carrier)
     if i == 0:
         near[:] = -v[0]
         _straight_on(far, near, v[0])
@@ -149,9 +161,9 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
     _strain_along(behind, first, u, v, viscosity, cell, per_x, bend)
     for f in range(first + 1, stop + 1):
         a, b, f2 = f - 1, min(f, nx - 1), min(f + 1, nx)
-        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, flux_x, cell)
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
+        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, cell)
         _strain_along(behind, f, u, v, viscosity, cell, per_x, bend)
         _carrier(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
         _shear(shear, f, u, v, viscosity, corner, per_x, per_y, bend)
@@ -197,9 +209,10 @@ def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film
     _carrier(east, flux_x[first, :-1], face_x[first, :-1], flux_x[first, 1:], face_x[first, 1:])
     _shear(behind, first, u, v, viscosity, corner, per_x, per_y, bend)
     for i in range(first, stop):
-        f, (v1, v2, v3) = i + 1, _neighbours_of_v(ends[0], ends[1], ends[2], i, v)
+        f = i + 1
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f, :-1], face_x[f, :-1], flux_x[f, 1:], face_x[f, 1:])
+        v1, v2, v3 = _neighbours_of_v(ends[0], ends[1], ends[2], i, v, east)
         _shear(behind, f, u, v, viscosity, corner, per_x, per_y, bend)
         _carrier(side, flux_y[i, :-1], face_y[i, :-1], flux_y[i, 1:], face_y[i, 1:])
         if bend is not None:
