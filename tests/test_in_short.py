@@ -43,6 +43,7 @@ def test_building_blocks() -> None:
     assert (so_many(1, "patch", "patches"), so_many(2000, "patch", "patches")) == ("1 patch", "2,000 patches")
     assert interval_in_short("phi", 8.123, 7.0, 9.35, "-") == "phi: 8.12, 95 % 7 to 9.35"
     assert interval_in_short("k_s", 0.5, 0.4, 0.6, "m").endswith("0.6 m")
+    assert interval_in_short("outlet", 102.368, 102.346, 102.391, "m") == "outlet: 102.37, 95 % 102.35 to 102.39 m"
     assert errors_in_short({"level": 0.0021, "velocity": np.nan}) == "level 0.0021 m"
 
 

@@ -1,5 +1,6 @@
 """How values show themselves where they are printed: a heading, and below it a few lines with units."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 
@@ -20,4 +21,13 @@ def listed(parts: Sequence[str]) -> str:
 
 def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:
     """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit behind unless it is none."""
-    return f"{name}: {value:.3g}, 95 % {low:.3g} to {high:.3g} {unit.removesuffix('-')}".rstrip()
+    digits = telling_digits(low, high)
+    return f"{name}: {value:.{digits}g}, 95 % {low:.{digits}g} to {high:.{digits}g} {unit.removesuffix('-')}".rstrip()
+
+
+def telling_digits(low: float, high: float) -> int:
+    """Significant digits of both ends of a range: three, more where these would not tell one end from the other."""
+    apart, largest = high - low, max(abs(low), abs(high))
+    if not (math.isfinite(apart) and apart > 0.0):
+        return 3
+    return max(math.floor(math.log10(largest)) - math.floor(math.log10(apart)) + 1, 3)

@@ -11,6 +11,7 @@ from report_runs import MEMBERS
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
+from vegglue.report_page.posterior_words import parameter_in_words
 from vegglue.report_page.prior_words import off_its_prior
 from vegglue.report_page.run import Run
 from vegglue.report_page.tables import parameter_rows
@@ -44,6 +45,19 @@ def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
     assert float(drag.split()[0]) == pytest.approx(posterior.marginals.median["phi"], rel=0.01), "known to a tenth"
     vague = changed(posterior, log10_sd=posterior.marginals.log10_sd | {"phi": 0.2})
     assert estimate(vague, "phi").startswith("10<sup>")
+
+
+def test_both_ends_of_a_narrow_range_are_told_apart(toy: tuple[Run, str]) -> None:
+    ends = np.array([102.346, 102.36, 102.368, 102.38, 102.391])  # a level in a datum
+    own = toy[0].posterior.marginals
+    level = changed(
+        toy[0].posterior, quantiles=own.quantiles | {"n_b": ends}, median=own.median | {"n_b": 102.368},
+        sd=own.sd | {"n_b": 0.012}, identified=own.identified | {"n_b": True},
+    )  # fmt: skip
+    row = parameter_rows(replace(toy[0], posterior=level))[0]
+    assert row.range95 == "102.35 to 102.39"
+    assert row.posterior.replace("\u00a0", " ").startswith("102.37 ± 0.01")
+    assert "95 % range 102.35 to 102.39" in parameter_in_words(level, "n_b")[0]
 
 
 def test_says_at_which_bound_a_parameter_presses(d3a: tuple[Run, str]) -> None:

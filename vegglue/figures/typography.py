@@ -40,10 +40,10 @@ def short(value: float, figures: int = 3) -> str:
 
 
 def plus_minus(value: float, sd: float) -> str:
-    """value ± sd, both to two significant figures of sd, and no more than four of value."""
+    """value ± sd, both to two significant figures of sd; to one of them where value would have more than four."""
     if not math.isfinite(sd):
         return short(value)
-    places = min(decimals(sd), decimals(value, 4)) if value else decimals(sd)
+    places = min(decimals(sd), max(decimals(value, 4), decimals(sd, 1))) if value else decimals(sd)
     return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
 
 

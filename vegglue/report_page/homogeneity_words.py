@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from vegglue.in_short import telling_digits
 from vegglue.results.posterior import Posterior, Transfer
 
 # p-value [-], over all parameters compared (Bonferroni), below which a parameter is said to differ between experiments.
@@ -53,7 +54,7 @@ def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, ot
     name, doubted = posterior.parameters[j], transfer.p[j] < DOUBTED_BELOW
     scale = f"log10 {name}" if name in posterior.marginals.log10_median else name
     each = ", ".join(
-        f"{value:.3g} ± {error:.1g} ({experiment})"
+        f"{value:.{telling_digits(value - error, value + error)}g} ± {error:.1g} ({experiment})"
         for experiment, value, error in zip(
             transfer.experiments, transfer.value[:, j], transfer.error[:, j], strict=True
         )

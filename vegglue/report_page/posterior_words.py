@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.figures.typography import PLAIN_TEXT, Notation
-from vegglue.in_short import so_many
+from vegglue.in_short import so_many, telling_digits
 from vegglue.inference.likelihood import sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
@@ -96,7 +96,9 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
     """Median, standard deviation and 95 % range of a parameter against its prior, and the bounds it presses against."""
     marginals, symbol = posterior.marginals, notation.parameter(name)
     unit, number = notation.unit(posterior.sample.unit[name]), notation.number
-    low, high = (number(float(value), 3) for value in marginals.quantiles[name][[0, -1]])
+    ends = [float(value) for value in marginals.quantiles[name][[0, -1]]]
+    digits = telling_digits(*ends)
+    low, high = (number(value, digits) for value in ends)
     ratio = f"{notation.share(marginals.width_ratio[name])} of the prior's"
     if not marginals.identified[name]:
         return [
@@ -108,7 +110,7 @@ def parameter_in_words(posterior: Posterior, name: str, notation: Notation = PLA
     if name in marginals.log10_median:
         power = f" = {notation.power_of_ten(marginals.log10_median[name], marginals.log10_sd[name])}"
     return [
-        f"{symbol}: median {number(marginals.median[name], 3)}{unit}{power}, standard deviation "
+        f"{symbol}: median {number(marginals.median[name], digits)}{unit}{power}, standard deviation "
         f"{number(marginals.sd[name], 2)}, 95 % range {low} to {high}, {ratio}.",
         *against_prior_in_words(posterior, name, notation),
     ]

@@ -1,6 +1,7 @@
 """Where a posterior disagrees with its prior: it presses against a bound, or lies off its middle."""
 
 from vegglue.figures.typography import Notation
+from vegglue.in_short import telling_digits
 from vegglue.results.posterior import NEAR_BOUND, Posterior
 
 
@@ -20,7 +21,8 @@ def off_its_prior(posterior: Posterior, name: str) -> bool:
 def _off_in_words(posterior: Posterior, name: str, notation: Notation) -> list[str]:
     if not off_its_prior(posterior, name):
         return []
-    low, high = (notation.number(float(value), 3) for value in posterior.marginals.prior_quantiles[name][[0, -1]])
+    ends = [float(value) for value in posterior.marginals.prior_quantiles[name][[0, -1]]]
+    low, high = (notation.number(value, telling_digits(*ends)) for value in ends)
     return [
         f"{notation.parameter(name)} lies outside the range that its prior holds for 95 % likely, {low} to {high}: the "
         "prior or a measurement is wrong, or it stands in for something that is missing."

@@ -11,6 +11,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, plus_minus, short
+from vegglue.in_short import telling_digits
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
@@ -107,7 +108,7 @@ def _parameter_row(run: Run, name: str, comparison: ReferenceComparison) -> Para
         html.escape(run.case.parameters[name].meaning),
         _prior(run, name),
         estimate(posterior, name),
-        f"{short(low)} to {short(high)}",
+        _range(low, high),
         identified
         + (f", at {bound} bound" if bound else "")
         + (", outside its prior’s 95 %" if off_its_prior(posterior, name) else ""),
@@ -122,7 +123,7 @@ def _corrected_row(case: Case, canopy: CorrectedCanopy, comparison: ReferenceCom
         f"corrected from a canopy of {canopy.from_height:g} m to one of {canopy.to_height:g} m",
         "",
         f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>",
-        f"{short(low)} to {short(high)}",
+        _range(low, high),
         "",
         comparison,
     )
@@ -134,7 +135,12 @@ def _prior(run: Run, name: str) -> str:
     if prior.distribution in ("uniform", "loguniform"):
         return f"{words[prior.distribution]}, {as_given(low)} to {as_given(high)}"
     low, high = run.posterior.marginals.prior_quantiles[name][[0, -1]]
-    return f"{words[prior.distribution]}, 95{NARROW}% in {short(low)} to {short(high)}"
+    return f"{words[prior.distribution]}, 95{NARROW}% in {_range(low, high)}"
+
+
+def _range(low: float, high: float) -> str:
+    digits = telling_digits(low, high)
+    return f"{short(low, digits)} to {short(high, digits)}"
 
 
 def _study_value(run: Run, name: str) -> tuple[float, float] | None:
