@@ -16,7 +16,13 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
-from vegglue.inference.homogeneity import equal_values_test, one_experiment, transfer, without_prior
+from vegglue.inference.homogeneity import (
+    chance_of_as_much,
+    equal_values_test,
+    one_experiment,
+    transfer,
+    without_prior,
+)
 from vegglue.measurements.observations import read_observations
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
 from vegglue.results.posterior import Posterior, Transfer
@@ -32,6 +38,17 @@ def test_homogeneity_of_the_papers_table() -> None:
         pytest.approx(2), 1, pytest.approx(scipy.stats.chi2.sf(2, 1)),
     )  # fmt: skip
     assert math.isnan(equal_values_test(np.array([1.0, np.nan]), np.array([0.1, np.nan]))[0])
+
+
+def test_errors_estimated_from_few_readings_raise_no_false_alarms() -> None:
+    random, alarms = np.random.default_rng(4), 0
+    for _ in range(2000):  # the mean of 8 readings in each of two experiments, of one size of error
+        seen = random.normal(size=(2, 8))
+        size = math.sqrt(seen.var(axis=1, ddof=1).mean())
+        alarms += equal_values_test(seen.mean(axis=1), np.full(2, size / math.sqrt(8)), None, 14)[2] < 0.01
+    assert 10 <= alarms <= 32  # 20 are expected, 39 where the size is taken for known
+    assert chance_of_as_much(9.2, 3) == pytest.approx(scipy.stats.chi2.sf(9.2, 3))
+    assert chance_of_as_much(9.2, 3, 1e9) == pytest.approx(scipy.stats.chi2.sf(9.2, 3))
 
 
 def test_the_prior_is_taken_off(reach: SolvedReach) -> None:

@@ -6,9 +6,11 @@ of one degree of freedom less than experiments e. x_e and s_e are the estimate o
 experiment e alone, without its prior, and its standard error; rho_ef is the correlation of two estimates by errors
 that experiments share, those of the model and of the grid. All parameters at once are tested by the fall of chi2 when
 each experiment has its own. The size of the errors is estimated from the separate fits: the residual of the joint one
-would hold the differences that are tested.
+would hold the differences that are tested. As it is estimated from d degrees of freedom, chi2 / m of m of its own is
+Fisher's F_m,d (Fisher 1925, Statistical Methods for Research Workers); chi2 alone takes few readings for many.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -47,7 +49,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
     fits = side_by_side(partial(_alone, joint), parts)
-    scale = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
+    scale, free = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
     for e, fitted in enumerate(fits):
         if fitted is not None:
@@ -61,12 +63,12 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
     separate = sum(determined(one.covariance) for one in fits if one is not None)
     more = max(round(separate - determined(covariance(noise, joint))), 1)
     alike = _alike(noise, model, here, [part for _, part in parts], fits)
-    tested = [equal_values_test(value[:, j], error[:, j], alike[j]) for j in range(len(model.names))]
+    tested = [equal_values_test(value[:, j], error[:, j], alike[j], free) for j in range(len(model.names))]
     return Transfer(
         scale=scale,
         gain=gain,
         more=more,
-        p_all=float(scipy.stats.chi2.sf(max(gain, 0.0), more)),
+        p_all=chance_of_as_much(max(gain, 0.0), more, free),
         experiments=np.array(here, object),
         value=value,
         error=error,
@@ -91,12 +93,22 @@ def _alike(
     return correlations_of_estimates(noise, estimates, len(model.names))
 
 
-def _scale(fits: Sequence[MapEstimate | None], stations: Sequence[int], least: float) -> float:
-    """s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e [-]."""
+def _scale(fits: Sequence[MapEstimate | None], stations: Sequence[int], least: float) -> tuple[float, float]:
+    """s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e [-]; and the degrees
+    of freedom that s is estimated from, infinite where it is the least, which is known.
+    """
     pairs = [(one, count) for one, count in zip(fits, stations, strict=True) if one is not None]
     left = sum(one.chi2 for one, _ in pairs)
     free = sum(count - determined(one.covariance) for one, count in pairs)
-    return max(float(np.sqrt(left / free)), least) if free > 0 and left > 0 else 1.0
+    found = float(np.sqrt(left / free)) if free > 0 and left > 0 else 1.0
+    return (found, free) if free > 0 and found > least else (max(found, least), math.inf)
+
+
+def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:
+    """P(chi2 or more) [-] of so many degrees of freedom, over errors whose size is estimated from `free` others."""
+    if math.isinf(free):
+        return float(scipy.stats.chi2.sf(chi2, freedom))
+    return float(scipy.stats.f.sf(chi2 / freedom, freedom, free))
 
 
 def determined(spread: Array) -> float:
@@ -136,10 +148,12 @@ def correlations_of_estimates(noise: Noise, estimates: Sequence[Estimate | None]
     return np.asarray(shared / (own[:, :, None] * own[:, None, :]))
 
 
-def equal_values_test(value: Array, error: Array, alike: Array | None = None) -> tuple[float, int, float]:
+def equal_values_test(
+    value: Array, error: Array, alike: Array | None = None, free: float = math.inf
+) -> tuple[float, int, float]:
     """chi2, degrees of freedom and p of equal values (e,); error NaN or 0: unknown; NaN for fewer than two known.
 
-    alike: rho (e, e), independent where it is not given.
+    alike: rho (e, e), independent where it is not given; free: see `chance_of_as_much`.
     """
     known = np.isfinite(value) & (error > 0)  # zero at an end of its support, where no step leads
     if known.sum() < 2:
@@ -150,7 +164,7 @@ def equal_values_test(value: Array, error: Array, alike: Array | None = None) ->
     off = value[known] - (weight @ value[known]).sum() / weight.sum()
     separation = float(off @ weight @ off)
     freedom = int(known.sum()) - 1
-    return separation, freedom, float(scipy.stats.chi2.sf(separation, freedom))
+    return separation, freedom, chance_of_as_much(separation, freedom, free)
 
 
 def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, Noise]:
