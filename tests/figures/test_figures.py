@@ -112,6 +112,26 @@ def test_verticals_stand_at_their_y_with_velocity_to_the_right() -> None:
     assert points.get_ydata() == pytest.approx([-0.9, -0.5])
 
 
+def test_the_canopy_is_drawn_above_the_bed_that_its_plants_stand_on() -> None:
+    height = np.array([0.1, 0.5])
+    used = np.array([True, True])
+    flood_plain = Vertical(6.0, 1.0, 1.0, True, height, height, used, height, height)
+    main = Vertical(2.0, -1.0, 3.0, False, height, height, used, height, height)
+    axes = draw_verticals([flood_plain, main], (0.4, 0.05), 0.5).axes[0]
+    canopy = next(line for line in axes.lines if line.get_color() == COLOUR["stems"])
+    assert set(canopy.get_ydata()) == {1.4}  # it lay at -0.6, below the ground of the plants
+    edge = axes.collections[0].get_paths()[0].vertices
+    assert list(np.unique(edge[:, 0])) == [2.0, 6.0]
+    assert list(edge[:3, 0]) == sorted(edge[:3, 0]), "the ground is drawn from bank to bank"
+
+
+def test_residuals_of_any_number_of_zones_are_drawn() -> None:
+    zones = [f"class {number}" for number in range(9)]
+    axes = draw_residuals(np.arange(9.0), "y", np.linspace(-1, 1, 9), zones, "m/s").axes[0]
+    drawn = [line for line in axes.lines if line.get_linestyle() == "None"]
+    assert len(drawn) == len(zones)
+
+
 def test_quantiles_pair_the_smallest_residual_with_the_smallest_quantile() -> None:
     axes = draw_quantiles(np.array([2.0, -1.0, 0.1]), ["c", "a", "b"]).axes[0]
     points = next(line for line in axes.lines if line.get_marker() == "o")

@@ -5,6 +5,7 @@ Every function takes plain arrays and tables and returns a matplotlib Figure; no
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -40,6 +41,7 @@ def draw_verticals(verticals: Sequence[Vertical], canopy: tuple[float, float] | 
     canopy: height above the bed and its standard error [m], drawn where given.
     """
     figure, axes = canvas(2 * WIDTH, HEIGHT + 0.5)
+    verticals = sorted(verticals, key=lambda vertical: vertical.y)
     bed = np.array([[vertical.y, vertical.bed] for vertical in verticals])
     bottom = bed[:, 1].min()
     surface = float(np.median([vertical.bed + vertical.depth for vertical in verticals]))
@@ -48,12 +50,13 @@ def draw_verticals(verticals: Sequence[Vertical], canopy: tuple[float, float] | 
     label(axes, bed[0, 0], surface, "water surface", "model", xytext=(0, 3))
     for vertical in verticals:
         _draw_vertical(axes, vertical, stretch)
-    among = [vertical.y for vertical in verticals if vertical.planted]
-    if canopy is not None and among:
-        top = bottom + canopy[0]
-        axes.plot([min(among) - 0.1, max(among) + 0.4 * stretch], [top, top], color=COLOUR["stems"], linewidth=1.2)
+    among = np.array([[vertical.y, vertical.bed] for vertical in verticals if vertical.planted])
+    if canopy is not None and among.size:
+        place, top = among[:, 0], among[:, 1] + canopy[0]  # of plants on the bed that they stand on
+        ends = np.r_[place[0] - 0.1, place, place[-1] + 0.4 * stretch], np.r_[top[0], top, top[-1]]
+        axes.plot(*ends, color=COLOUR["stems"], linewidth=1.2)
         text = f"canopy {plus_minus(*canopy)} m"
-        label(axes, float(np.mean(among)), top, text, "stems", ha="center", xytext=(0, -11))
+        label(axes, float(place.mean()), float(top.mean()), text, "stems", ha="center", xytext=(0, -11))
     foot = axes.get_ylim()[0]
     start = float(bed[:, 0].min())
     axes.annotate(
@@ -112,7 +115,7 @@ def draw_residuals(place: Array, axis: str, residual: Array, zone: Sequence[str]
     axes.axhline(0, color=COLOUR["muted"], linewidth=0.8)
     axes.vlines(place, 0, residual, color=COLOUR["measured"], linewidth=0.8)
     names = list(dict.fromkeys(zone))
-    for marker, name in zip("osD^vP", names, strict=False):
+    for marker, name in zip(cycle("osD^vP"), names, strict=False):
         chosen = np.array([other == name for other in zone])
         axes.plot(place[chosen], residual[chosen], marker, markersize=4.4, color=COLOUR["measured"])
         last = int(np.argmax(np.where(chosen, np.abs(residual), -1)))

@@ -138,9 +138,10 @@ def _vertical(profile: pd.Series, points: pd.DataFrame) -> Vertical:
 
 def _stretch(verticals: list[Vertical]) -> float:
     """Metres drawn for 1 m/s: the fastest point reaches one and a half distances between verticals."""
-    y = np.sort([vertical.y for vertical in verticals])
+    y = np.unique([vertical.y for vertical in verticals])
     spacing = float(np.median(np.diff(y))) if len(y) > 1 else 1.0
-    return 1.5 * spacing / max(float(vertical.velocity.max()) for vertical in verticals)
+    fastest = max(float(np.abs(vertical.velocity).max()) for vertical in verticals)
+    return 1.5 * spacing / fastest if fastest > 0.0 else 1.5 * spacing
 
 
 def weights_of_ensemble(posterior: Posterior, ensemble: Ensemble) -> np.ndarray:
