@@ -116,6 +116,20 @@ def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy
     assert "vegglue run toy.yaml" in answer_of(toy).ladder_words
 
 
+def test_the_name_of_a_file_is_no_markup(toy: Run) -> None:
+    named = replace(toy, case=toy.case.model_copy(update={"source": Path("a<b>&c.yaml")}))
+    assert "vegglue run a&lt;b&gt;&amp;c.yaml" in answer_of(named).ladder_words
+
+
+@pytest.mark.parametrize(
+    ("unseen", "said"), [(0.0391, "stays at 0.039 m/s"), (0.045, "rises from 0.039 to 0.045"), (float("nan"), "is 0.039")]
+)
+def test_an_error_that_stays_neither_falls_nor_rises(unseen: float, said: str) -> None:
+    first, last = (0.039, unseen) if unseen == unseen else (unseen, 0.039)
+    steps = replace(FIRST, unseen=first), replace(LAST, unseen=last)
+    assert f"has seen {said}" in plain(ladder_in_words(replace(LADDER, steps=steps)))
+
+
 def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
     said = plain(ladder_in_words(LADDER))
     assert said.startswith("With eddies, the error at measurements no calibration has seen falls from 0.039 to 0.0033")

@@ -3,6 +3,7 @@
 `answer_of` has its values, the macro `answer` of answer.html.j2 its looks; a page of several cases may show it again.
 """
 
+import html
 from dataclasses import dataclass
 
 from vegglue.figures.error_rows import draw_error_rows
@@ -44,7 +45,7 @@ class CaseAnswer:
 def answer_of(run: Run) -> CaseAnswer:
     """The answer of a run; its pictures are written to run.folder/figures. run.flow is not asked for."""
     ladder = run.loop.ladder
-    command = f"<code>vegglue run {run.case.source.name}</code>"
+    command = f"<code>vegglue run {html.escape(run.case.source.name)}</code>"
     missing = f"{command} would show here how far the error falls with what is missing."
     return CaseAnswer(
         name=run.case.name,
