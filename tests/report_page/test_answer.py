@@ -122,7 +122,8 @@ def test_the_name_of_a_file_is_no_markup(toy: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unseen", "said"), [(0.0391, "stays at 0.039 m/s"), (0.045, "rises from 0.039 to 0.045"), (float("nan"), "is 0.039")]
+    ("unseen", "said"),
+    [(0.0391, "stays at 0.039 m/s"), (0.045, "rises from 0.039 to 0.045"), (float("nan"), "is 0.039")],
 )
 def test_an_error_that_stays_neither_falls_nor_rises(unseen: float, said: str) -> None:
     first, last = (0.039, unseen) if unseen == unseen else (unseen, 0.039)

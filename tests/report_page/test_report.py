@@ -1,5 +1,6 @@
 """The report: one self-contained page that says what the posterior says, on the synthetic record and on a toy case."""
 
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -12,7 +13,8 @@ from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
 from vegglue.report_page.findings import findings
-from vegglue.report_page.run import Run, is_synthetic, station_zones
+from vegglue.report_page.run import Run, file_name, is_synthetic, station_zones
+from vegglue.report_page.section_pictures import section_panels
 from vegglue.report_page.tables import parameter_rows
 
 pytestmark = pytest.mark.slow  # whole pages
@@ -163,6 +165,26 @@ def test_zones_follow_the_plants_present(toy: tuple[Run, str]) -> None:
 
 def test_names_of_users_make_safe_file_names(toy: tuple[Run, str]) -> None:
     assert (toy[0].folder / "figures" / "section-with-S-1.svg").is_file()
+
+
+def test_names_that_differ_in_lost_letters_have_files_of_their_own() -> None:
+    assert file_name("verticals-high flow-S 1") == "verticals-high-flow-S-1"
+    assert len({file_name(words) for words in ("posterior-φ", "posterior-ψ", "posterior--")}) == 3
+    long = [file_name(f"section-{'x' * 130}-{number}") for number in (1, 2)]
+    assert long[0] != long[1]
+    assert max(map(len, long)) <= 120
+
+
+def test_panels_of_long_names_are_found_by_their_ids(tmp_path: Path) -> None:
+    toy = a_toy(tmp_path)
+    table = toy.observations.table
+    moved = [f"{'long ' * 30}{number % 2}" if name else "" for number, name in enumerate(table["section"])]
+    named = replace(toy, observations=replace(toy.observations, table=table.assign(section=moved)))
+    panels = section_panels(named)
+    ids = [one["id"] for one in json.loads(panels.data)]
+    drawn = [picture.name for one in panels.experiments for picture in one.pictures]
+    assert sorted(ids) == sorted(drawn), "a page whose script finds no figure for a panel reads no station"
+    assert len(set(ids)) == len(ids)
 
 
 def test_an_unwritable_folder_is_one_sentence(tmp_path: Path) -> None:

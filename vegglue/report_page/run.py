@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,6 +27,7 @@ from vegglue.site.gridded_site import Site, cells_at
 from vegglue.whole_files import folder_within
 
 SYNTHETIC = "synthetic record"  # stamped on every figure of one
+LONGEST_FILE_NAME = 120  # letters: encrypted disks take 143, with the ending
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,13 @@ def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Pict
 
 
 def file_name(words: str) -> str:
-    """Words as the name of a file, of a length that every disk takes: a user names experiments and sections."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", words)[:120]
+    """Words as the name of a file, of a length that every disk takes: a user names experiments and sections. With a
+    checksum where letters are lost that may be all that tells it from another.
+    """
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", words)
+    if words.isascii() and len(plain) <= LONGEST_FILE_NAME:
+        return plain
+    return f"{plain[: LONGEST_FILE_NAME - 9]}-{crc32(words.encode(errors='replace')):08x}"
 
 
 def stamp(case: Case) -> str:

@@ -112,8 +112,8 @@ def _drawn(
         drawn = draw_panel(panel, values, f"{kind.column} [{kind.unit}]", stamp(run.case))
         alt = f"{kind.words.capitalize()} across {panel.title}, experiment {experiment}: {panel_words(panel)}."
         reasons = rows[rows["section"] == section].sort_values("y")["reason"].astype(str).tolist()
-        numbers = _numbers(name, kind, panel, drawn) | {"reason": reasons}
-        yield published_svg(run, drawn.svg, name, panel_words(panel), alt), numbers
+        picture = published_svg(run, drawn.svg, name, panel_words(panel), alt)
+        yield picture, _numbers(picture.name, kind, panel, drawn) | {"reason": reasons}
 
 
 def _unused(words: str, taken: set[str]) -> str:
