@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.stats
 from posteriors import assert_same
@@ -19,8 +20,9 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
 from vegglue.parallel import at_most
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import describe, validation_in_words
 from vegglue.results.posterior import Posterior
+from vegglue.results.refinement import GroupsLeftOut
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_posterior, write_posterior
 
@@ -116,6 +118,28 @@ def test_what_is_said(refined: Posterior) -> None:
         assert part in said, part
     assert "estimated from what" not in said
     assert "no posterior is claimed" not in said
+
+
+def test_a_group_of_smaller_errors_is_not_told_better_for_them(refined: Posterior) -> None:
+    station = pd.DataFrame(
+        {"experiment": "June", "section": ["A", "A", "", ""], "kind": ["velocity"] * 2 + ["level"] * 2, "used": True}
+    )
+    error = np.array([0.02, 0.02, 0.001, 0.001])
+    off = np.array([0.0, 0.0, 2.0, 2.0])  # residuals of the levels are the larger in their errors
+    logs = scipy.stats.norm.logpdf(off * error, scale=error)
+    assert refined.refinement is not None
+    summed = logs.reshape(2, 2).sum(axis=1)
+    groups = GroupsLeftOut(np.array(["June A", "June levels"], object), np.array([2, 2]), summed, np.zeros(2))
+    misfit = replace(refined.refinement.misfit, surprise=np.zeros(4), outlier=np.zeros(4, bool))
+    told = replace(
+        refined, station=station, fit=replace(refined.fit, noise=error),
+        refinement=replace(refined.refinement, groups=groups, misfit=misfit),
+    )  # fmt: skip
+    assert told.refinement is not None
+    assert logs[2] > logs[0], "in metres the level has the higher density"
+    assert "worst from the others is June levels (-2.92 a station" in " ".join(
+        validation_in_words(told, told.refinement)
+    )
 
 
 @pytest.mark.slow

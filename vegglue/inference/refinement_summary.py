@@ -98,7 +98,7 @@ def _misfit(base: ModesAndErrors, prediction: Array, at_all: Callable[[Array], A
 
 
 def _groups_left_out(left: Array, precision: Array, weights: Array, used: pd.DataFrame) -> GroupsLeftOut:
-    groups = _groups(used)
+    groups = groups_left_out(used)
     without = [leave_out(left, precision, weights, rows) for rows in groups.values()]
     return GroupsLeftOut(
         left_out=np.array(list(groups), object),
@@ -108,7 +108,7 @@ def _groups_left_out(left: Array, precision: Array, weights: Array, used: pd.Dat
     )
 
 
-def _groups(used: pd.DataFrame) -> dict[str, np.ndarray]:
+def groups_left_out(used: pd.DataFrame) -> dict[str, np.ndarray]:
     """Rows of each section of each experiment, then of each experiment; none where there is only one of them."""
     names = used["experiment"].astype(str).to_numpy()
     sections = used["section"].astype(str).to_numpy()

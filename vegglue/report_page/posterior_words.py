@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.figures.typography import PLAIN_TEXT, Notation
 from vegglue.in_short import so_many, telling_digits
 from vegglue.inference.likelihood import sizes_as_stated
+from vegglue.inference.refinement_summary import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import SET_ASIDE
@@ -256,17 +257,30 @@ def _left_out(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -
     ]
     untrusted = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_K_HAT]
     if groups.left_out.size:
-        each = groups.left_out_score / groups.left_out_stations
+        each = _scores_in_errors(posterior, groups)
         worst = int(np.argmin(each))
         sentences.append(
             f"Of {groups.left_out.size} sections and experiments left out in turn, the one told worst from the others "
-            f"is {groups.left_out[worst]} ({each[worst]:.2f} a station, {np.median(each):.2f} in the middle)."
+            f"is {groups.left_out[worst]} ({each[worst]:.2f} a station, its values in their errors; "
+            f"{np.median(each):.2f} in the middle)."
         )
     if untrusted:
         sentences.append(
             f"Without {', '.join(untrusted)} the posterior moves too far for these draws: not to be trusted."
         )
     return sentences
+
+
+def _scores_in_errors(posterior: Posterior, groups: GroupsLeftOut) -> np.ndarray:
+    """(ln p(y) + sum_i ln s_i) / n of each group of n stations (group,): the density of y_i / s_i, s_i the errors.
+
+    That of y_i itself is the higher the smaller its unit and errors: of levels and velocities, velocities told alike
+    would be told worst.
+    """
+    used = posterior.station["used"].to_numpy(bool)
+    size, rows = np.log(posterior.fit.noise[used]), groups_left_out(posterior.station[used])
+    sizes = [size[rows[name]].mean() if name in rows else size.mean() for name in groups.left_out]
+    return np.asarray(groups.left_out_score / groups.left_out_stations + sizes)
 
 
 def _bands(alone: LeaveOneOut) -> list[str]:
