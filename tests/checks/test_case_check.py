@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vegglue.case.config import load_case
+from vegglue.checks.boundaries import remarks_on_discharges
 from vegglue.checks.case_check import check_case
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
@@ -250,6 +251,23 @@ def test_a_discharge_far_from_the_measured_one_is_said(tmp_path):
     assert [
         s for s in said if s.startswith("The ADV of D3 in experiment D3a gives 2.6") and "the case says 3.2 m3/s" in s
     ]
+
+
+@pytest.mark.parametrize(
+    ("enters", "main", "said"),
+    [("420, 422", 2.66, None), ("420, 422", 1.66, "1.66 m3/s"), ("20, 22", 1.66, None), ("400, 404", 1.66, None)],
+)
+def test_a_section_measures_what_has_entered_above_it(tmp_path, enters, main, said):
+    (tmp_path / "other.yaml").write_text(
+        f"extends: {CONFIGS / 'd3a.yaml'}\ninflows: {{stream: {{side: north, range: [{enters}]}}}}\n"
+        f"experiments: {{D3a: {{discharge: {{upstream: {main}, stream: 1.0}}}}}}\n",
+        encoding="utf-8",
+    )
+    case = load_case(tmp_path / "other.yaml")
+    observations = read_observations(case)  # D3 lies at x = 402 m and tells 2.66 m3/s
+    remarks = list(remarks_on_discharges(case, observations))
+    assert bool(remarks) == bool(said)
+    assert all(f"the case says {said}." in one for one in remarks)
 
 
 def test_the_expected_water_is_parallel_to_the_floor_and_nowhere_below_the_outlet(tmp_path):

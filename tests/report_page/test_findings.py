@@ -8,6 +8,7 @@ import pytest
 from posteriors import changed
 from report_runs import MEMBERS
 
+from vegglue.case.site_schema import Inflow
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
@@ -121,6 +122,17 @@ def test_says_when_water_is_lost(d3a: tuple[Run, str]) -> None:
     for each, doubt in ((run, False), (leaking, True)):
         mass = next(finding for finding in findings(each) if finding.subject == "mass")
         assert mass.doubt == doubt
+
+
+def test_a_stream_that_joins_below_a_section_is_not_missing_in_it(d3a: tuple[Run, str]) -> None:
+    run, _ = d3a
+    given = run.case.experiments["D3a"]
+    joined = given.model_copy(update={"discharge": given.discharge | {"stream": 1.0}})
+    for place, total in (((420.0, 422.0), "2.66"), ((20.0, 22.0), "3.66")):
+        inflows = run.case.inflows | {"stream": Inflow(side="north", range=place)}
+        case = run.case.model_copy(update={"inflows": inflows, "experiments": {"D3a": joined}})
+        told = [one.text for one in findings(replace(run, case=case)) if one.subject == "discharge"]
+        assert any(f"the model was given {total}" in text for text in told), told
 
 
 def test_doubts_come_first(d3a: tuple[Run, str]) -> None:

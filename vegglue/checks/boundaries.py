@@ -9,8 +9,9 @@ from vegglue.case.parameter_space import middle_value, prior_range
 from vegglue.case.schema import Case, Experiment
 from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
+from vegglue.measurements.sections import section_place
 from vegglue.resistance.physical_constants import GRAVITY
-from vegglue.site.channel_geometry import expected_depth
+from vegglue.site.channel_geometry import entered_above, expected_depth
 from vegglue.site.grid import curvature_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import centres_within, inflow_cells
@@ -70,7 +71,10 @@ def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> f
 def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[str]:
     """Discharges [m3/s] that differ from those of the ADV sections by more than their errors."""
     for (name, section), by_rule in observations.discharge.items():
-        parts = [prior_range(case, value) for value in case.experiments[name].discharge.values()]
+        given = entered_above(case, case.experiments[name], section_place(observations.table, name, section))
+        if given is None:
+            continue
+        parts = [prior_range(case, value) for value in given]
         total = (sum(low for low, _ in parts), sum(high for _, high in parts))
         for rule, measured in by_rule.items():
             off = max(total[0] - measured.value, measured.value - total[1])

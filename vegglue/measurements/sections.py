@@ -17,6 +17,12 @@ def section_places(station: pd.DataFrame) -> pd.Series:
     return group["x"].transform("median").where(together, station["x"])
 
 
+def section_place(station: pd.DataFrame, experiment: str, section: str) -> float:
+    """The x of a section of one experiment [m]: the median of its stations; NaN without any."""
+    own = (station["experiment"] == experiment) & (station["section"].astype(str) == section)
+    return float(station.loc[own, "x"].median())
+
+
 def section_in_words(name: str, x: float) -> str:
     """`D3, x = 42 m`; `x = 42 m` alone of a section that was only named after its place. x [m], to centimetres."""
     place = f"x = {round(x, 2):g} m"

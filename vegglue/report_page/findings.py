@@ -15,6 +15,7 @@ from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
+from vegglue.measurements.sections import section_place
 from vegglue.report_page.homogeneity_words import homogeneity_in_words, homogeneity_rejected
 from vegglue.report_page.key_numbers import (
     MASS_LIMIT,
@@ -41,6 +42,7 @@ from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.run import Run, median_plants
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.site.channel_geometry import entered_above
 from vegglue.solver.status import STATUS_WORDS, members_with
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.
@@ -198,7 +200,11 @@ def _flagged(observations: Observations) -> Iterator[Finding]:
 
 def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
     for (experiment, section), rules in observations.discharge.items():
-        given = list(case.experiments[experiment].discharge.values())
+        given = entered_above(
+            case, case.experiments[experiment], section_place(observations.table, experiment, section)
+        )
+        if given is None:
+            continue
         prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
         measured = rules["profile"]
         text = (

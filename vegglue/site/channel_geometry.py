@@ -32,6 +32,21 @@ def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
     )
 
 
+def entered_above(case: Case, experiment: Experiment, x: float) -> list[float | str] | None:
+    """Discharges, numbers or parameters, of what has entered upstream of x [m]; None where a side inflow lets water in
+    on both sides of x.
+    """
+    given = []
+    for name, value in experiment.discharge.items():
+        inflow = case.inflows[name]
+        low, high = inflow.range or case.grid.x
+        if inflow.side == "west" or high <= x:
+            given.append(value)
+        elif not low >= x:
+            return None
+    return given
+
+
 def half_width(site: Site) -> float:
     """Half width of the floor [m], the median of its cross-sections."""
     return float(np.median(_geometry(site, (), ()).half_width))
