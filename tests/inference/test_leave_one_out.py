@@ -106,6 +106,15 @@ def test_bands_hold_their_share() -> None:
     assert share_inside(below, 0.95) == pytest.approx(0.95, abs=0.002)
 
 
+def test_members_of_no_weight_are_given_none() -> None:
+    heavy = np.linspace(0.0, -3.0, 8)
+    log_weights = np.full(1000, -2000.0)  # below rounding, as of draws in a mode that a section rules out
+    log_weights[:8] = heavy
+    weights, _ = pareto_smoothed(log_weights)
+    assert np.count_nonzero(weights) == 8
+    assert weights[:8] == pytest.approx(np.exp(heavy) / np.exp(heavy).sum(), abs=0.05)
+
+
 @pytest.mark.slow  # arviz takes a second to import
 def test_smoothed_weights_are_those_of_arviz() -> None:
     arviz = pytest.importorskip("arviz")

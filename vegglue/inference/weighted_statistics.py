@@ -133,10 +133,10 @@ def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
     order = np.argsort(weights, kind="stable")
     tail = order[-_tail(len(weights)) :]
     cut = weights[order[max(len(weights) - len(tail) - 1, 0)]]
-    excess = weights[tail] - cut
-    if np.sum(excess > 0) < 5:
+    tail = tail[weights[tail] > cut]  # what is below rounding, as most may be, does not grow to a quantile of the rest
+    if len(tail) < 5:
         return weights / weights.sum(), float("inf" if effective_size(weights) < 5 else "nan")
-    k, scale = _generalised_pareto(excess[excess > 0])
+    k, scale = _generalised_pareto(weights[tail] - cut)
     level = (np.arange(len(tail)) + 0.5) / len(tail)
     grown = -scale * np.log1p(-level) if abs(k) < 1e-9 else scale * np.expm1(-k * np.log1p(-level)) / k
     weights[tail] = np.minimum(cut + grown, 1.0)
