@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
+from vegglue.errors import InputError
 from vegglue.inference.emulator import emulator_of_density, fit_emulator
 from vegglue.inference.importance_sampling import Sample, sample
 from vegglue.inference.student_mixture import Mixture, draw, log_density, mixture_at_modes, pooled_weights, tempered
@@ -90,6 +91,19 @@ def test_places_that_fail_weigh_nothing_and_are_kept() -> None:
     assert np.all(drawn.log_density[failed] == -np.inf)
     assert np.all(drawn.weights[failed] == 0)
     assert drawn.weights @ drawn.z[:, 0] == pytest.approx(math.sqrt(2 / math.pi), abs=4 * 0.6 / math.sqrt(500))
+
+
+@pytest.mark.parametrize("solved", [0, 1, 2, 5])
+def test_a_model_that_fails_almost_everywhere_is_no_traceback(solved: int) -> None:
+    def almost_never(z: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(len(z))[:, None] < solved, z, np.nan)
+
+    if solved < 2:
+        with pytest.raises(InputError, match="of the 192 members drawn around the best fit was solved"):
+            sample(almost_never, squares, start(2), 500, seed=3)
+    else:
+        drawn = sample(almost_never, squares, start(2), 500, seed=3)
+        assert drawn.weights.sum() == pytest.approx(1.0)
 
 
 def test_same_seed_same_draws_and_all_count() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.stats
 
 from vegglue.arrays import Array
+from vegglue.errors import InputError
 from vegglue.inference.emulator import Emulator, emulator_of_density
 from vegglue.inference.student_mixture import Mixture, adapt, draw, pooled_weights
 from vegglue.inference.weighted_statistics import effective_size
@@ -25,6 +26,8 @@ SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws of a round over those before at most: chosen, so that a proposal that turns out to be poor costs two thirds of
 # all draws so far, while 192 draws and two more rounds are enough for 1,000 effective ones of six in ten.
 GROWTH = 2
+# Draws with a density below which nothing is drawn anew: the emulator predicts each from others.
+FEWEST_SOLVED = 2
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16
 Predict = Callable[[Array], Array]
@@ -58,6 +61,8 @@ def sample(
 
     predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,); finished: is told how many
     of those wanted are effective after each round.
+
+    Errors: InputError when fewer than FEWEST_SOLVED of the draws have a density.
     """
     points = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
     mixture, size = start, FIRST_DRAWS
@@ -71,6 +76,11 @@ def sample(
         parts.append((new, values, _impossible_where_nan(density(new, values))))
         rounds.append((size, mixture))
         z, values, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
+        if (solved := int(np.isfinite(logs).sum())) < FEWEST_SOLVED:
+            raise InputError(
+                f"infer: {solved or 'none'} of the {len(z)} members drawn around the best fit was solved, too few "
+                "to go on from; use `--method glue`."
+            )
         weights = pooled_weights(logs, z, rounds)
         drawn.append(len(z))
         effective.append(effective_size(weights))
