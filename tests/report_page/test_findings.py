@@ -5,17 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from posteriors import changed
+from posteriors import a_posterior, changed
 from report_runs import MEMBERS
 
 from vegglue.case.site_schema import Inflow
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
+from vegglue.report_page.homogeneity_words import homogeneity_in_words
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
+from vegglue.report_page.measured_pictures import residuals
 from vegglue.report_page.posterior_words import parameter_in_words
 from vegglue.report_page.prior_words import off_its_prior
 from vegglue.report_page.run import Run
-from vegglue.report_page.tables import parameter_rows
+from vegglue.report_page.tables import fit_rows, parameter_rows
+from vegglue.results.posterior import Transfer
 
 pytestmark = pytest.mark.slow  # whole pages
 
@@ -133,6 +136,31 @@ def test_a_stream_that_joins_below_a_section_is_not_missing_in_it(d3a: tuple[Run
         case = run.case.model_copy(update={"inflows": inflows, "experiments": {"D3a": joined}})
         told = [one.text for one in findings(replace(run, case=case)) if one.subject == "discharge"]
         assert any(f"the model was given {total}" in text for text in told), told
+
+
+def test_a_residual_names_its_experiment(toy: tuple[Run, str]) -> None:
+    captions = [picture.caption for picture in residuals(toy[0]) if "the largest is" in picture.caption]
+    assert re.search(r"at with(out)? S/1, y = [\d.]+ m", captions[0])
+    assert re.search(r"at with(out)?, x = [\d.]+ m", captions[1])
+
+
+def test_sigma_of_a_study_is_that_of_velocities(d3a: tuple[Run, str]) -> None:
+    sigma = d3a[0].posterior.fit.sigma | {"level": 0.002}
+    velocity, level, _ = fit_rows(replace(d3a[0], posterior=changed(d3a[0].posterior, sigma=sigma)))
+    assert velocity.study != "–"
+    assert level.study == "–"
+
+
+def test_an_experiment_without_a_fit_of_its_own_is_said_to_have_none() -> None:
+    alone = np.array([12.0, np.nan])
+    one = np.array([np.nan])
+    found = Transfer(
+        scale=1.0, gain=8.0, more=1, p_all=0.1, experiments=np.array(["June", "July"], object), chi2=np.array([0.5]),
+        value=np.array([[1.0], [1.1]]), error=np.array([[0.1], [0.1]]), freedom=np.array([1]), p=np.array([0.5]),
+        misfit_together=np.array([20.0, 15.0]), misfit_alone=alone, stations=np.array([15, 15]),
+    )  # fmt: skip
+    said = " ".join(homogeneity_in_words(changed(a_posterior(False), theta={"n_b": one}), found, {}))
+    assert "15 together and not found alone over 15 stations (July)" in said
 
 
 def test_doubts_come_first(d3a: tuple[Run, str]) -> None:

@@ -77,7 +77,8 @@ def _degrees(count: int) -> str:
 
 def _misfits(transfer: Transfer) -> str:
     each = ", ".join(
-        f"{together:.3g} together and {alone:.3g} alone over {int(stations)} stations ({experiment})"
+        f"{together:.3g} together and {f'{alone:.3g} alone' if np.isfinite(alone) else 'not found alone'} over "
+        f"{int(stations)} stations ({experiment})"
         for experiment, together, alone, stations in zip(
             transfer.experiments, transfer.misfit_together, transfer.misfit_alone, transfer.stations, strict=True
         )

@@ -16,7 +16,7 @@ from vegglue.figures.measured import (
     draw_verticals,
 )
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import count, fixed, plus_minus, short, unit_html, unit_math
+from vegglue.figures.typography import as_given, count, fixed, plus_minus, short, unit_html, unit_math
 from vegglue.inference.glue import member_weights
 from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
@@ -47,9 +47,7 @@ def residuals(run: Run) -> Iterator[Picture]:
         yield published_picture(run, figure, f"residuals-{kind.name}", caption, alt)
         score = residual / posterior.fit.noise[rows]
         worst = int(np.argmax(np.abs(score)))
-        names = [
-            f"{table['section'][row] or table['experiment'][row]}, {axis} = {table[axis][row]:g} m" for row in rows
-        ]
+        names = [f"{_station_group(table, int(row))}, {axis} = {as_given(table[axis][row])} m" for row in rows]
         caption = (
             f"Residuals of {kind.words} over the error assumed, σ = {short(posterior.fit.sigma[kind.name], 2)} {unit}: "
             f"the largest is {fixed(score[worst], 1)} at {html.escape(names[worst])}."
@@ -60,6 +58,12 @@ def residuals(run: Run) -> Iterator[Picture]:
         figure = draw_quantiles(score, names)
         alt = f"Ordered residuals of {kind.words} against normal quantiles."
         yield published_picture(run, figure, f"quantiles-{kind.name}", caption, alt)
+
+
+def _station_group(table: pd.DataFrame, row: int) -> str:
+    """Section of a station, and its experiment where there are several or it has no section."""
+    experiment, section = str(table["experiment"][row]), str(table["section"][row])
+    return f"{experiment} {section}".strip() if table["experiment"].nunique() > 1 else section or experiment
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, plus_minus, short
 from vegglue.in_short import telling_digits
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
 from vegglue.report_page.posterior_words import identification
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
@@ -174,7 +174,13 @@ def fit_rows(run: Run) -> list[FitRow]:
     stated = run.case.reference.table if run.case.reference else {}
     study = {key: as_given(value) for key, value in stated.items() if isinstance(value, float)}
     rows = [
-        FitRow("σ", f"residual, {kind.words}", short(value, 2), kind.unit, study.get("sigma", "–"))
+        FitRow(
+            "σ",
+            f"residual, {kind.words}",
+            short(value, 2),
+            kind.unit,
+            study.get("sigma", "–") if kind.name == STREAMWISE else "–",
+        )
         for kind, value in ((kind_of(name), value) for name, value in run.posterior.fit.sigma.items())
     ]
     return [*rows, FitRow("n", "stations used", str(run.posterior.fit.used), "", study.get("n", "–"))]
