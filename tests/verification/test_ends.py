@@ -77,7 +77,8 @@ def test_what_disturbs_water_that_flows_in_at_the_outlet_does_not_grow(kind):
 
 def test_an_eddy_may_reach_through_the_outlet():
     """Water enters through a third of the width, and some flows back in at the outlet, at up to 0.08 m/s."""
-    problem = make_problem(np.zeros((20, 12)), (0.5, 0.5), 2.0, 1.0, (bed_laws.CHEZY, 80.0), viscosity=np.full(1, 0.005))
+    smooth, mixing = (bed_laws.CHEZY, 80.0), np.full(1, 0.005)
+    problem = make_problem(np.zeros((20, 12)), (0.5, 0.5), 2.0, 1.0, smooth, viscosity=mixing)
     outlet = solved(changed(problem, inflows=(InflowSegment("west", 0, 4, np.full(1, 2.0)),)))[-1, ALONG, :, 0]
     assert outlet.min() == pytest.approx(-0.083, abs=0.005)
     assert outlet.max() == pytest.approx(0.993, abs=0.005)

@@ -17,7 +17,7 @@ from vegglue.importers.measured_rows import Taken
 PlaceKey = tuple[str, str, float, float]
 RepeatedValue = tuple[float, float]
 # Of what counts as one: begins as the key of a place, and may go on.
-Key = Any
+RepeatKey = Any
 # How much of a key names a place, its section and its experiment: the narrowest that has ENOUGH is asked.
 NARROW_TO_WIDE = (4, 2, 1)
 # Degrees of freedom nu of a scatter. chi^2 is nu / (nu - 2) times too large on average with it: 7 % with 30. The whole
@@ -26,7 +26,7 @@ ENOUGH, LEAST_OF_FILE = 30, 10
 Scatter = Mapping[tuple[object, ...], tuple[float, int]]
 
 
-def means_of_repeats(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
+def means_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
     """Mean of each place and its standard error: from those stated, else s / sqrt(n); 0 for unknown.
 
     s: root of sum (u - mean u)^2 / sum (n - 1), of the values without stated errors of the narrowest of place, section
@@ -38,7 +38,7 @@ def means_of_repeats(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> list[Re
     ]
 
 
-def said_of_repeats(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> str:
+def said_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
     """How many values were averaged, and where they are too few for a standard error that is missing."""
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
     repeats = sum(len(values) - 1 for values in gathered.values())
@@ -88,13 +88,13 @@ def _stated(values: Sequence[RepeatedValue]) -> bool:
     return all(np.isfinite(error) for _, error in values)
 
 
-def _error(place: Key, values: Sequence[RepeatedValue], scatter: Scatter) -> float:
+def _error(place: RepeatKey, values: Sequence[RepeatedValue], scatter: Scatter) -> float:
     if _stated(values):
         return sqrt(sum(error**2 for _, error in values)) / len(values)
     return sqrt(_variance(place, scatter) / len(values))
 
 
-def _variance(place: Key, scatter: Scatter) -> float:
+def _variance(place: RepeatKey, scatter: Scatter) -> float:
     """s^2 of one value at a place; 0 for unknown."""
     for width in NARROW_TO_WIDE:
         squares, freedom = scatter.get(place[:width], (0.0, 0))
@@ -104,7 +104,7 @@ def _variance(place: Key, scatter: Scatter) -> float:
     return squares / freedom if freedom >= LEAST_OF_FILE else 0.0
 
 
-def _scatter(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> Scatter:
+def _scatter(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> Scatter:
     """Sum of squares about the means of the places, and degrees of freedom, by the beginning of their keys."""
     found: dict[tuple[object, ...], tuple[float, int]] = {}
     for place, values in gathered.items():
@@ -115,5 +115,5 @@ def _scatter(gathered: Mapping[Key, Sequence[RepeatedValue]]) -> Scatter:
     return found
 
 
-def _groups_of(place: Key) -> Iterator[tuple[object, ...]]:
+def _groups_of(place: RepeatKey) -> Iterator[tuple[object, ...]]:
     return (place[:width] for width in (*NARROW_TO_WIDE, 0))
