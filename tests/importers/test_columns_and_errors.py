@@ -78,6 +78,27 @@ def test_a_point_measured_again_is_averaged_with_itself(tmp_path: Path) -> None:
     assert again["standard_error"].tolist() == pytest.approx([0.01])
 
 
+def test_heights_above_the_bed_are_those_of_points(tmp_path: Path) -> None:
+    """Of a probe on a stand, which knows no datum: two verticals on the floor, one on the bank."""
+    points = [f"8,{y},{height},{0.3 + 0.1 * height}" for y in (0, 1, 2) for height in (0.05, 0.15, 0.3)]
+    table = "\n".join(["x,y,Height above bed [m],u", *points])
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv=table), tmp_path / "brook.yaml")
+    found = read_observations(case)
+    assert found.points["height"].tolist() == pytest.approx([0.05, 0.15, 0.3] * 3)
+    assert found.points["used"].all()
+    bank = found.points[found.points["y"] == 2.0]
+    assert (bank["z"] - bank["height"] > found.points["z"].min()).all(), "the bed of the bank lies higher"
+
+
+def test_the_level_of_the_bed_is_no_height_of_a_point(tmp_path: Path) -> None:
+    """Readings of one place with the bed below each: repeats, and no vertical."""
+    table = "\n".join(["x,y,Bed level,u", *(f"8,{y},{bed},0.4" for y in (0, 1) for bed in (0.01, 0.03))])
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv=table), tmp_path / "brook.yaml")
+    assert read_observations(case).table["value"].tolist() == [0.4, 0.4]
+    assert case.imported is not None
+    assert "2 of velocity, 2 repeats averaged" in case.imported[0].taken
+
+
 def test_stated_errors_of_points_in_the_vertical_count(tmp_path: Path) -> None:
     """Neither the column nor the site file did: all had the error of a minute of usual turbulence."""
     errors = []

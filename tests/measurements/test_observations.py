@@ -160,7 +160,7 @@ def test_a_wrong_row_is_refused_by_file_and_row(tmp_path, line, sentence):
 def test_wrong_files_are_refused(tmp_path):
     row = "D3a,p,102,4.0,-3.6,0.3,0.1,100\n"
     with pytest.raises(InputError, match=r"row 1: expected the columns .* without z"):
-        read_observations(with_file(tmp_path, POINTS.replace("z", "height") + row))
+        read_observations(with_file(tmp_path, POINTS.replace("z", "altitude") + row))
     with pytest.raises(InputError, match="expected rows below the heading"):
         read_observations(with_file(tmp_path, POINTS))
     with pytest.raises(InputError, match=r"row 1: expected the columns .* got nothing, without case"):

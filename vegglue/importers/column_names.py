@@ -27,6 +27,8 @@ ROLES = {
                              "offset", "distance across", "lateral distance", "cross stream distance")),
         Role("z", "length", ("z", "elevation", "elev", "altitude", "hohe", "bed level", "z bed", "zb", "bed elevation",
                              "alt", "rl")),
+        Role("height", "length", ("height above bed", "height above the bed", "distance from bed", "distance above bed",
+                                  "elevation above bed", "z above bed", "above bed", "hab", "hohe uber sohle")),
         Role("u", "velocity", ("u", "vx", "ux", "u mean", "mean u", "umean", "velocity", "vel", "mean velocity",
                                "mean vel", "meanv", "velocity x", "vel x", "x velocity", "streamwise velocity",
                                "u velocity", "geschwindigkeit", "vitesse", "u depthavg", "u avg", "depth averaged u")),

@@ -11,10 +11,11 @@ from vegglue.importers.unit_words import UNITS, unit_named
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
+NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
 # Names that stand for a role where no other column has it: beside z of a point there may be the bed, and beside Vx the
 # magnitude of the velocity.
 LESS_SAID = {
-    "z": {"bed level", "z bed", "zb", "bed elevation"},
+    "z": NAMES_OF_BED,
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "geschwindigkeit", "vitesse"},
 }
 # What errors and scatters are of, and so in the unit of where they state none.

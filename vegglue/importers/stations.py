@@ -8,6 +8,8 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
+from vegglue.importers.column_names import known_name
+from vegglue.importers.columns_of_table import NAMES_OF_BED
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.known_experiments import KnownExperiments
@@ -62,7 +64,7 @@ def station_tables(
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
-        lacking = (*no_place, *_lacking(taken, ["u", "z"], np.all), *beside)
+        lacking = (*no_place, *_lacking(taken, ["u", str(_vertical_role(taken))], np.all), *beside)
         return StationTables([_points(taken, stem, words)], lacking)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
@@ -132,13 +134,22 @@ def _sections(x: Array) -> list[str]:
     return [names[number] for number in group]
 
 
+def _vertical_role(taken: Taken) -> str | None:
+    """What says how high each velocity was measured: above the bed there, else z; None where z is that of the bed."""
+    if "height" in taken.numbers:
+        return "height"
+    known = known_name(taken.columns.get("z", ""))
+    return "z" if "z" in taken.numbers and (known is None or known[0] not in NAMES_OF_BED) else None
+
+
 def _in_verticals(taken: Taken) -> bool:
     """Whether VERTICALS of the places have velocities at several heights: shallow ones are often measured at one."""
-    if not {"z", "u"} <= taken.numbers.keys():
+    role = _vertical_role(taken)
+    if role is None or "u" not in taken.numbers:
         return False
-    there = np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"])
+    there = np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[role])
     heights: dict[PlaceKey, set[float]] = {}
-    for place, z, kept in zip(_places(taken), np.round(taken.numbers["z"], 2).tolist(), there, strict=True):
+    for place, z, kept in zip(_places(taken), np.round(taken.numbers[role], 2).tolist(), there, strict=True):
         if kept:
             heights.setdefault(place, set()).add(z)
     several = sum(len(some) > 1 for some in heights.values())
@@ -160,7 +171,8 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
         for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
     ]
     devices = kept.words.get("device", ["ADV"] * kept.size)
-    places = [kept.numbers[role] for role in ("x", "y", "z")]
+    upward = str(_vertical_role(kept))
+    places = [kept.numbers[role] for role in ("x", "y", upward)]
     columns = [
         *(map(_place, one) for one in places),
         *(map(_value, one) for one in (kept.numbers["u"], *optional.values())),
@@ -174,7 +186,7 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     observations = tuple(
         _section_observation(f"{stem}.csv", name, words, name in across) for name in dict.fromkeys(names)
     )
-    heading = ("case", "device", "x", "y", "z", "u", *optional)
+    heading = ("case", "device", "x", "y", upward, "u", *optional)
     return StationTable(
         f"{stem}.csv",
         heading,
@@ -186,14 +198,15 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
 
 def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
     """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
-    kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers["z"]))
+    upward = str(_vertical_role(taken))
+    kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
     sections = list(zip(kept.words["experiment"], kept.words["section"], strict=True))
     x = kept.numbers["x"].copy()
     for one in set(sections):
         here = np.array([section == one for section in sections])
         x[here] = np.median(x[here])
     kept = kept.having({"x": x})
-    z = np.round(kept.numbers["z"] / ONE_PLACE).tolist()
+    z = np.round(kept.numbers[upward] / ONE_PLACE).tolist()
     heights = [(*place, height) for place, height in zip(_places(kept), z, strict=True)]
     return without_repeats(kept, heights, errors_of_rows(kept, KINDS[STREAMWISE], words))
 

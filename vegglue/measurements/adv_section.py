@@ -10,7 +10,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
+from vegglue.measurements.csv_table import columns_of, read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.measurements.section_discharge import (
@@ -87,15 +87,17 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 
 
 def _read_points(observation: Observation) -> pd.DataFrame:
-    """Rows of the observed case, upwards in each vertical, in the coordinates of the grid."""
+    """Rows of the observed case, upwards in each vertical, in the coordinates of the grid; with z, else with height."""
     path, wanted = observation.file, observation.case
+    there = columns_of(path)
+    upward = "height" if "height" in there and "z" not in there else "z"
     optional = ("v", "w", "u_se", "u_std", "duration_s")
-    rows = read_table(path, ("case", "device"), ("x", "y", "z", "u"), optional, gaps=("v", "w"))
+    rows = read_table(path, ("case", "device"), ("x", "y", upward, "u"), optional, gaps=("v", "w"))
     if "u_se" in rows:
         refuse_rows(path, rows["u_se"] < 0.0, "expected u_se of at least 0, which is unknown; mend or remove the row")
     for column in {"u_std", "duration_s"} & set(rows.columns):
         refuse_rows(path, rows[column] <= 0.0, f"expected {column} above 0; mend or remove the row")
-    refuse_repeated(path, rows, ("case", "x", "y", "z"))
+    refuse_repeated(path, rows, ("case", "x", "y", upward))
     chosen = rows[rows["case"] == wanted]
     if chosen.empty:
         raise InputError(
@@ -104,7 +106,7 @@ def _read_points(observation: Observation) -> pd.DataFrame:
         )
     refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
     moved = chosen.assign(x=chosen["x"] + observation.offset.x, y=chosen["y"] + observation.offset.y)
-    return moved.drop(columns="case").sort_values(["y", "z"]).reset_index(drop=True)
+    return moved.drop(columns="case").sort_values(["y", upward]).reset_index(drop=True)
 
 
 def _across(case: Case) -> Array:
@@ -199,9 +201,13 @@ def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> N
 
 
 def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface: float) -> pd.DataFrame:
-    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water."""
+    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water.
+
+    Of heights above the bed below each point, z is that of the bed of the case and the height.
+    """
     x, y = points["x"].iloc[0], points["y"].to_numpy()
     bed = _bed(case, observation, x, y)
+    points = points if "z" in points else points.assign(z=bed + points["height"])
     reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
     if (reason != "").all():
         raise InputError(

@@ -50,6 +50,11 @@ def read_table(
     )
 
 
+def columns_of(path: Path) -> list[str]:
+    """The headings of a CSV. Errors: as `read_table`."""
+    return list(_raw_table(path).columns)
+
+
 def _raw_table(path: Path) -> pd.DataFrame:
     """All columns as text, their names without spaces around them; what a short row lacks is empty.
 
