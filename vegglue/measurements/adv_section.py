@@ -10,7 +10,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.csv_table import columns_of, read_table, refuse_repeated, refuse_rows
+from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.measurements.section_discharge import (
@@ -89,7 +89,7 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 def _read_points(observation: Observation) -> pd.DataFrame:
     """Rows of the observed case, upwards in each vertical, in the coordinates of the grid; with z, else with height."""
     path, wanted = observation.file, observation.case
-    there = columns_of(path)
+    there = headings_of(path)
     upward = "height" if "height" in there and "z" not in there else "z"
     optional = ("v", "w", "u_se", "u_std", "duration_s")
     rows = read_table(path, ("case", "device"), ("x", "y", upward, "u"), optional, gaps=("v", "w"))

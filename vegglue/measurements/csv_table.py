@@ -50,7 +50,7 @@ def read_table(
     )
 
 
-def columns_of(path: Path) -> list[str]:
+def headings_of(path: Path) -> list[str]:
     """The headings of a CSV. Errors: as `read_table`."""
     return list(_raw_table(path).columns)
 
