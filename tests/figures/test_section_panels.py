@@ -9,9 +9,10 @@ import pytest
 
 from vegglue.figures.error_rows import draw_error_rows
 from vegglue.figures.field_map import first_crossing
+from vegglue.figures.interval_rows import DrawnInterval, draw_interval_rows
 from vegglue.figures.section_panels import PanelGround, SectionPanel, draw_panel, value_range
 from vegglue.figures.style import COLOUR
-from vegglue.figures.svg_text import area_between, line_through, round_ticks, svg_words, tick_labels
+from vegglue.figures.svg_text import area_between, line_through, round_ticks, svg_words, tick_labels, within_width
 
 SVG = "{http://www.w3.org/2000/svg}"
 GROUND = PanelGround(np.arange(-3.0, 3.5, 0.5), np.abs(np.arange(-3.0, 3.5, 0.5)), np.arange(13) > 6)
@@ -103,6 +104,28 @@ def test_lines_break_where_nothing_is_known() -> None:
 )
 def test_ticks_are_round(low: float, high: float, expected: str) -> None:
     assert " ".join(tick_labels(round_ticks(low, high, 5))) == expected
+
+
+def test_words_too_long_for_a_picture_lose_their_middle() -> None:
+    assert within_width("D3, x = 42 m", 186.0, 11.5) == "D3, x = 42 m"
+    long = draw_panel(replace(PANEL, title=f"{'below the bridge ' * 4}, x = 42 m"), (0.0, 1.0), "u [m/s]").svg
+    title = next(text.text or "" for text in parsed(long).iter(f"{SVG}text") if text.get("font-weight") == "bold")
+    assert len(title) <= 28
+    assert title.startswith("below the")
+    assert title.endswith("x = 42 m")
+    words = f"{'a-long-name-' * 6}, worth 90 of 5,000 members"
+    drawn = draw_interval_rows({words: DrawnInterval(1.0, 2.0, 3.0)}, False, "k")
+    assert max(len(text.text or "") for text in parsed(drawn).iter(f"{SVG}text")) * 7.54 <= 460.0
+    assert "worth 90 of 5,000 members" in drawn
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+@pytest.mark.parametrize("row", [DrawnInterval(102.34, 102.36, 102.39), DrawnInterval(0.03, 0.03, 0.03)])
+def test_numbers_of_an_axis_differ(row: DrawnInterval, logarithmic: bool) -> None:
+    svg = draw_interval_rows({"run": row}, logarithmic, "k")
+    _, *numbers = [text.text or "" for text in parsed(svg).iter(f"{SVG}text") if text.text != "k"]
+    assert len(numbers) == len(set(numbers)) >= 2
+    assert max(map(len, numbers)) <= 7, "no ten digits for one value alone"
 
 
 def test_words_of_users_are_no_markup() -> None:

@@ -18,6 +18,7 @@ from vegglue.figures.svg_text import (
     svg_element,
     svg_words,
     tick_labels,
+    within_width,
 )
 
 # The picture [px], legible on a telephone of 360 px; the height of a row, of its words in it, and of the foot.
@@ -25,6 +26,8 @@ INTERVALS_WIDTH, INTERVALS_LETTERS, ROW, WORDS, FOOT = 460.0, 13.0, 40.0, 18.0, 
 START, END = 12.0, 440.0
 # Share of the range that stays free beyond its ends.
 FREE_BEYOND = 0.06
+# Range of an axis with one value, over that value: enough for round numbers on both sides of it.
+ALONE = 0.1
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,9 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
     """SVG text. rows: intervals of one unit by what they are of; logarithmic: equal ratios are equally long."""
     known = np.array([value for row in rows.values() for value in (row.low, row.centre, row.high)])
     ends = np.log10([known.min(), known.max()]) if logarithmic else np.array([known.min(), known.max()])
-    spread = max(float(ends[1] - ends[0]), 1e-6 * max(abs(float(ends[1])), 1e-6))
+    spread = float(ends[1] - ends[0])
+    if spread <= 1e-6 * abs(float(ends[1])):  # one value alone
+        spread = ALONE * abs(float(ends[1])) or ALONE
     low, high = float(ends[0]) - FREE_BEYOND * spread, float(ends[1]) + FREE_BEYOND * spread
     place = linear_scale(low, high, START, END)
 
@@ -50,7 +55,9 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
 
     foot = ROW * len(rows) + 6.0
     ticks = _powers(low, high) if logarithmic else round_ticks(low, high, 6)
-    labels = [f"{tick:.4g}" for tick in ticks] if logarithmic else tick_labels(ticks)
+    labels = [f"{tick:.4g}" for tick in ticks]
+    if not logarithmic or len(set(labels)) < len(labels):
+        labels = tick_labels(ticks)
     parts = axis_below(scale, ticks, labels, foot, INTERVALS_WIDTH, "")
     for number, (words, row) in enumerate(rows.items()):
         parts += _row(scale, words, row, ROW * number + WORDS)
@@ -69,7 +76,8 @@ def _powers(low: float, high: float) -> list[float]:
 def _row(scale: Scale, words: str, row: DrawnInterval, height: float) -> list[str]:
     """Words above a line from low to high with its centre: a dot of ours, a diamond of others."""
     colour = "measured" if row.others else "model"
-    parts = [svg_words(0.0, height - 4, words, "muted" if row.others else "ink")]
+    shown = within_width(words, INTERVALS_WIDTH, INTERVALS_LETTERS)
+    parts = [svg_words(0.0, height - 4, shown, "muted" if row.others else "ink")]
     centre, level = float(scale(row.centre)), height + 9.0
     if row.high > row.low:
         line = f"M{float(scale(row.low)):.1f},{level:g}H{float(scale(row.high)):.1f}"

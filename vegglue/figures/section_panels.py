@@ -22,12 +22,14 @@ from vegglue.figures.svg_text import (
     svg_element,
     svg_words,
     tick_labels,
+    within_width,
 )
 
 # A panel [px]: four of them stand side by side on a screen of 1,200; letters of the size of the captions.
 PANEL_WIDTH, PANEL_HEIGHT, PANEL_LETTERS, NOTE_LETTERS = 240.0, 222.0, 11.5, 9.0
 PANEL_LEFT, PANEL_RIGHT, PANEL_TOP, PANEL_LOWEST, PANEL_BED_TOP, PANEL_BED_FOOT = 28.0, 236.0, 24.0, 154.0, 160.0, 190.0
 PANEL_TICKS = 5
+PANEL_TITLE = 186.0  # room of the title [px], beside the unit
 FAINT_LINE: dict[str, Any] = {"stroke_width": 0.9, "stroke_dasharray": "2 2.5"}
 AXIS_CLEAR = 18.0  # of the name of the axis [px]
 LARGE_DOT, SMALL_DOT = 3.6, 2.6
@@ -100,7 +102,7 @@ def draw_panel(panel: SectionPanel, values: tuple[float, float], unit: str, note
         *_lines(panel, across, down),
         *_points(panel, across, down),
         _cursor(),
-        svg_words(0.0, 13.0, panel.title, font_weight="bold"),
+        svg_words(0.0, 13.0, within_width(panel.title, PANEL_TITLE, PANEL_LETTERS), font_weight="bold"),
         svg_words(PANEL_RIGHT, PANEL_HEIGHT - 3, note, "muted", font_size=NOTE_LETTERS, text_anchor="end"),
     ]
     places = {"measured": down(panel.measured), "after": down(panel.after)}

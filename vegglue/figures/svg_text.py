@@ -17,6 +17,8 @@ from vegglue.figures.typography import decimals, fixed
 Scale = Callable[[Any], Array]  # values to places [px]
 # A number this near to the left edge [px] begins there instead of standing amid its stroke.
 CLOSE_TO_THE_EDGE = 10.0
+# Width of a letter over its size [-]: the mean of names and numbers in bold Helvetica, so that plain ones have room.
+LETTER_WIDTH = 0.58
 # Fewer numbers on an axis tell no scale.
 FEWEST_TICKS = 2
 FACE = "system-ui, 'Liberation Sans', Helvetica, Arial, sans-serif"
@@ -34,6 +36,17 @@ def svg_element(tag: str, content: str = "", **attributes: object) -> str:
 def svg_words(x: float, y: float, text: str, colour: str = "ink", **attributes: object) -> str:
     """Words at a place [px], in a colour of the palette."""
     return svg_element("text", html.escape(text), x=x, y=y, fill=COLOUR[colour], **attributes)
+
+
+def within_width(words: str, width: float, size: float) -> str:
+    """Words that fit in a width [px] in letters of a size [px]: without their middle where they are too long, as names
+    differ at their ends.
+    """
+    most = int(width / (LETTER_WIDTH * size))
+    if len(words) <= most:
+        return words
+    half = (most - 1) // 2
+    return f"{words[:half].rstrip()}…{words[len(words) - half :].lstrip()}"
 
 
 def svg_document(width: float, height: float, content: Iterable[str], title: str, size: float) -> str:
