@@ -18,6 +18,8 @@ from vegglue.inference.weighted_statistics import effective_size, weighted_quant
 
 # Points of a drawn density: its curve looks smooth at the width of a column.
 DENSITY_POINTS = 240
+# Width of the kernel of a density over the range drawn, at least [-]: a quarter of a pixel.
+NARROWEST = 1e-3
 # Members drawn for the prior, at most: the start of a Sobol' sequence is as even as the whole.
 PRIOR_MEMBERS = 1024
 # Members drawn for the posterior, at most: more discs cover each other, and the page grows.
@@ -68,16 +70,20 @@ def density(values: Array, weights: Array, low: float, high: float, bounds: tupl
     """p(x) = sum_k w_k [N(x; x_k, b) + sum_c N(x; 2 c - x_k, b)] from low to high, b = 0.9 s n^(-1/5) (Silverman).
 
     Mirrored at the finite ones of the bounds c, so that no mass leaks out; n is the effective number of members, s the
-    lesser of standard deviation and quartile distance / 1.34. Returns grid and density (DENSITY_POINTS,).
+    lesser of standard deviation and quartile distance / 1.34. Returns grid and density (2 DENSITY_POINTS,), half of its
+    points where the values are: even ones alone draw a narrow density as wide as they stand apart.
     """
     share = weights / weights.sum()
     quartile = weighted_quantile(values, weights, [0.25, 0.75])
     sd = np.sqrt(share @ (values - share @ values) ** 2)
     spread = min(sd, float(np.ptp(quartile)) / 1.34) or sd
-    width = max(0.9 * spread * effective_size(weights) ** -0.2, (high - low) / 200)
-    grid = np.linspace(low, high, DENSITY_POINTS)
+    width = max(0.9 * spread * effective_size(weights) ** -0.2, NARROWEST * (high - low))
+    near = weighted_quantile(values, weights, [0.005, 0.995]) + 4.0 * width * np.array([-1.0, 1.0])
+    start, end = np.clip(near, low, high)
+    fine = np.linspace(start, end, DENSITY_POINTS)
+    grid = np.sort(np.concatenate([np.linspace(low, high, DENSITY_POINTS), fine]))
     kept = share > 1e-8
-    total = np.zeros(DENSITY_POINTS)
+    total = np.zeros(grid.size)
     for mirrored in (values[kept], *(2 * bound - values[kept] for bound in bounds if np.isfinite(bound))):
         total += np.exp(-0.5 * ((grid[:, None] - mirrored) / width) ** 2) @ share[kept]
     return grid, total / (width * np.sqrt(2 * np.pi))
@@ -92,11 +98,9 @@ def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequenc
     bounds = float(parameter.coordinate(parameter.bounds[0])), float(parameter.coordinate(parameter.bounds[1]))
     grid, posterior = density(values, weights, low, high, bounds)
     quantiles = weighted_quantile(values, weights, [0.025, 0.25, 0.5, 0.75, 0.975])
-    prior = (
-        density(prior_values, np.ones(len(prior_values)), low, high, bounds)[1]
-        if prior_values.size
-        else np.zeros(DENSITY_POINTS)
-    )
+    prior = np.zeros(grid.size)
+    if prior_values.size:
+        prior = np.interp(grid, *density(prior_values, np.ones(len(prior_values)), low, high, bounds))
     axes.fill_between(grid, prior, color=COLOUR["prior"], linewidth=0)
     for (left, right), colour in ((quantiles[[0, 4]], "wide"), (quantiles[[1, 3]], "narrow")):
         inside = np.linspace(left, right, DENSITY_POINTS)
@@ -117,12 +121,14 @@ def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequenc
 
 def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> None:
     at = int(np.argmax(posterior))
-    right = at < DENSITY_POINTS / 2
+    left, reach = float(grid[0]), float(np.ptp(grid))
+    right = grid[at] < left + 0.5 * reach
     side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
     label(axes, grid[at], posterior[at], "posterior", "model", **side)
     if not prior.any():
         return
-    gap = int(np.argmax(np.where((grid > grid[12]) & (grid < grid[-40]), prior - posterior, -np.inf)))
+    room = (grid > left + 0.05 * reach) & (grid < left + 0.83 * reach)  # for the word, which begins there
+    gap = int(np.argmax(np.where(room, prior - posterior, -np.inf)))
     label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
 
 
