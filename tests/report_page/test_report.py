@@ -12,6 +12,7 @@ from diagnoses import NOTHING, a_diagnosis
 from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
+from vegglue.measurements.observations import SET_ASIDE
 from vegglue.report_page.findings import findings
 from vegglue.report_page.run import Run, file_name, is_synthetic, station_zones
 from vegglue.report_page.section_pictures import section_panels
@@ -121,6 +122,16 @@ def test_the_flagged_station_is_shown_with_its_reason(d3a: tuple[Run, str]) -> N
     table = d3a[0].observations.table
     reason = table.loc[~table["used"], "reason"].iloc[0]
     assert f"y = 6.40 m: {reason}" in d3a[1]
+
+
+def test_a_station_that_does_not_count_is_found_by_its_place(tmp_path: Path) -> None:
+    toy = a_toy(tmp_path)
+    table = toy.observations.table.copy()
+    table.loc[9, ["used", "reason"]] = [False, SET_ASIDE]  # a gauge of the first experiment
+    text = written(replace(toy, observations=replace(toy.observations, table=table)))
+    assert "2 of 22 stations do not count" in text
+    assert f"<li>with, x = 5.0 m, y = 5.00 m: {SET_ASIDE}.</li>" in text
+    assert "quality control" not in text, "the diagnosis is none"
 
 
 def test_failed_members_are_counted_with_their_reasons(d3a: tuple[Run, str]) -> None:
