@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import scipy.stats
 
+from vegglue.calibration.fit import chance_of_misfit
 from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likelihoods, share_inside
+from vegglue.inference.refinement_summary import freedom_of_misfit
 from vegglue.inference.weighted_statistics import pareto_smoothed
 
 STATIONS, DRAWS = 30, 6000
@@ -92,6 +94,18 @@ def test_draws_that_weigh_next_to_nothing_raise_no_warning(linear: tuple[np.ndar
     half = draws[1::2]
     plain = leave_one_out(measured - half @ design.T, np.linalg.inv(covariance), np.full(DRAWS // 2, 2 / DRAWS))
     assert found.score == pytest.approx(plain.score, abs=0.02)
+
+
+def test_parameters_that_the_data_leave_open_cost_no_degree_of_freedom() -> None:
+    random = np.random.default_rng(3)
+    slope = random.normal(size=(12, 5)) * [20.0, 20.0, 0.05, 0.05, 0.05]  # three of five are left at their priors
+    spread = np.linalg.inv(slope.T @ slope + np.eye(5))
+    values = (slope @ random.normal(size=(5, 4000))) + random.normal(size=(12, 4000))
+    chi2 = np.sum((values - slope @ spread @ slope.T @ values) ** 2, axis=0)
+    freedom = freedom_of_misfit(12, spread)
+    assert freedom == 10
+    alarms = np.mean([chance_of_misfit(float(one), freedom) < 0.05 for one in chi2])
+    assert alarms == pytest.approx(0.05, abs=0.012)  # 0.17 of 12 - 5
 
 
 def test_independent_errors_give_the_plain_likelihood() -> None:
