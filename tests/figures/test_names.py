@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from drawings import texts
 from matplotlib.figure import Figure
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from vegglue.figures.measured import draw_quantiles, draw_residuals
 from vegglue.figures.posterior import DrawnParameter, draw_cylinder, draw_joint
 from vegglue.figures.style import canvas, formula_labels, save, styled
+from vegglue.figures.suspects import draw_fingerprint
 from vegglue.figures.typography import symbol_math, unit_math
 
 NASTY = (
@@ -36,6 +38,13 @@ def test_a_section_of_any_signs_is_written_as_it_is(name: str) -> None:
     assert name in texts(drawn(draw_quantiles(np.array([-1.0, 0.0, 1.0]), [name] * 3)).axes[0])
     residuals = draw_residuals(np.arange(3.0), "x", np.arange(3.0), [name] * 3, unit_math("m/s"))
     assert name in texts(drawn(residuals).axes[0])
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_the_size_of_an_effect_is_written_as_it_is(name: str) -> None:
+    station = pd.DataFrame({"experiment": "E", "kind": "velocity", "section": "S", "x": 1.0, "y": np.arange(3.0)})
+    figure = drawn(draw_fingerprint(np.arange(3.0), station, f"2 {name}"))
+    assert figure.get_suptitle() == f"by 2 {name}"
 
 
 @styled

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, canvas, formula_labels, label, styled
-from vegglue.figures.typography import fixed, no_formula, unit_math
+from vegglue.figures.typography import fixed, unit_math
 from vegglue.measurements.kinds import KINDS, Kind
 from vegglue.measurements.sections import section_in_words
 from vegglue.screening.score_test import ALIKE, alike_groups
@@ -157,7 +157,7 @@ def draw_fingerprint(trace: Array, station: pd.DataFrame, size: str) -> Figure:
         Line2D([], [], linestyle=line, color=COLOUR["model"], label=experiment) for experiment, line in lines.items()
     ]
     figure.legend(handles=handles, loc="outside upper left", ncols=4, frameon=False, fontsize=SMALL + 0.5)
-    figure.suptitle(no_formula(f"by {size}"), x=0.995, ha="right", fontsize=SMALL + 0.5, color=COLOUR["muted"])
+    figure.suptitle(f"by {size}", x=0.995, ha="right", fontsize=SMALL + 0.5, color=COLOUR["muted"])
     return figure
 
 
