@@ -271,7 +271,7 @@ def test_nothing_to_weigh_is_told() -> None:
         infer(stations(measured()).assign(used=False))
     with pytest.raises(InputError, match="none of the 16 members"):
         infer(stations(measured()), members=16, failed=tuple(range(16)))
-    with pytest.raises(InputError, match="all measured values are equal"):
+    with pytest.raises(InputError, match="all measured values of a kind are equal, as a single one is"):
         infer(stations(np.full(5, 0.3)), likelihood="nse")
 
 

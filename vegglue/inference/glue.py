@@ -83,7 +83,10 @@ def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:
     Errors: InputError when no member has weight.
     """
     if (likelihood != "gaussian" or threshold > -np.inf) and np.isnan(fit.efficiency[fit.best]):
-        raise InputError("observations: no efficiency is defined where all measured values are equal; use gaussian.")
+        raise InputError(
+            "observations: no efficiency is defined where all measured values of a kind are equal, as a single one is; "
+            "use gaussian."
+        )
     kept = fit.solved & ((threshold == -np.inf) | (fit.efficiency >= threshold))
     weights = np.zeros(len(kept))
     if likelihood == "gaussian":
