@@ -14,7 +14,7 @@ from vegglue.report_page.findings import findings
 from vegglue.report_page.homogeneity_words import homogeneity_in_words
 from vegglue.report_page.key_numbers import estimate, key_numbers, verdict_of
 from vegglue.report_page.measured_pictures import residuals
-from vegglue.report_page.posterior_words import parameter_in_words
+from vegglue.report_page.posterior_words import parameter_in_words, weights_in_words
 from vegglue.report_page.prior_words import off_its_prior
 from vegglue.report_page.run import Run
 from vegglue.report_page.tables import fit_rows, parameter_rows
@@ -161,6 +161,11 @@ def test_an_experiment_without_a_fit_of_its_own_is_said_to_have_none() -> None:
     )  # fmt: skip
     said = " ".join(homogeneity_in_words(changed(a_posterior(False), theta={"n_b": one}), found, {}))
     assert "15 together and not found alone over 15 stations (July)" in said
+
+
+def test_a_tail_that_nobody_knows_has_no_index() -> None:
+    said = weights_in_words(changed(a_posterior(False), pareto_k=float("nan")))[0]
+    assert said.endswith("too few stand out to tell the index k-hat of their tail.")
 
 
 def test_doubts_come_first(d3a: tuple[Run, str]) -> None:

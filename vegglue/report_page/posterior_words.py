@@ -70,11 +70,12 @@ def weights_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> l
     """How many equal members the weights are worth, and a warning where that is too few for a posterior."""
     weighting = posterior.weighting
     size = notation.number(weighting.effective_size, 3)
-    sentences = [
-        f"The weights are worth {size} equal members; the largest weight is "
-        f"{notation.number(weighting.largest_weight, 2)}, the index of their tail k-hat "
-        f"{notation.number(weighting.pareto_k, 2)} (to be trusted below {TRUSTED_K_HAT})."
-    ]
+    tail = "too few stand out to tell the index k-hat of their tail"
+    if math.isfinite(weighting.pareto_k):
+        k_hat = notation.number(weighting.pareto_k, 2)
+        tail = f"the index of their tail k-hat {k_hat} (to be trusted below {TRUSTED_K_HAT})"
+    largest = notation.number(weighting.largest_weight, 2)
+    sentences = [f"The weights are worth {size} equal members; the largest weight is {largest}, {tail}."]
     if not posterior.claimed:
         remedy = "refine around the best members (`infer --method refine`)"
         if posterior.refinement is not None:
