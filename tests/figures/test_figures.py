@@ -189,6 +189,15 @@ def test_joint_draws_area_in_proportion_to_weight() -> None:
     assert sizes[0] == pytest.approx(2 * sizes[1])
 
 
+def test_a_long_name_stays_on_the_sheet() -> None:
+    place = replace(
+        unknown(np.linspace(0.1, 1.0, 20), 0.0, 2.0), symbol="unlisted_object_x33_75_y_0_68_drag", unit="1/m"
+    )
+    figure = draw_joint(place, place, np.ones(20) / 20, [])
+    assert off_the_sheet(figure) == []
+    assert figure.axes[0].get_ylabel().replace("\n", "") == "unlisted_object_x33_75_y_0_68_drag [1/m]"
+
+
 def test_joint_of_many_draws_shows_some_of_them() -> None:
     values = np.linspace(1.0, 4.0, 3000)
     figure = draw_joint(unknown(values, 0, 5), unknown(values, 0, 5), np.ones(3000), [])

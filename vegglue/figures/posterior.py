@@ -1,5 +1,6 @@
 """Figures of parameters: marginal and joint posteriors, plant drag beside its rigid-cylinder estimate, weights."""
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.figures.style import COLOUR, HEIGHT, WIDTH, canvas, formula_labels, label, styled
 from vegglue.figures.svg_text import FEWEST_TICKS, round_ticks
-from vegglue.figures.typography import symbol_math, unit_math
+from vegglue.figures.typography import no_formula, symbol_math, unit_math
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 
 # Points of a drawn density: its curve looks smooth at the width of a column.
@@ -24,6 +25,8 @@ NARROWEST = 1e-3
 PRIOR_MEMBERS = 1024
 # Members drawn for the posterior, at most: more discs cover each other, and the page grows.
 POSTERIOR_MEMBERS = 400
+# Letters of a name along an axis in one line: with its unit more of them run off the picture.
+LONGEST_LINE = 26
 # Three to a row of the page [inch].
 NARROW_WIDTH = 3.4
 
@@ -48,7 +51,11 @@ class DrawnParameter:
 
     @property
     def title(self) -> str:
-        return f"{symbol_math(self.symbol)} [{unit_math(self.unit)}]"
+        written = symbol_math(self.symbol)
+        if len(self.symbol) > LONGEST_LINE and written == no_formula(self.symbol):
+            lines = textwrap.wrap(written.replace("_", "_ "), LONGEST_LINE)
+            written = "\n".join(line.replace("_ ", "_") for line in lines)
+        return f"{written} [{unit_math(self.unit)}]"
 
     def coordinate(self, value: Array | float) -> Array:
         """Where a value is drawn: itself, or its common logarithm."""
