@@ -112,11 +112,12 @@ def _beside_y(bend, i, j, per_x):
 
 
 @compiled
-def _neighbours_of_u(far, near, east, f, u, carrier, flux, cell):
+def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     """u [m/s] two faces and one west of face f and one east of it, (ny, m) each; where a side is nearer, into
     what is given.
 
-    On the west side the depth is not known, so that the first cell counts by the velocity in its middle.
+    On the west side the depth is not known, so that the first cell counts by the velocity in its middle: by its flux
+    over its depth, at least half of that of its face.
     """
     nx, rows, m = cell.shape
     if f == nx:
@@ -124,7 +125,9 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, cell):
     if f == 1:
         for j in range(rows):
             for k in range(m):
-                near[j, k] = (flux[0, j, k] + flux[1, j, k]) / cell[0, j, k] - u[1, j, k]
+                # At a waterline no water is as fast as the flux over the depth of a cell far thinner than its face.
+                thick = max(cell[0, j, k], 0.5 * face[1, j, k])
+                near[j, k] = (flux[0, j, k] + flux[1, j, k]) / thick - u[1, j, k]
     west = u[f - 1] if f > 1 else near
     if f <= 2:
         _straight_on(far, west, u[f])
@@ -163,7 +166,7 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
         a, b, f2 = f - 1, min(f, nx - 1), min(f + 1, nx)
         west, east, before, behind = east, west, behind, before
         _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
-        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, cell)
+        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, face_x, cell)
         _strain_along(behind, f, u, v, viscosity, cell, per_x, bend)
         _carrier(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
         _shear(shear, f, u, v, viscosity, corner, per_x, per_y, bend)
