@@ -178,10 +178,9 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
     of these chances, 0 unless some correlation is likelier than none.
     """
     deviance, neighbours = _deviance_of(noise, residual, systematic), _has_neighbours(noise)
-    fit = partial(_likeliest, deviance)
-    without, correlations = [0.0], START_CORRELATIONS if neighbours else [0.0]
-    tasks = [(correlations, False), (correlations, True), (without, False), (without, True)]
-    stated, free, stated_without, free_without = in_threads(fit, tasks)
+    correlations = [[0.0], START_CORRELATIONS] if neighbours else [[0.0]]
+    fits = in_threads(partial(_likeliest, deviance), itertools.product(correlations, [False, True]))
+    (stated_without, free_without), (stated, free) = fits[:2], fits[-2:]
     rejected = stated.deviance - free.deviance > SCALE_EVIDENCE and free.scale > 1.0
     scale = free.scale if rejected else 1.0
     if not neighbours:
@@ -195,10 +194,9 @@ def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
 
 @dataclass(frozen=True)
 class _Likeliest:
-    """The maximum of the likelihood: -2 ln L up to a constant, rho, s and ln t there."""
+    """The maximum of the likelihood: -2 ln L up to a constant, s and ln t there."""
 
     deviance: float
-    correlation: float
     scale: float
     log_size: float
 
@@ -222,7 +220,8 @@ def _likeliest(
     end = scipy.optimize.minimize(
         lambda x: deviance(*unfold(x)), np.array(begin), method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.02}
     )
-    return _Likeliest(float(end.fun), *unfold(end.x))
+    _, scale, log_size = unfold(end.x)
+    return _Likeliest(float(end.fun), scale, log_size)
 
 
 def _has_neighbours(noise: Noise) -> bool:
