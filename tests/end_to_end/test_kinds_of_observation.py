@@ -152,6 +152,10 @@ def test_a_diagnosis_tells_zones_of_each_kind_apart(line: Line) -> None:
     save_diagnosis_figure(line.diagnosis, line.case, line.folder / "diagnosis.png")
 
 
+def test_both_commands_count_the_same_degrees_of_freedom(line: Line) -> None:
+    assert line.diagnosis.misfit.freedom == line.posterior.refinement.misfit.freedom
+
+
 def test_models_are_compared_and_measurements_planned(line: Line) -> None:
     base = baseline(model_of(line.case, line.observations))
     found = rung(base)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from vegglue.calibration.fit import chance_of_misfit
+from vegglue.calibration.fit import chance_of_misfit, freedom_of_misfit
 from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likelihoods, share_inside
-from vegglue.inference.refinement_summary import freedom_of_misfit
 from vegglue.inference.weighted_statistics import pareto_smoothed
 
 STATIONS, DRAWS = 30, 6000

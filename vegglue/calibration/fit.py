@@ -83,6 +83,21 @@ def chance_of_misfit(misfit: float, freedom: int) -> float:
     return float(scipy.stats.chi2.sf(misfit, max(freedom, 1)))
 
 
+def determined(spread: Array) -> float:
+    """p - tr V [-]: effective number of parameters, those that the data determine and not the prior; V (p, p) the
+    covariance of z.
+    """
+    return float(spread.shape[0] - np.trace(spread))
+
+
+def freedom_of_misfit(readings: int, spread: Array) -> int:
+    """n - (p - tr V), to a whole number: the mean of chi2 at the best fit of n readings, V (p, p) the covariance of z.
+
+    A parameter that the data leave at its prior takes no residual away, and costs no degree of freedom.
+    """
+    return round(readings - determined(spread))
+
+
 def objective(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 + |z|^2 [-]."""
     return chi2(noise, point) + float(point.z @ point.z)

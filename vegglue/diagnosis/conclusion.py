@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, log_evidence
-from vegglue.calibration.fit import chance_of_misfit, chi2, interval95
+from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
@@ -106,7 +106,8 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
 def _misfit(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    freedom = after.noise.rows.size - after.fitted.point.z.size - int(np.linalg.matrix_rank(after.noise.unknown))
+    readings = after.noise.rows.size - int(np.linalg.matrix_rank(after.noise.unknown))
+    freedom = freedom_of_misfit(readings, after.fitted.covariance)
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
         chi2=misfit,

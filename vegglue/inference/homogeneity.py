@@ -20,7 +20,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MapEstimate, covariance, fit, squared_misfit
+from vegglue.calibration.fit import MapEstimate, covariance, determined, fit, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of, with_correlation
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
@@ -109,11 +109,6 @@ def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> floa
     if math.isinf(free):
         return float(scipy.stats.chi2.sf(chi2, freedom))
     return float(scipy.stats.f.sf(chi2 / freedom, freedom, free))
-
-
-def determined(spread: Array) -> float:
-    """p - tr(covariance of z) [-]: effective number of parameters, those that the data determine and not the prior."""
-    return float(spread.shape[0] - np.trace(spread))
 
 
 def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
-from vegglue.calibration.fit import MapEstimate, fit
+from vegglue.calibration.fit import MapEstimate, determined, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
@@ -203,8 +203,7 @@ def _with_estimated_sizes(noise: Noise, fitted: MapEstimate, station: pd.DataFra
     """s_k^2 = sum_k r^2 / (n_k (1 - p / n)) for each kind k of enough readings; p: effective number of parameters."""
     residual = noise.residual(fitted.point.prediction)
     kind = station["kind"].to_numpy()[noise.rows]
-    determined = fitted.covariance.shape[0] - float(np.trace(fitted.covariance))
-    free = max(1.0 - determined / residual.size, 1.0 / residual.size)
+    free = max(1.0 - determined(fitted.covariance) / residual.size, 1.0 / residual.size)
     sigma = {str(k): float(np.sqrt(np.mean(residual[kind == k] ** 2) / free)) for k in np.unique(kind)}
     return noise_of(station.assign(standard_error=np.nan), sigma | sizes_as_stated(station))
 

@@ -8,11 +8,10 @@ import pandas as pd
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import chance_of_misfit, squared_misfit
+from vegglue.calibration.fit import chance_of_misfit, freedom_of_misfit, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.prior import sample_prior
-from vegglue.inference.homogeneity import determined
 from vegglue.inference.importance_sampling import Sample
 from vegglue.inference.leave_one_out import leave_one_out, leave_out, share_inside
 from vegglue.inference.likelihood import root_mean_square
@@ -96,14 +95,6 @@ def _misfit(base: ModesAndErrors, prediction: Array, at_all: Callable[[Array], A
         surprise=at_all(base.standardised),
         outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.standardised)) * 2) < OUTLIER_BELOW,
     )
-
-
-def freedom_of_misfit(readings: int, spread: Array) -> int:
-    """n - (p - tr V), to a whole number: the mean of chi2 at the best fit of n readings, V (p, p) the covariance of z.
-
-    A parameter that the data leave at its prior takes no residual away, and costs no degree of freedom.
-    """
-    return round(readings - determined(spread))
 
 
 def _groups_left_out(left: Array, precision: Array, weights: Array, used: pd.DataFrame) -> GroupsLeftOut:
