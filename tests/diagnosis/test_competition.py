@@ -8,7 +8,7 @@ import pytest
 from vegglue.diagnosis import competition
 from vegglue.diagnosis.competition import contenders_of
 from vegglue.diagnosis.rivals import followed_further, with_chances
-from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.diagnosis.tempered_chances import tempered_chances, tempered_odds
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
 from vegglue.screening import score_test
@@ -40,6 +40,13 @@ def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
     assert tempered_chances(0.5 * np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert tempered_chances(0.5 * np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
     assert tempered_chances(0.5 * np.array([46.0, 9.0]))[1] < 1e-5
+
+
+def test_odds_are_those_of_the_chances_of_two() -> None:
+    one, other = tempered_chances(np.array([46.0, 39.0]))
+    assert tempered_odds(46.0, 39.0) == pytest.approx(one / other)
+    assert tempered_odds(39.0, 46.0) == pytest.approx(other / one)
+    assert np.isfinite(tempered_odds(1e5, 0.0))
 
 
 STEP = Step("a", ("a", "b"), (0.6, 0.3), (("a", "b"),), 900.0, 300.0, 1e-3, {"a place": 0.1})

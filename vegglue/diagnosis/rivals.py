@@ -10,6 +10,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.refits import Refit
+from vegglue.diagnosis.tempered_chances import tempered_odds
 from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
@@ -23,8 +24,6 @@ from vegglue.screening.residual_screening import Screening
 IN_SET, HARDLY = 0.95, 0.05
 # Share of the squared fingerprint of a spot above which an experiment is said to point at it.
 POINTS_AT_IT = 0.1
-# Odds beyond e^this are told as this: larger numbers say no more.
-LARGEST_LOG_ODDS = 100.0
 
 
 def step_found(
@@ -98,7 +97,6 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     # What was not worth a refit counts to first order.
     evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
     evidence |= {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
-    ahead = {name: best.log_evidence - other for name, other in evidence.items() if name != best.kind}
     return Location(
         **refit.shapes,
         x_error=best.errors[0],
@@ -110,7 +108,7 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
         unit=refit.candidate.amplitude.unit,
         score=float(kind.scores[best.column]),
         experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
-        odds={name: float(np.exp(min(gained, LARGEST_LOG_ODDS))) for name, gained in ahead.items()},
+        odds={name: tempered_odds(best.log_evidence, other) for name, other in evidence.items() if name != best.kind},
         plausible=places.plausible,
     )
 

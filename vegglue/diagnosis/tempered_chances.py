@@ -12,6 +12,8 @@ from vegglue.arrays import Array
 
 # Relative error of a fingerprint [-]: on cells of two thirds of the size, those of mixing differ by 10 to 25 %.
 FINGERPRINT_ERROR = 0.15
+# Odds beyond e^this are told as this: larger numbers say no more.
+LARGEST_LOG_ODDS = 100.0
 
 
 def tempered_chances(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
@@ -23,3 +25,8 @@ def tempered_chances(evidence: Array, trace_error: float = FINGERPRINT_ERROR) ->
 def tempering(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
     """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
     return np.asarray(1.0 + trace_error**2 * 2.0 * np.maximum(evidence, 0.0))
+
+
+def tempered_odds(evidence: float, other: float) -> float:
+    """p_1 / p_2 of the chances of these two alone [-]."""
+    return float(np.exp(min((evidence - other) / float(tempering(np.array(min(evidence, other)))), LARGEST_LOG_ODDS)))
