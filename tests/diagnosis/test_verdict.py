@@ -10,6 +10,7 @@ from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.refits import Refit
+from vegglue.diagnosis.rivals import undecided_of
 from vegglue.results.diagnosis import EstimatedErrors, ModelErrorUsed, Step
 from vegglue.screening.instruments import Instrument
 
@@ -129,7 +130,7 @@ def test_what_scores_below_the_alarm_is_not_excluded() -> None:
 
 def test_an_alarm_that_nothing_came_of_is_no_all_clear() -> None:
     contenders = tuple(Contender("effect", name, 1.0, 0, None) for name in ("wind", "elder", "steep_bank", "jet"))
-    verdict, sentence, _ = said(grounds(undecided=contenders))
+    verdict, sentence, _ = said(grounds(undecided=undecided_of(contenders, (), np.array([]))))
     assert verdict == "cannot-tell"
     assert "it may be wind (25%) or elder (25%) or steep_bank (25%), but none of them surely" in sentence
 
@@ -141,9 +142,19 @@ def test_what_may_be_it_is_told_in_words() -> None:
     contenders = (
         Contender("bed", "unlisted_bed[x9.8,y0.5]", 3.0, 0, spot), Contender("position", "position", 2.0, 0, probe)
     )  # fmt: skip
-    sentence = said(grounds(undecided=contenders))[1]
+    sentence = said(grounds(undecided=undecided_of(contenders, (), np.array([]))))[1]
     assert "it may be something in no list, as if the bed lies 0.30 m lower at x = 9.8, y = 0.5 m (7" in sentence
     assert "or a probe that is off in all experiments at x = 14.2, y = 1.5 m (2" in sentence
+
+
+def test_what_was_followed_is_told_with_the_chances_that_decided() -> None:
+    contenders = tuple(
+        Contender("effect", name, evidence, 0, None) for name, evidence in (("wind", 2.0), ("elder", 0.0), ("jet", 0.0))
+    )
+    alone = undecided_of(contenders, (), np.array([])).chances
+    found = undecided_of(contenders, (0, 1), np.array([0.25, 0.75]))
+    assert found.chances == pytest.approx((0.25 * (1.0 - alone[2]), 0.75 * (1.0 - alone[2]), alone[2]))
+    assert "it may be elder (67%) or wind (22%) or jet" in said(grounds(undecided=found))[1]
 
 
 def test_a_misfit_is_not_said_to_hide() -> None:

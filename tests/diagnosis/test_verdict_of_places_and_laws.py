@@ -5,6 +5,7 @@ from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspec
 from verdicts import MISSES, grounds, said, step
 
 from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.findings import Undecided
 
 
 def test_a_place_wins_over_steps_and_all_are_told() -> None:
@@ -48,7 +49,7 @@ def test_a_field_is_none_of_the_known_effects() -> None:
 
 
 # What competed last and led to nothing.
-UNSURE = (Contender("effect", "wind", 3.0, 0, None),)  # type: ignore[arg-type]
+UNSURE = Undecided((Contender("effect", "wind", 3.0, 0, None),), (1.0,))  # type: ignore[arg-type]
 LIKELY = laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp")
 
 

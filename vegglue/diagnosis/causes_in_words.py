@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vegglue.diagnosis.competition import Contender, chances_of
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.results.causes import FAULT_WORDS, LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
@@ -155,9 +155,10 @@ def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
     return f"something in no list, as if {_what_acts(term, amplitude)} at x = {x:.1f}, y = {y:.1f} m"
 
 
-def undecided_in_words(contenders: Sequence[Contender]) -> str:
+def undecided_in_words(undecided: Undecided) -> str:
     """The likeliest contenders with their chances among all of them."""
-    told = zip(contenders[:UNDECIDED_TOLD], chances_of(contenders), strict=False)
+    pairs = zip(undecided.contenders, undecided.chances, strict=True)
+    told = sorted(pairs, key=lambda one: -one[1])[:UNDECIDED_TOLD]
     return " or ".join(f"{_contender_words(one)} ({_percent(chance)})" for one, chance in told)
 
 

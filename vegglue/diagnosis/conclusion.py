@@ -157,7 +157,8 @@ def _field(
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = found.gained(log_evidence(first.base), log_evidence(last.base)) if found.accepted else 0.0
-    gained = max([gained, *(one.log_evidence for one in found.undecided)])
+    undecided = found.undecided.contenders if found.undecided else ()
+    gained = max([gained, *(one.log_evidence for one in undecided)])
     told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
     if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
         return None, None

@@ -19,14 +19,15 @@ from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_unknown_errors
 from vegglue.diagnosis.competition import (
     Contender,
+    chances_of,
     contenders_of,
     tempered_chances,
 )
 from vegglue.diagnosis.conclusion import concluded
 from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as_likely
-from vegglue.diagnosis.findings import Charge, Findings
+from vegglue.diagnosis.findings import Charge, Findings, Undecided
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found
+from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found, undecided_of
 from vegglue.diagnosis.rivals_again import with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -84,8 +85,8 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         contenders = contenders_of(screening, watch)
         suspects |= _calibrated(contenders, tested)
         following = _following(screening, contenders, found, watch)
-        if following is None:
-            found = replace(found, undecided=tuple(contenders))
+        if isinstance(following, Undecided):
+            found = replace(found, undecided=following)
             break
         found, base = following.found, following.base
         if following.what != "instrument":
@@ -121,8 +122,8 @@ def _with_alarm(screening: Screening, found: Findings) -> Findings:
 
 def _following(
     screening: Screening, contenders: Sequence[Contender], found: Findings, watch: Watch
-) -> Following | None:
-    """What is found with the likeliest contender, and the model that follows; None when it leads to nothing.
+) -> Following | Undecided:
+    """What is found with the likeliest contender, and the model that follows; undecided when it leads to nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
     come next, see `contender_choice`.
@@ -131,11 +132,13 @@ def _following(
     branches = in_threads(_branch, [(screening, contenders, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
-        return possible[0][1] if possible else None
+        return possible[0][1] if possible else Undecided(tuple(contenders), tuple(chances_of(contenders)))
     ends = in_threads(_screened, [(one,) for _, one in possible])
     score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
     best = chosen_contender([one.what for one in ends], score)
-    return None if best is None else _told_beside(ends[best], [contenders[j] for j, _ in possible], score)
+    if best is None:
+        return undecided_of(contenders, [j for j, _ in possible], tempered_chances(score))
+    return _told_beside(ends[best], [contenders[j] for j, _ in possible], score)
 
 
 def _told_beside(following: Following, followed: Sequence[Contender], score: Array) -> Following:

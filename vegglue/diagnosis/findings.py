@@ -16,11 +16,19 @@ class Charge:
 
 
 @dataclass(frozen=True)
+class Undecided:
+    """Contenders that competed last and led to nothing, most evidence first, and the chance of each (k,) [-]."""
+
+    contenders: tuple[Contender, ...]
+    chances: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Findings:
     """charges: of all that is held. flagged: readings set aside, indices among the used stations. of_shape: ln evidence
     of places as they competed, less that in the model, whose covariance holds the error of their shape. p: of the last
-    alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing, most evidence
-    first. absurd: values that no flow of the case can have, in sentences.
+    alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing. absurd:
+    values that no flow of the case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
@@ -31,7 +39,7 @@ class Findings:
     of_shape: float = 0.0
     p: float = 1.0
     rate: float = 0.0
-    undecided: tuple[Contender, ...] = ()
+    undecided: Undecided | None = None
     absurd: tuple[str, ...] = ()
 
     @property

@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import chi2
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
+from vegglue.diagnosis.findings import Undecided
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.tempered_chances import tempered_odds
 from vegglue.measurements.kinds import kind_of
@@ -67,6 +68,15 @@ def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step
     together = sum(told.get(name, 0.0) for name in followed)
     told |= {name: float(p) * together for name, p in zip(followed, chance, strict=True)}
     return with_chances(step, step.accepted, told)
+
+
+def undecided_of(contenders: Sequence[Contender], followed: Sequence[int], chance: Array) -> Undecided:
+    """All contenders, none of them surely it, once some have been followed further: chance (k,), shared as in
+    `followed_further`.
+    """
+    told = chances_of(contenders)
+    told[list(followed)] = chance * told[list(followed)].sum()
+    return Undecided(tuple(contenders), tuple(float(p) for p in told))
 
 
 def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:

@@ -65,7 +65,7 @@ def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
     if found.accepted:
         return [found.gained(log_evidence(first.base), log_evidence(last.base))]
     if found.undecided:
-        return [one.log_evidence for one in found.undecided]
+        return [one.log_evidence for one in found.undecided.contenders]
     return [kind.total for kind in last.kinds]
 
 
