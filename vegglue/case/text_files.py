@@ -85,7 +85,12 @@ def told_apart(stems: Mapping[str, str]) -> dict[str, str]:
     """Stems by name, with a number from the second on where they come to be the same on a disk that knows no case."""
     found = dict[str, str]()
     for name, stem in stems.items():
-        taken = {one.casefold() for one in found.values()}
-        numbered = (f"{stem}-{number}" for number in count(2))
-        found[name] = next(one for one in chain([stem], numbered) if one.casefold() not in taken)
+        found[name] = unused(stem, found.values())
     return found
+
+
+def unused(stem: str, taken: Iterable[str]) -> str:
+    """A stem, with a number from 2 on where it is taken on a disk that knows no case."""
+    of_any_case = {one.casefold() for one in taken}
+    numbered = (f"{stem}-{number}" for number in count(2))
+    return next(one for one in chain([stem], numbered) if one.casefold() not in of_any_case)

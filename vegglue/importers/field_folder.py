@@ -14,7 +14,7 @@ from pathlib import Path
 
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import case_name, told_apart
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.banks import bank_break, roughness_of_banks, with_banks
 from vegglue.importers.config_parts import (
@@ -209,15 +209,11 @@ def _experiment(given: MeasuredFlow) -> Tree:
 def _plants(patches: Sequence[PlantedPatch]) -> Tree:
     densest = max(patch.stems_per_m2 for patch in patches)
     stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
-    names = [case_name(patch.name or f"p{number}", f"p{number}") for number, patch in enumerate(patches, 1)]
+    told = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
+    names = told_apart({place: case_name(patch.name or place, place) for place, patch in told.items()})
     rows = [
-        {
-            "name": name if names.count(name) == 1 else f"{name}-{number}",
-            "stand": "plants",
-            **_shape(patch),
-            "stems": patch.stems_per_m2,
-        }
-        for number, (name, patch) in enumerate(zip(names, patches, strict=True), 1)
+        {"name": names[place], "stand": "plants", **_shape(patch), "stems": patch.stems_per_m2}
+        for place, patch in told.items()
     ]
     return {"stands": {"plants": stand}, "patches": rows}
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.case.text_files import unused
 from vegglue.figures.section_panels import DrawnPanel, Edges, PanelGround, SectionPanel, draw_panel, value_range
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import as_given, count, short
@@ -108,20 +109,14 @@ def _drawn(
     panels = [_panel(run, experiment, rows[rows["section"] == section], added) for section in places.index]
     values = value_range(panels)
     for section, panel in zip(places.index, panels, strict=True):
-        name = _unused(f"{'section' if kind.name == STREAMWISE else kind.name}-{experiment}-{section}", taken)
+        words = f"{'section' if kind.name == STREAMWISE else kind.name}-{experiment}-{section}"
+        name = unused(file_name(words), taken)
+        taken.add(name)
         drawn = draw_panel(panel, values, f"{kind.column} [{kind.unit}]", stamp(run.case))
         alt = f"{kind.words.capitalize()} across {panel.title}, experiment {experiment}: {panel_words(panel)}."
         reasons = rows[rows["section"] == section].sort_values("y")["reason"].astype(str).tolist()
         picture = published_svg(run, drawn.svg, name, panel_words(panel), alt)
         yield picture, _numbers(picture.name, kind, panel, drawn) | {"reason": reasons}
-
-
-def _unused(words: str, taken: set[str]) -> str:
-    name, number = file_name(words), 2
-    while name.casefold() in taken:  # some disks know no upper case
-        name, number = f"{file_name(words)}-{number}", number + 1
-    taken.add(name.casefold())
-    return name
 
 
 def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> SectionPanel:
