@@ -30,6 +30,7 @@ def test_the_library_covers_all_stages():
     for effect in SHIPPED:
         assert effect.doi == "" or effect.doi.startswith("10."), effect.name
         assert not effect.checked or effect.source.startswith("definition"), f"{effect.name}: was the source read?"
+        assert not (effect.checked and effect.read_in), f"{effect.name}: a definition needs no other program"
 
 
 @pytest.mark.parametrize("value", [-1.9, -0.5, 0.5, 0.8, 2.5])

@@ -118,7 +118,8 @@ class SeenRange:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`.
+    """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`;
+    read_in: the program in whose code it was read, where the source was not at hand.
 
     each: whether it is one cause for the whole case, or a cause of its own in each experiment, section, device
     or patch (a shape `patch` is then its number).
@@ -136,6 +137,7 @@ class Effect:
     source: str = ""
     doi: str = ""
     checked: bool = False
+    read_in: str = ""
     each: Literal["case", "experiment", "section", "device", "patch"] = "case"
     mirrored: bool = True
     tags: tuple[str, ...] = ()

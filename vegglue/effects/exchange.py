@@ -127,6 +127,7 @@ EFFECTS = (
         act=smagorinsky,
         amplitude=Amplitude("coefficient", "-", "coefficient C_s, some 0.1 to 0.2", 0.3, 0.0, 3.0, power=2),
         source="Smagorinsky (1963)",
+        read_in="TELEMAC-2D (smagor.f)",
         doi="10.1175/1520-0493(1963)091<0099:GCEWTP>2.3.CO;2",
     ),
     Effect(
@@ -202,7 +203,8 @@ EFFECTS = (
         equation="h T_sn = -s b h (h/R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2)/kappa",
         act=helical_flow,
         amplitude=Amplitude("share", "-", "strength s, 1 for a spiral in balance", 0.5, -3.0, 3.0),
-        source="Kalkwijk and Booij (1986), as in Delft3D",
+        source="Kalkwijk and Booij (1986)",
+        read_in="Delft3D-FLOW (vihsec.f90, secrhs.f90)",
         doi="10.1080/00221688609499330",
     ),
 )

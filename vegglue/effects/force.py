@@ -41,6 +41,7 @@ EFFECTS = (
         act=wind,
         amplitude=Amplitude("speed", "m/s", "wind speed W downstream", 5.0, -30.0, 30.0, power=2),
         source="Garratt (1977)",
+        read_in="RegCM, where C_w is 1.29e-3 at 8 m/s",
         doi="10.1175/1520-0493(1977)105<0915:RODCOO>2.0.CO;2",
         tags=("negative control",),
     ),

@@ -38,7 +38,8 @@ def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
     h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2)), its height; both at most 1 [-].
 
     Cauchy number Ca and buoyancy number B [-]; a blade is not shortened where Ca is below 0.9^3, nor lowered below 1.
-    Source: Luhar and Nepf (2011), doi 10.4319/lo.2011.56.6.2003; from memory, not read again.
+    Source: Luhar and Nepf (2011), doi 10.4319/lo.2011.56.6.2003, not compared with it: l_e as in ROMS
+    (vegetation_drag.F), the height from memory.
     """
     ca = np.maximum(cauchy, LEAST_CAUCHY)
     length = 1.0 - (1.0 - 0.9 * ca ** (-1 / 3)) / (1.0 + ca**-1.5 * (8.0 + buoyancy**1.5))
@@ -110,6 +111,7 @@ EFFECTS = (
         amplitude=Amplitude("vogel_exponent", "-", "Vogel exponent chi, 0 for rigid plants", 0.5, -2.0, 1.0),
         shapes=(REFERENCE_SPEED,),
         source="Vogel (1984); Järvelä (2004)",
+        read_in="Delft3D-FLOW (trtrou.f90, law 155)",
         doi="10.1080/15715124.2004.9635222",
     ),
     Effect(
@@ -145,6 +147,7 @@ EFFECTS = (
             REFERENCE_SPEED,
         ),
         source="Luhar and Nepf (2011)",
+        read_in="ROMS (vegetation_drag.F; l_e alone)",
         doi="10.4319/lo.2011.56.6.2003",
     ),
     Effect(
@@ -170,6 +173,7 @@ EFFECTS = (
             REFERENCE_SPEED,
         ),
         source="Västilä and Järvelä (2014)",
+        read_in="Delft3D-FLOW (trtrou.f90, law 155)",
         doi="10.1002/2013WR013819",
     ),
     Effect(

@@ -52,9 +52,12 @@ def effect_in_words(effect: Effect) -> Iterator[str]:
 
 
 def effect_source(effect: Effect) -> str:
-    """Where it comes from, and whether the formula was compared with it."""
+    """Where it comes from, and whether the formula was compared with it, or with the code of another program."""
     doi = f", doi:{effect.doi}" if effect.doi else ""
-    return f"{effect.source}{doi}{'' if effect.checked else ' (formula not compared with it)'}"
+    if effect.checked:
+        return f"{effect.source}{doi}"
+    read = f"read in the code of {effect.read_in}, not in the source" if effect.read_in else "not compared with it"
+    return f"{effect.source}{doi} (formula {read})"
 
 
 def config_snippet(effect: Effect) -> tuple[str, ...]:
@@ -90,6 +93,7 @@ def effect_json(effect: Effect) -> dict[str, Any]:
         "source": effect.source,
         "doi": effect.doi,
         "checked": effect.checked,
+        "read_in": effect.read_in,
         "each": effect.each,
         "mirrored": effect.mirrored,
         "tags": list(effect.tags),
