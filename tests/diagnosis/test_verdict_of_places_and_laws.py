@@ -74,6 +74,9 @@ def test_an_instrument_that_is_clearly_off_goes_before_a_law_that_may_be() -> No
     assert sentence.startswith("One reading at x = 36, y = 1 m is off by 0.1 m/s")
     assert "cannot tell whether anything else is missing: a law of" in sentence
     assert said(grounds(laws=unlikely, instruments=(clear, faint)))[0] == "cannot-tell"
+    beside = said(grounds(laws=unlikely, instruments=(clear,), neighbours=True))
+    assert beside[0] == "cannot-tell"
+    assert "readings side by side" in beside[1]
     assert said(grounds(laws=LIKELY, instruments=(clear,)))[0] == "none-of-these"
 
 

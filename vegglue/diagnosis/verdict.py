@@ -63,6 +63,7 @@ FAR_OFF = 4.0
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = 0.01
+NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad probe does not explain"
 TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
 
 
@@ -138,9 +139,11 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
 
 def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[VerdictKind, str]:
     """A law where no known effect explains the misfit; an instrument that is clearly off goes before one that is not
-    likelier than all else.
+    likelier than all else, but for readings side by side.
     """
     law = f"{law_in_words(laws)} ({_told(grounds.misfit)} without it)"
+    if grounds.neighbours and not is_likelier(laws):
+        doubt = doubt or NEIGHBOURS_ASIDE
     if doubt:
         return "cannot-tell", f"These data cannot tell: {doubt}. To first order {law}. {TO_DISCOVER}"
     if is_likelier(laws):
@@ -254,7 +257,7 @@ def _unearned(grounds: Grounds) -> str:
             "over whole sections"
         )
     if grounds.neighbours:
-        return "readings side by side had to be set aside, which one bad probe does not explain"
+        return NEIGHBOURS_ASIDE
     if used is not None and used.needed > 1.0 and used.log_ratio > NEEDS_MORE:
         of_friction = f": {used.needed * used.friction:.0%} in friction where {used.friction:.0%} is allowed"
         return (
