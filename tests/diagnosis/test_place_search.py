@@ -57,4 +57,4 @@ def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None
     assert away(dict(found.refit.shapes)) <= away(shapes)
     assert away(dict(found.refit.shapes)) < 0.35
     assert found.refit.amplitude * drag > 0.0
-    assert abs(found.refit.shapes["x"] - 14.3) < 2.0 * found.x_error + 0.1
+    assert abs(found.refit.shapes["x"] - 14.3) < 2.0 * found.spread[0] + 0.1

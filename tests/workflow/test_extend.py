@@ -112,7 +112,7 @@ def found_in(case: Case, kind: str, *, order: tuple[str, ...] = (), place: bool 
 
 def test_a_place_is_spread_over_where_it_may_lie() -> None:
     """A spot whose middle errs by a normal has a wider and lower one as its mean; as much as before is there."""
-    place = replace(a_place("bed"), x_error=3.0, y_error=0.2)
+    place = replace(a_place("bed"), x_spread=3.0, y_spread=0.2)
     spread, u = spread_over_its_error(place), np.linspace(-30.0, 30.0, 2001)
     middles = 3.0 * np.random.default_rng(1).standard_normal(4000)
     mean = place.amplitude * np.exp(-(((u[:, None] - middles) / place.length) ** 2)).mean(axis=1)
@@ -123,14 +123,14 @@ def test_a_place_is_spread_over_where_it_may_lie() -> None:
 
 
 def test_water_that_enters_stays_as_much_where_it_is_spread() -> None:
-    place = replace(a_place("inflow"), x_error=3.0)
+    place = replace(a_place("inflow"), x_spread=3.0)
     assert spread_over_its_error(place).amplitude == place.amplitude
 
 
 def test_a_place_that_was_found_is_added_as_it_is_spread() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = found_in(case, "none-of-these", order=("unlisted_bed_x47_29_y_0_29_rise",), place=True)
-    found = replace(found, places=(replace(a_place("bed"), x_error=3.0),))
+    found = replace(found, places=(replace(a_place("bed"), x_spread=3.0),))
     ((candidate, shapes),) = [one for one in found_additions(case, found) if one[0].name != "streamlining"]
     assert shapes["length"] == dict(candidate.fixed)["length"] == pytest.approx(np.hypot(1.8, 3.0 * 2**0.5), abs=0.01)
     values = values_found(case, found)
@@ -153,7 +153,7 @@ def test_effects_and_places_are_tried_in_the_order_found(turn: int) -> None:
 def test_a_place_likelier_than_an_effect_is_tried_after_it(chance: float, tried: int) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = found_in(case, "one-of", order=("streamlining_vogel_exponent",))
-    place, name = replace(a_place("bed"), x_error=3.0), "unlisted_bed[x47.29,y-0.29]"
+    place, name = replace(a_place("bed"), x_spread=3.0), "unlisted_bed[x47.29,y-0.29]"
     step = replace(found.steps[0], chances=(0.24,), others={name: chance}, places={name: place})
     found = replace(found, steps=(step,))
     names = [candidate.name for candidate, _ in tried_additions(case, found)]

@@ -88,7 +88,7 @@ def spread_over_its_error(location: Location) -> Location:
     """
     length, width = (
         round(float(np.hypot(half, 2.0**0.5 * error)), 2)
-        for half, error in ((location.length, location.x_error), (location.width, location.y_error))
+        for half, error in ((location.length, location.x_spread), (location.width, location.y_spread))
     )
     share = 1.0 if location.term == "inflow" else location.length * location.width / (length * width)
     low, high = location.interval95

@@ -44,7 +44,8 @@ START_SHARES = (1.0, 0.3)
 @dataclass(frozen=True)
 class Contender:
     """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
-    fingerprint among those of its kind; what: its refit, or the instrument; errors: of x and y of a place [m].
+    fingerprint among those of its kind; what: its refit, or the instrument; errors, spread: of x and y of a
+    place [m], see `FoundPlace`.
     """
 
     kind: str
@@ -53,6 +54,7 @@ class Contender:
     column: int
     what: Refit | Instrument
     errors: tuple[float, float] = (0.0, 0.0)
+    spread: tuple[float, float] = (0.0, 0.0)
 
 
 def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Contender]:
@@ -139,8 +141,8 @@ def _place_contender(
         return []
     spot, best = max(refits, key=lambda one: one[1].log_factor)
     there = found_place(search, places, kind, spot, best)
-    errors = (there.x_error, there.y_error)
-    return [Contender(kind.name, there.refit.candidate.name, there.log_evidence, spot, there.refit, errors)]
+    found = there.refit
+    return [Contender(kind.name, found.candidate.name, there.log_evidence, spot, found, there.errors, there.spread)]
 
 
 def chances_of(contenders: Sequence[Contender]) -> Array:

@@ -15,6 +15,7 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.screening import score_test
 from vegglue.screening.candidates import place_candidate, with_effect
 from vegglue.screening.evidence import HypothesisKind, expected_gain, log_factors
@@ -40,14 +41,15 @@ class Window:
 
 @dataclass(frozen=True)
 class FoundPlace:
-    """A refit where it explains most; log_evidence: of its term over all places; x_error, y_error: root mean square
-    distance of where it may lie [m].
+    """A refit where it explains most; log_evidence: of its term over all places; errors: root mean square distance in x
+    and y of where it may lie [m], by chances that allow for traces that are not nature's; spread: the same by the
+    evidence as it is.
     """
 
     refit: Refit
     log_evidence: float
-    x_error: float
-    y_error: float
+    errors: tuple[float, float]
+    spread: tuple[float, float]
 
 
 def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
@@ -60,10 +62,19 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         kind.log_evidence[~near] + kept,
         window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING),
     ])  # fmt: skip
-    x, y = np.concatenate([places.x[~near], window.x]), np.concatenate([places.y[~near], window.y])
-    chance, middle = np.exp(weight - logsumexp(weight)), moved.shapes
-    errors = [float(np.sqrt(chance @ (at - middle[axis]) ** 2)) for axis, at in (("x", x), ("y", y))]
-    return FoundPlace(moved, float(logsumexp(weight)), *errors)
+    away = np.stack([
+        np.concatenate([places.x[~near], window.x]) - moved.shapes["x"],
+        np.concatenate([places.y[~near], window.y]) - moved.shapes["y"],
+    ])  # fmt: skip
+    total = float(logsumexp(weight))
+    errors, spread = (_root_mean_square(away, chance) for chance in (tempered_chances(weight), np.exp(weight - total)))
+    return FoundPlace(moved, total, errors, spread)
+
+
+def _root_mean_square(away: Array, chance: Array) -> tuple[float, float]:
+    """Of distances in x and y (2, spot), each with its chance (spot,)."""
+    along, across = np.sqrt(away**2 @ chance)
+    return float(along), float(across)
 
 
 def _moved(search: SearchModel, places: Places, refit: Refit, moves: int) -> tuple[Refit, Window]:

@@ -111,6 +111,8 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
         **refit.shapes,
         x_error=best.errors[0],
         y_error=best.errors[1],
+        x_spread=best.spread[0],
+        y_spread=best.spread[1],
         term=best.kind,
         effect=refit.candidate.effect.name,
         amplitude=refit.amplitude,

@@ -16,7 +16,8 @@ FAULT_WORDS = {
 @dataclass(frozen=True)
 class Location:
     """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
-    and standard errors of x and y over all spots that could be it.
+    and standard errors of x and y over all spots that could be it; x_spread, y_spread: the same where traces are taken
+    to be nature's own, over which `extend` spreads it.
 
     effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
     [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
@@ -38,6 +39,8 @@ class Location:
     plausible: float
     x_error: float = 0.0
     y_error: float = 0.0
+    x_spread: float = 0.0
+    y_spread: float = 0.0
 
     @property
     def shapes(self) -> dict[str, float]:
