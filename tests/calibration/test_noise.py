@@ -60,6 +60,14 @@ def test_a_boat_that_does_not_keep_its_line_measures_across_all_the_same() -> No
     )
 
 
+def test_two_lines_under_one_name_are_two_readings_wherever_they_are() -> None:
+    """Stations at the same y of both lines were one reading: the covariance had no inverse."""
+    one = stations()[:5]
+    two = pd.concat([one, one.assign(x=0.6)], ignore_index=True)
+    correlations = covariance_of(with_correlation(noise_of(two), 0.4, 1.0)) / 0.01**2
+    assert correlations[0, [1, 5, 6]] == pytest.approx(0.4 ** np.array([1.0, 2.0, np.hypot(1.0, 2.0)]))
+
+
 def test_components_at_one_place_are_neighbours_of_their_own_kind_alone() -> None:
     both = pd.concat([stations(), stations().assign(kind="velocity_across")], ignore_index=True)
     others = stations().assign(kind="discharge")

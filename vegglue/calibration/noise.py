@@ -301,17 +301,19 @@ def covariance_of_data(noise: Noise) -> Array:
 
 def _separation(used: pd.DataFrame) -> Array:
     """d_ij / d (n, n) [-]: distance over the median spacing of a section; infinite between sections and kinds, and for
-    kinds whose errors are not correlated.
+    kinds whose errors are not correlated. Where two of a section stand at one y it is no line: d_ij is then as it is.
     """
     separation = np.full((len(used), len(used)), np.inf)
     np.fill_diagonal(separation, 0.0)
     correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
     keys = used[["experiment", "section", "kind"]].astype(str).agg("\n".join, axis=1).to_numpy()
-    x, y = section_places(used).to_numpy(float), used["y"].to_numpy(float)
+    own = used[["x", "y"]].to_numpy(float)
+    in_line = np.column_stack([section_places(used).to_numpy(float), own[:, 1]])
     for key in np.unique(keys[correlated]):
         here = np.flatnonzero(keys == key)
-        line = here[np.lexsort((y[here], x[here]))]
-        spacing = np.median(np.hypot(np.diff(x[line]), np.diff(y[line]))) if here.size > 1 else 1.0
-        distance = np.hypot(x[here, None] - x[here], y[here, None] - y[here])
+        line = np.unique(in_line[here], axis=0)
+        spacing = np.median(np.hypot(*np.diff(line, axis=0).T)) if len(line) > 1 else 1.0
+        x, y = (in_line if len(line) == here.size else own)[here].T
+        distance = np.hypot(x[:, None] - x, y[:, None] - y)
         separation[np.ix_(here, here)] = distance / max(spacing, 1e-9)
     return separation
