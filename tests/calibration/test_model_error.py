@@ -13,7 +13,7 @@ from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.model_error import bumps, field_columns, model_error_columns, responses_to_bumps
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.parameter_space import z_of
-from vegglue.case.schema import Case, ModelError
+from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.screening.candidates import effect_entry, place_candidate, with_effect
@@ -133,6 +133,20 @@ def test_something_unlisted_in_the_model_may_differ_from_its_spot(flowing: tuple
     assert twice == pytest.approx(2.0 * own)
     assert not off.any()
     assert 1 < own.shape[1] < 60, "bumps around the place, not all over the channel"
+
+
+def test_a_place_that_is_calibrated_errs_where_it_lies(flowing: tuple[Model, Point]) -> None:
+    model, point = flowing
+    prior = Parameter(distribution="uniform", low=5.0, high=25.0, unit="m")
+    known = replace(point, z=np.append(point.z, 0.0), slope=np.pad(point.slope, ((0, 0), (0, 1))))
+
+    def columns(x: float | str) -> Array:
+        entry = EffectEntry(effect="unlisted_object", values={"drag": 0.2, "x": x, "y": 0.2})
+        parameters = {**CASE.parameters, "x_of_thing": prior}
+        case = CASE.model_copy(update={"effects": {"thing": entry}, "parameters": parameters})
+        return model_error_columns(replace(model, case=case), known, CASE_ALLOWS)
+
+    assert columns("x_of_thing") == pytest.approx(columns(15.0))
 
 
 @pytest.mark.parametrize(("name", "amplitude"), [("unlisted_object", 0.2), ("unlisted_inflow", 0.05)])

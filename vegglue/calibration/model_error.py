@@ -121,11 +121,13 @@ def any_error(allowed: ModelError) -> bool:
 
 @dataclass(frozen=True)
 class UnlistedObject:
-    """Something unlisted at a place that acts in a case: its term, the name of its amplitude or its value, its spot."""
+    """Something unlisted at a place that acts in a case: its term, its amplitude and its spot, numbers or names of
+    parameters.
+    """
 
     term: Term
     amplitude: Value
-    place: dict[str, float]
+    place: dict[str, Value]
 
 
 def unlisted_in(case: Case) -> list[UnlistedObject]:
@@ -134,7 +136,7 @@ def unlisted_in(case: Case) -> list[UnlistedObject]:
     for name, entry in case.effects.items():
         effect = effect_of(case, name)
         if effect.name in TERM_OF:
-            place = {shape.name: float(entry.values.get(shape.name, shape.default)) for shape in effect.shapes}
+            place = {shape.name: entry.values.get(shape.name, shape.default) for shape in effect.shapes}
             amplitude = entry.values.get(effect.amplitude.name, effect.amplitude.off)
             found.append(UnlistedObject(TERM_OF[effect.name], amplitude, place))
     return found
@@ -142,11 +144,13 @@ def unlisted_in(case: Case) -> list[UnlistedObject]:
 
 def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one: UnlistedObject) -> Array:
     """Bumps around a spot, each of SHAPE_ERROR of its size, but for what looks like another size."""
-    place, half, grid = one.place, FRICTION_RADIUS * half_width(model.site), model.site.grid
+    theta = theta_at(model.case, point.z[None])
+    place = {name: float(value_of(value, theta, 1)[0]) for name, value in one.place.items()}
+    half, grid = FRICTION_RADIUS * half_width(model.site), model.site.grid
     over = bumps(grid, half, half)
     away = ((over.x[:, None] - place["x"]) / (place["length"] + over.length)) ** 2
     away = away + ((over.y[None] - place["y"]) / (place["width"] + over.width)) ** 2
-    size = float(value_of(one.amplitude, theta_at(model.case, point.z[None]), 1)[0])
+    size = float(value_of(one.amplitude, theta, 1)[0])
     if one.term == "inflow":
         size /= np.pi * place["length"] * place["width"]
     near = responses_to_bumps(responses, one.term, over)[:, away < AROUND**2]
