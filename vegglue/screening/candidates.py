@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.case_effects import effect_of
+from vegglue.case.parameter_space import middle_value
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
 from vegglue.effects.definition import Amplitude, Effect
@@ -111,7 +112,7 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
 
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
-    """The effects of a case as candidates, by their keys."""
+    """The effects of a case as candidates, by their keys; shapes that are calibrated in the middle of their priors."""
     return {key: _candidate_of(case, key, entry) for key, entry in case.effects.items()}
 
 
@@ -122,10 +123,11 @@ def candidate_in_case(case: Case, name: str) -> Candidate:
 
 def _candidate_of(case: Case, key: str, entry: EffectEntry) -> Candidate:
     effect = effect_of(case, key)
-    if effect.each == "patch":
-        return patch_candidate(effect, int(float(entry.values["patch"])) - 1, case)
+    shapes = {one.name: float(middle_value(case, entry.values.get(one.name, one.default))) for one in effect.shapes}
+    if effect.each == "patch" and (index := int(shapes["patch"]) - 1) in range(len(case.plants.patches)):
+        return patch_candidate(effect, index, case)
     if "search" in effect.tags and key != effect.name:
-        return place_candidate(effect, {shape.name: float(entry.values[shape.name]) for shape in effect.shapes})
+        return place_candidate(effect, shapes)
     return Candidate(effect, entry.experiments or (), entry.sections, entry.devices)
 
 
