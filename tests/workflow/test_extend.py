@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnoses import a_diagnosis, a_suspect, laws_suspected_of
+from linear_baseline import stations_of
 from reach import said_to
 
 from vegglue.case.config import load_case
@@ -57,6 +58,16 @@ def test_an_entry_of_a_case_says_which_candidate_it_was() -> None:
     assert {one.effect.each for one in every} >= {"case", "experiment", "section"}
     for one in every:
         assert candidates_in_case(with_effect(case, one, {})) == {one.key: one}
+        assert candidate_named(case, station, one.name) == one
+
+
+def test_a_candidate_is_found_by_its_name_whatever_else_has_that_name() -> None:
+    """A section called as an experiment or a patch is: its probe was said of all sections of the experiment, and the
+    density of the patch to act nowhere.
+    """
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    station = stations_of(case, ("low", "p1", "left, 2", "b]"), 2)
+    for one in candidates_of(case, station):
         assert candidate_named(case, station, one.name) == one
 
 

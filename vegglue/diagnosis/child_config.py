@@ -21,6 +21,7 @@ from vegglue.results.diagnosis import Location
 from vegglue.screening.candidates import (
     Candidate,
     acting_in,
+    candidates_of,
     effect_entry,
     patch_candidate,
     place_candidate,
@@ -33,8 +34,13 @@ from vegglue.screening.candidates import (
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
     """The candidate that `discharge_error[high]` or `streamlining` names: an effect, and where it acts.
 
+    A candidate of the search comes first: its section may be called as an experiment is, or have a comma in its name.
+
     Errors: InputError for an unknown effect, one that is at work already, or a place it cannot act in.
     """
+    searched = {one.name: one for one in candidates_of(case, station)}
+    if name in searched:
+        return searched[name]
     found = re.fullmatch(r"(\w+)(?:\[([^\]]+)\])?", name)
     known = library(case.effect_file)
     if found is None or found[1] not in known:
