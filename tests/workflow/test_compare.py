@@ -1,12 +1,14 @@
 """Models are compared by the same measurements, each under a name of its own."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import vegglue
 from vegglue.case.config import load_case
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, Validation
 from vegglue.errors import InputError
 
 
@@ -24,6 +26,43 @@ def test_models_of_other_measurements_are_refused(case: Case, tmp_path: Path) ->
     other = case.model_copy(update={"name": "fewer", "observations": observations})
     with pytest.raises(InputError, match="expected fewer and brook to be fitted to the same measurements, got others"):
         vegglue.compare([case, other], runs=tmp_path / "runs")
+
+
+def other_error(case: Case) -> Case:
+    one = next(one for one in case.observations if one.kind == "velocity")
+    table = pd.read_csv(one.file, comment="#")
+    wider = one.file.with_name("wider.csv")
+    table.assign(u_se=0.2).to_csv(wider, index=False)
+    observations = tuple(each.model_copy(update={"file": wider}) if each is one else each for each in case.observations)
+    return case.model_copy(update={"observations": observations})
+
+
+def shorter(case: Case) -> Case:
+    return case.model_copy(update={"grid": case.grid.model_copy(update={"x": (case.grid.x[0], 17.0)})})
+
+
+@pytest.mark.parametrize("changed", [other_error, shorter])
+def test_errors_are_set_side_by_side_under_the_same_errors_at_the_same_stations(
+    case: Case, tmp_path: Path, changed: Callable[[Case], Case]
+) -> None:
+    """A grid that ends before the last section ended in a traceback; chi2 stood beside one of other errors."""
+    other = changed(case).model_copy(update={"name": "other"})
+    with pytest.raises(InputError, match="fitted to the same measurements, got others; name the same files in both"):
+        vegglue.compare([case, other], runs=tmp_path / "runs")
+
+
+def test_models_are_judged_by_the_same_measurements_for_validation(case: Case, tmp_path: Path) -> None:
+    judged = [
+        case.model_copy(
+            update={
+                "name": f"judged{number}",
+                "validation": Validation(experiments=case.experiments, observations=case.observations[:number]),
+            }
+        )
+        for number in (1, 2)
+    ]
+    with pytest.raises(InputError, match="judged2 and judged1 to have the same measurements for validation"):
+        vegglue.compare(judged, runs=tmp_path / "runs")
 
 
 def test_models_of_one_name_are_refused(case: Case, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
-from vegglue.diagnosis.excluded_stations import exclusion_in_words
+from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.in_short import in_short, so_many
@@ -21,6 +21,9 @@ from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.storage.kept_words import write_ladder
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 from vegglue.workflow.set_aside import left_out
+
+# On which errors hang that are set side by side, of each station.
+ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,9 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
 
 
 def _refuse_other_measurements(cases: Sequence[Case]) -> None:
-    """Errors are compared station by station, and kept in a folder for each name; one model may be there twice."""
+    """Errors are compared station by station, under the same errors of the data, and kept in a folder for each name;
+    one model may be there twice.
+    """
     first, *others = cases
     for number, case in enumerate(others, 1):
         if any(one.name == case.name and case_hash(one) != case_hash(case) for one in cases[:number]):
@@ -70,12 +75,20 @@ def _refuse_other_measurements(cases: Sequence[Case]) -> None:
         if not _measured(case).equals(_measured(first)):
             raise InputError(
                 f"compare: expected {case.name} and {first.name} to be fitted to the same measurements, got others; "
-                "name the same files in both. A reading that is off is left out of all models once it is diagnosed."
+                "name the same files in both, with the same errors, and a grid that holds the same stations. "
+                "A reading that is off is left out of all models once it is diagnosed."
+            )
+    unseen = [(case.name, there.station[ALIKE_IN_ALL]) for case in cases if (there := validation_of(case)) is not None]
+    for name, station in unseen[1:]:
+        if not station.equals(unseen[0][1]):
+            raise InputError(
+                f"compare: expected {name} and {unseen[0][0]} to have the same measurements for validation, got "
+                "others; name the same files in both."
             )
 
 
 def _measured(case: Case) -> pd.DataFrame:
-    return read_observations(case).table[["experiment", "kind", "section", "x", "y", "value"]]
+    return read_observations(case).table[ALIKE_IN_ALL]
 
 
 def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = silent) -> Rung:
