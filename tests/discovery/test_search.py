@@ -92,6 +92,11 @@ def test_silence_says_how_often_errors_leave_as_much(p: float, words: str) -> No
     assert words in Discovery(p, 65, (), {}).sentence
 
 
+def test_silence_of_no_law_is_not_that_of_errors() -> None:
+    """Water below 5 cm has no cell of which a law could be told: errors alone left as much in 100 % of no cases."""
+    assert Discovery(1.0, 0, (), {}).sentence == "No law is tried: these data have seen too little of every quantity."
+
+
 @pytest.mark.slow
 def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
     """Three seeds; each names one by chance in at most 5 %."""

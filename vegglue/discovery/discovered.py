@@ -140,6 +140,8 @@ class Discovery:
         if self.others:
             name, chance = max(self.others.items(), key=lambda pair: pair[1])
             return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
+        if self.tried == 0:
+            return "No law is tried: these data have seen too little of every quantity."
         if self.p <= FALSE_ALARMS:
             rarely = f"errors alone leave as much in {100 * max(self.p, 0.001):.1g} % of cases"
             return f"No law is found: {rarely}, but no law or known effect explains enough of it."
