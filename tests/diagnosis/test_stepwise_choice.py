@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vegglue.diagnosis.comparison import By, HeldOut, InSample, PredictiveScores, Rung
-from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen
+from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen, why_not_kept
 
 STATIONS = 12
 EXPERIMENTS = ("low", "high")
@@ -106,7 +106,13 @@ def test_in_doubt_errors_must_fall_clearly() -> None:
 def test_what_cannot_be_judged_is_not_added() -> None:
     made = choice({PARENT: (np.nan, np.nan), A: (np.nan, np.nan)}, A)
     assert made.stages == (PARENT,)
-    assert "nothing to hold out" in made.refused["a"]
+    assert "nothing to hold out: one section in one experiment" in made.refused["a"]
+
+
+def test_levels_alone_are_not_called_one_section() -> None:
+    gauges = a_rung((np.nan, np.nan), {"a": 9.0}, seen=1.0)
+    gauges = replace(gauges, held_out=replace(gauges.held_out, velocity=np.zeros(STATIONS, bool)))
+    assert why_not_kept(gauges, gauges) == "there is nothing to hold out: no velocity along the channel"
 
 
 @pytest.mark.parametrize(
