@@ -12,7 +12,9 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
-from vegglue.diagnosis.comparison import Rung, homogeneity, improvement, rung
+from vegglue.cli.tables import show_ladder
+from vegglue.diagnosis.comparison import Rung, homogeneity, improvement, rung, rung_in_short
+from vegglue.workflow.compare import Comparison
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 SECTIONS, POINTS = ("A", "B", "C"), 6
@@ -103,3 +105,15 @@ def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) ->
     means, errors = np.array(told).T
     assert np.sqrt(np.mean(errors**2)) > 0.8 * means.std(), "of the unweighted means it is 0.6"
     assert np.mean(means > 2.0 * errors) < 0.1
+
+
+def test_a_ladder_of_levels_alone_tells_no_number_that_is_none(
+    slope: Array, capsys: pytest.CaptureFixture[str]
+) -> None:
+    station = stations().assign(kind="level")
+    one = rung(at_best(CASE, station, measured(slope, np.zeros(slope.shape)), slope))
+    assert rung_in_short(one) == "twin, 4 parameters: no velocity along the channel"
+    show_ladder(Comparison((one, one), pd.DataFrame()))
+    told = capsys.readouterr().out
+    assert "nan" not in told
+    assert "noise floor - m/s" in told

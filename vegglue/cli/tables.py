@@ -58,9 +58,15 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
     )
 
 
-def _error(value: float) -> str:
-    """An error [m/s or m]; - where there is nothing that it could be of."""
-    return "-" if np.isnan(value) else f"{value:.4f}"
+def _error(value: float, digits: str = ".4f") -> str:
+    """An error [m/s or m], or a score or share of errors; - where there is nothing that it could be of."""
+    return "-" if np.isnan(value) else f"{value:{digits}}"
+
+
+def _gain(before: Rung | None, one: Rung) -> str:
+    """By how much held-out squares fell [(mm/s)^2]; the error of that is - where one section alone was held out."""
+    gain, error = (1e6 * part for part in improvement(before, one)) if before else (float("nan"),) * 2
+    return "" if np.isnan(gain) else f"{gain:.2g} ± {_error(error, '.1g')}"
 
 
 def show_ladder(found: Comparison) -> None:
@@ -72,20 +78,19 @@ def show_ladder(found: Comparison) -> None:
                 *(["validation"] if validated else []))  # fmt: skip
     rows = []
     for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
-        gain = "" if before is None else "{:.2g} ± {:.1g}".format(*(1e6 * part for part in improvement(before, one)))
         seen, scores = one.in_sample, one.predictive
         rows.append((
             one.name, str(len(one.values)), _error(seen.rmse[STREAMWISE]), _error(seen.rmse[WATER_LEVEL]),
             *(_error(seen.rmse[kind.name]) for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
-            _error(held_out_rmse(one)), gain, _error(held_out_rmse(one, "experiments")),
-            f"{scores.log_score:.2f}", f"{scores.inside50:.0%}", f"{scores.inside95:.0%}",
+            _error(held_out_rmse(one)), _gain(before, one), _error(held_out_rmse(one, "experiments")),
+            _error(scores.log_score, ".2f"), _error(scores.inside50, ".0%"), _error(scores.inside95, ".0%"),
             *([_error(one.validation)] if validated else []),
         ))  # fmt: skip
     print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
     if rungs:
         console().print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
-            f"{rungs[-1].in_sample.noise_floor:.4f} m/s; compare chi2 here only."
+            f"{_error(rungs[-1].in_sample.noise_floor)} m/s; compare chi2 here only."
         )
     if note:
         console().print(note)

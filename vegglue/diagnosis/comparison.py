@@ -117,7 +117,9 @@ def rung_in_short(rung: Rung) -> str:
         "noise floor": rung.in_sample.noise_floor,
     }
     known = [f"{words} {value:.2g}" for words, value in told.items() if np.isfinite(value)]
-    return f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known)}"
+    return (
+        f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known) or 'no velocity along the channel'}"
+    )
 
 
 def rung_json(rung: Rung) -> dict[str, Any]:
