@@ -10,6 +10,7 @@ from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import at_point
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.cli.tables import show_ladder
@@ -85,6 +86,28 @@ def test_held_out_errors_are_those_of_calibrating_without_the_section(slope: Arr
     assert found.held_out.sections[out] == pytest.approx(values[out] - slope[out] @ z)
     without = rung(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
     assert without.in_sample.stations == (~out).sum()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_held_out_velocities_lie_within_their_band_as_often_as_told(slope: Array, friction: float) -> None:
+    """Friction that is a little off everywhere acts like the roughness of the bed, which is calibrated to the other
+    sections: taken for independent of that, nearly all lay within the band of half of them.
+    """
+    table, random = stations(), np.random.default_rng(9)
+    noise = with_model_error(noise_of(table.assign(value=0.0)), friction * slope[:, :1])
+    inside = []
+    for _ in range(200):
+        truth = random.standard_normal(slope.shape[1])
+        values = slope @ truth + noise.lower @ random.standard_normal(len(table))
+        here, start = replace(noise, value=values), at_best(CASE, table, values, slope)
+        white = here.whiten(slope)
+        z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ here.whiten(values))
+        fitted = at_point(here, replace(start.fitted.point, z=z, prediction=slope @ z))
+        found = rung(replace(start, noise=here, fitted=fitted)).predictive
+        inside.append((found.inside50, found.inside95))
+    half, most = np.mean(inside, axis=0)
+    assert half == pytest.approx(0.5, abs=0.02)
+    assert most == pytest.approx(0.95, abs=0.01)
 
 
 def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) -> None:

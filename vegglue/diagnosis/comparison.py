@@ -2,7 +2,10 @@
 
 Held out: each section, or each experiment, is left out in turn and the model calibrated again by one exact linear step,
 
-    dz = (J' C^-1 J + 1)^-1 (J' C^-1 r - z)   over the rows kept,   error r - J dz of those left out.
+    dz = V (J' C^-1 r - z),   V = (J' C^-1 J + 1)^-1   over the rows kept,   error r_o - J_o dz of those left out,
+    spread^2 = diag(C_oo + J_o V J_o' - 2 J_o V J' C^-1 C_o),
+
+C_o between those kept and those left out: what the model errs by in both is calibrated away with the parameters.
 """
 
 from collections.abc import Collection, Mapping
@@ -217,19 +220,21 @@ def _predictive_scores(error: Array, spread: Array) -> PredictiveScores:
 
 
 def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
-    """Errors of stations when their group is left out, and the spread they were predicted with (n,)."""
+    """Errors of stations when their group is left out, and the spread they were predicted with (n,), see above."""
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)
     error, spread = np.full(left.size, np.nan), np.full(left.size, np.nan)
     names = dict.fromkeys(groups)
     if len(names) < 2:
         return error, spread
-    own = np.diag(covariance_of(noise))
+    errors = covariance_of(noise)
     for name in names:
-        out = np.flatnonzero(groups == name)
-        step, covariance = _step(noise, slope, left, point.z, np.flatnonzero(groups != name))
+        out, kept = np.flatnonzero(groups == name), np.flatnonzero(groups != name)
+        step, covariance = _step(noise, slope, left, point.z, kept)
         error[out] = left[out] - slope[out] @ step
-        spread[out] = np.sqrt(own[out] + np.einsum("ij,jk,ik->i", slope[out], covariance, slope[out]))
+        shared = np.linalg.solve(errors[np.ix_(kept, kept)], errors[np.ix_(kept, out)])
+        of_step = slope[out] @ covariance - 2.0 * shared.T @ slope[kept] @ covariance
+        spread[out] = np.sqrt(np.diag(errors)[out] + np.einsum("ij,ij->i", of_step, slope[out]))
     return error, spread
 
 
