@@ -92,6 +92,16 @@ def test_a_section_that_a_boat_measured_moves_as_one() -> None:
     assert halfway(station, 8.0)["x"].tolist() == pytest.approx([3.9, 4.0, 4.1, 7.1, 7.0, 6.9])
 
 
+def test_a_section_that_lies_a_little_off_in_another_experiment_is_no_next_one() -> None:
+    """Stations moved by 1 cm, where the data know the flow: what may hide between the sections was not seen."""
+    off = {"low": 2.0, "high": 2.02}
+    station = pd.concat([
+        pd.DataFrame({"kind": "velocity", "x": [x, x, 6.0], "y": [0.0, 1.0, 0.0], "section": [f"x{x:.2f}"] * 2 + ["B"]})
+        .assign(experiment=experiment, used=True) for experiment, x in off.items()
+    ], ignore_index=True)  # fmt: skip
+    assert halfway(station, 10.0)["x"].tolist() == pytest.approx([4.0, 4.0, 8.0, 4.01, 4.01, 8.0])
+
+
 @pytest.mark.parametrize(("there", "told"), [(0.29, False), (0.31, True), (-0.31, True)])
 def test_what_acts_mostly_where_nobody_measured_is_told(
     there: float, told: bool, monkeypatch: pytest.MonkeyPatch

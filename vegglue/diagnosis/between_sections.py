@@ -77,12 +77,19 @@ def _read_at(station: pd.DataFrame, base: Baseline) -> Array:
 
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
-    """The stations of velocities moved halfway to the next section downstream, or to the end of the channel [m]."""
+    """The stations of velocities moved halfway to the next section of their experiment downstream, or to the end of the
+    channel [m]: in another one a boat lies some centimetres off.
+    """
     velocity = station[station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()]
     middle = section_places(velocity)
-    places = np.unique(middle)
-    ahead = dict(zip(places, 0.5 * (np.append(places[1:], end) - places), strict=True))
-    return velocity.assign(x=np.minimum(velocity["x"] + middle.map(ahead), end))
+
+    def ahead(of_experiment: "pd.Series[float]") -> "pd.Series[float]":
+        places = np.unique(of_experiment)
+        steps = 0.5 * (np.append(places[1:], end) - places)
+        return of_experiment.map(dict(zip(places, steps, strict=True)))
+
+    moved = velocity["x"] + middle.groupby(velocity["experiment"]).transform(ahead)
+    return velocity.assign(x=np.minimum(moved, end))
 
 
 def _errors_between(where: SearchModel) -> tuple[Array, Array] | None:
