@@ -50,6 +50,21 @@ def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
     assert 0.0 < low < high < 4.0, "no section crosses a patch; what is in it is seen all the same"
 
 
+def test_a_section_of_which_nothing_is_used_has_seen_nothing(model: Model) -> None:
+    """Outside the grid it counted as measured at the end of the channel, and laws as seen there."""
+    coarse = coarser(model)
+    assert coarse is not None
+    last = coarse.station["section"] == "C"
+    station = coarse.station.assign(
+        used=coarse.station["used"] & ~last, x=np.where(last, model.case.grid.x[1] + 5.0, coarse.station["x"])
+    )
+    without = station[station["used"]].reset_index(drop=True)
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    kept, left_out = (laws_in_case(replace(coarse, station=table), point, []) for table in (station, without))
+    assert [(one.law.name, one.seen) for one in kept] == [(one.law.name, one.seen) for one in left_out]
+
+
 @cache
 def ground_of(seed: int) -> TwinBase:
     """The truth before something is hidden in it: most tests share it."""
