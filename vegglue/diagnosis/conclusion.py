@@ -19,6 +19,7 @@ from vegglue.diagnosis.unseen import unseen_ratio
 from vegglue.diagnosis.verdict import POOR, Grounds, judged
 from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
+from vegglue.measurements.kinds import velocity_rows
 from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
@@ -89,7 +90,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
     """What the verdict rests on, but for fields and laws."""
     silent = not (found.steps or found.places or found.undecided)
     return Grounds(
-        errors=_errors(last, found),
+        errors=estimated_errors(last, found),
         misfit=misfit,
         findings=found,
         field=None,
@@ -124,10 +125,11 @@ def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
     )
 
 
-def _errors(screening: Screening, found: Findings) -> EstimatedErrors:
+def estimated_errors(screening: Screening, found: Findings) -> EstimatedErrors:
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in found.flagged)
-    return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid_error), flagged)
+    velocity = velocity_rows(screening.base.model.station.iloc[noise.rows])
+    return EstimatedErrors(noise.correlation, noise.scale, root_mean_square(noise.grid_error[velocity]), flagged)
 
 
 def _model_error(screening: Screening) -> ModelErrorUsed | None:

@@ -164,7 +164,7 @@ class Misfit:
 @dataclass(frozen=True)
 class EstimatedErrors:
     """What the errors were taken to be: correlation of neighbours [-], true over stated errors [-], root mean square
-    error of the grid, and rows of the stations rejected as outliers.
+    error of the grid in velocities [m/s], NaN without any, and rows of the stations rejected as outliers.
     """
 
     correlation: float
