@@ -3,13 +3,22 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
+import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_location, a_suspect
 from verdicts import step
 
 from vegglue.case.config import load_case
-from vegglue.results.diagnosis import Step
+from vegglue.case.parameter_space import theta_at
+from vegglue.effects.library import library
+from vegglue.engine.interface import Model
+from vegglue.engine.newton import NEWTON
+from vegglue.results.diagnosis import ParameterEstimates, Step
+from vegglue.screening.candidates import place_candidate, with_effect
+from vegglue.site.gridded_site import build_site
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.next_measurement import next_measurement
 
@@ -51,3 +60,19 @@ def test_next_asks_what_tells_a_place_from_an_effect(
     case = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
     assert [question.tells_apart for question in next_measurement(case, runs=tmp_path)] == ([asked] if asked else [])
     assert given == ([sorted(asked.split(" from "))] if asked else [])
+
+
+def test_what_hides_beside_a_place_is_asked_of_the_model_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The diagnosis calls it untestable there; without the place the trace of helical_flow was 200 times weaker."""
+    case = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
+    base: Any = SimpleNamespace(model=Model(case, build_site(case), pd.DataFrame(), NEWTON))
+    name = next(iter(with_effect(case, place_candidate(library()[PLACE.effect], PLACE.shapes), {}).effects))
+    middle = theta_at(case, np.zeros(len(case.parameters)))
+    last = {one: (float(value[0]), 0.0, 1.0) for one, value in middle.items()} | {f"{name}_drag": (0.4, 0.3, 0.5)}
+    found = replace(NOTHING, places=(PLACE,), parameters=ParameterEstimates({}, last))
+    monkeypatch.setattr(verb, "baseline", lambda model, known: (model, known))
+    monkeypatch.setattr(verb, "for_prediction", lambda made: made)
+    model, known = cast("tuple[Model, np.ndarray]", verb.with_places(base, found))
+    assert model.case.effects[name].values["x"] == PLACE.x
+    assert known == pytest.approx([0.0] * len(case.parameters) + [0.4 / PLACE.plausible], abs=1e-6)
+    assert verb.with_places(base, NOTHING) is base

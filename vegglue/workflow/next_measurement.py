@@ -1,12 +1,16 @@
 """case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from vegglue.calibration.baseline import Baseline, baseline, for_prediction
+from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_at, candidate_named
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
@@ -97,13 +101,26 @@ def next_measurement(
     if asked:
         with at_most(jobs):
             watch(Progress(with_compilation(f"calibrating {case.name}")))
-            base = calibrated(case, folder_of(runs, case), excluded_by(found), watch)
+            base = with_places(calibrated(case, folder_of(runs, case), excluded_by(found), watch), found)
             watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
     if not between:
         write_questions(folder_of(runs, case), [open_question(one) for one in questions], wanted)
     return questions
+
+
+def with_places(base: Baseline, found: Diagnosis) -> Baseline:
+    """The calibrated model with the places that its diagnosis found, as that calls untestable what hides beside them.
+
+    From where the diagnosis ended.
+    """
+    if not found.places:
+        return base
+    case = base.model.case
+    child = with_additions(case, [(candidate_at(case, place), place.shapes) for place in found.places])
+    known = z_at(child, {name: np.array([found.parameters.last[name][0]]) for name in child.parameters})[0]
+    return for_prediction(baseline(replace(base.model, case=child), known))
 
 
 def open_question(question: Question) -> OpenQuestion:
