@@ -1,6 +1,8 @@
 """Something at a place is looked for between the spots of the screening, in the flow that it leaves."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +12,13 @@ from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import z_of
+from vegglue.diagnosis.competition import promising_spots
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.engine.interface import linearise
 from vegglue.screening.candidates import place_candidate, with_effect
+from vegglue.screening.places import Places
 from vegglue.screening.residual_screening import Screening, screen
 
 # Between the spots, which stand 0.5 m and 0.45 m apart: drag below zero pushes, as a jet does.
@@ -58,3 +62,17 @@ def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None
     assert away(dict(found.refit.shapes)) < 0.35
     assert found.refit.amplitude * drag > 0.0
     assert abs(found.refit.shapes["x"] - 14.3) < 2.0 * found.spread[0] + 0.1
+
+
+def test_nothing_more_is_looked_for_where_something_acts_already() -> None:
+    """Of another length at the same x and y it had the same name, and took the place of the first in the case; a
+    parameter without an effect was left.
+    """
+    x, length = np.array([10.0, 12.0, 10.0, 14.0]), np.array([0.5, 0.5, 2.0, 2.0])
+    places = Places("drag", x, np.zeros(4), length, np.full(4, 0.5), 1.0, np.zeros((1, 4)))
+    evidence = np.array([9.0, 8.0, 9.5, 7.0])
+    kind = SimpleNamespace(name="drag", log_evidence=evidence, total=10.0)
+    acting = place_candidate(OBJECT, places.shapes(0))
+    for case, spots in ((CASE, [0, 2]), (with_effect(CASE, acting, {}), [1, 3])):
+        screening: Any = SimpleNamespace(kinds=(kind,), search=SimpleNamespace(model=SimpleNamespace(case=case)))
+        assert promising_spots(screening, places, 10.0) == spots

@@ -95,7 +95,7 @@ def _round(screening: Screening, linear: Array, best: float, tried: set[str]) ->
     kinds, candidates = {kind.name: kind for kind in screening.kinds}, screening.fingerprints.candidates
     effects = [j for j in _worth_refitting(screening, linear, best) if candidates[j].name not in tried]
     places = [
-        (one, _promising_spots(one, kinds[one.term], best))
+        (one, promising_spots(screening, one, best))
         for one in screening.fingerprints.places
         if f"{one.term} at a place" not in tried and _within_reach(kinds[one.term].total, best)
     ]
@@ -176,12 +176,17 @@ def _most_promising(of_each: Array) -> list[int]:
     return [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
 
 
-def _promising_spots(places: Places, kind: HypothesisKind, best: float) -> list[int]:
-    """The best spot of each length, those within reach."""
-    evidence = kind.log_evidence
+def promising_spots(screening: Screening, places: Places, best: float) -> list[int]:
+    """The best spot of each length, those within reach; none where something of the term acts already: an effect at
+    the same place has its name, and would take its place in the case.
+    """
+    kind, case = next(kind for kind in screening.kinds if kind.name == places.term), screening.search.model.case
+    effect = library(case.effect_file)[EFFECT_AT_PLACE[places.term]]
+    acting = [place_candidate(effect, places.shapes(spot)).key in case.effects for spot in range(places.x.size)]
+    evidence = np.where(acting, -np.inf, kind.log_evidence)
     of_length = [np.flatnonzero(places.length == length) for length in np.unique(places.length)]
     spots = [int(columns[np.argmax(evidence[columns])]) for columns in of_length]
-    charge = kind.total - float(evidence.max())
+    charge = kind.total - float(kind.log_evidence.max())
     return [spot for spot in spots if _within_reach(float(evidence[spot]) + charge, best)]
 
 

@@ -85,6 +85,8 @@ def _moved(search: SearchModel, places: Places, refit: Refit, moves: int) -> tup
         return refit, window
     shapes = {**refit.shapes, "x": round(float(window.x[best]), 2), "y": round(float(window.y[best]), 2)}
     candidate = place_candidate(refit.candidate.effect, shapes, places.plausible)
+    if candidate.key in search.model.case.effects:  # it would take the place of what acts there
+        return refit, window
     start = start_with(search.model.case, candidate, shapes, refit.fitted.point.z[:-1], float(window.gain[best]))
     (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
     if there is None or there.log_factor < refit.log_factor + LEAST_RISE:
