@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from vegglue.calibration.fit import objective
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 from vegglue.screening import score_test
+from vegglue.screening.evidence import prior_shrinkage
 from vegglue.screening.residual_screening import Screening
 
 # Rate at which errors alone make some listed effect score higher than what counts as detectable.
@@ -57,7 +59,10 @@ def _suspect(screening: Screening, candidate: int, threshold: float) -> Suspect:
 
 
 def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimate:
-    """gain = T / |S_perp|, with a standard error of 1 / |S_perp|."""
+    """gain = T / |S_perp|, with a standard error of 1 / |S_perp|; objective F - T^2 a^2 / (1 + a^2), a of `evidence`,
+    F under the errors as they are told now: what the prior of the amplitude costs is in it, as in that of a refit.
+    """
+    base, shrinkage = screening.base, prior_shrinkage(screening.kinds[0].size[column])
     amplitude, length = screening.fingerprints.amplitudes[column], _length(screening, column)
     score = screening.effects.scores[column]
     gain = float(score) / length
@@ -69,7 +74,7 @@ def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimat
         scale=amplitude.scale,
         refitted=False,
         support=(amplitude.low, amplitude.high),
-        objective=screening.base.fitted.objective - float(score**2),
+        objective=objective(base.noise, base.fitted.point) - float(score**2 * shrinkage),
     )
 
 

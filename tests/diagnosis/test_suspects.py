@@ -1,0 +1,37 @@
+"""What is told of an effect to first order: on a model that is linear, where it is what a refit would give."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+
+from vegglue.diagnosis.suspects import suspects_of
+from vegglue.effects.library import library
+from vegglue.screening.candidates import Candidate
+from vegglue.screening.fingerprints import Fingerprints
+from vegglue.screening.residual_screening import screen
+
+STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
+
+
+@pytest.mark.parametrize("visible", [0.2, 5.0])
+def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visible: float) -> None:
+    """Without it an effect that the data hardly see was told to explain more than its refit does."""
+    random = np.random.default_rng(4)
+    slope = 0.02 * random.standard_normal((len(STATION), len(CASE_OF_TWINS.parameters)))
+    effect = library()["bank_trend"]
+    own = replace(effect, amplitude=replace(effect.amplitude, scale=1.0))
+    trace = visible * 0.01 * random.standard_normal((len(STATION), 1)) / len(STATION) ** 0.5
+    values = (
+        slope @ random.standard_normal(slope.shape[1]) + 1.5 * trace[:, 0] + 0.01 * random.standard_normal(len(STATION))
+    )
+    base = at_best(CASE_OF_TWINS, STATION, values, slope)
+    known = Fingerprints(
+        base.fitted.point, [Candidate(own)], [np.array([0])], [{}], [own.amplitude], [], trace, places=()
+    )
+    screening = screen(base, (), known)
+    refitted = at_best(CASE_OF_TWINS, STATION, values, np.hstack([slope, trace])).fitted
+    (suspect,) = suspects_of(screening).values()
+    assert (screening.base.noise.correlation, screening.base.noise.scale) == (0.0, 1.0)
+    assert suspect.amplitude.objective == pytest.approx(refitted.objective, abs=1e-6)
