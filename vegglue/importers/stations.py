@@ -13,6 +13,7 @@ from vegglue.importers.columns_of_table import NAMES_OF_BED
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.known_experiments import KnownExperiments
+from vegglue.importers.lost_places import refuse_lost_places
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
@@ -42,7 +43,7 @@ class StationTable:
 
 @dataclass(frozen=True)
 class StationTables:
-    """The tables of one file; left_out: how many of its rows are in none of them and what they lack, in words."""
+    """The tables of one file; left_out: what they lack, how many of its rows are in none of them and why, in words."""
 
     tables: list[StationTable]
     left_out: tuple[str, ...]
@@ -58,17 +59,19 @@ def station_tables(
     taken: Taken, stem: str, words: FileWords, known: KnownExperiments, place: Placement, file: str
 ) -> StationTables:
     """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
-    no_place = _lacking(taken, [role for role in ("x", "y") if role in taken.numbers], np.all)
+    at = [role for role in ("x", "y") if role in taken.numbers]
+    no_place = _lacking(taken, at, np.all)
     taken = _named(taken, words, known.names, f"{file}:")
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
+    on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
-        lacking = (*no_place, *_lacking(taken, ["u", str(_vertical_role(taken))], np.all), *beside)
+        lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(_vertical_role(taken))], np.all), *beside)
         return StationTables([_points(taken, stem, words)], lacking)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    return StationTables([table for table in found if table.rows], (*no_place, *no_value))
+    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value))
 
 
 def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str) -> None:
@@ -98,13 +101,13 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
             "`files` of the site file, or give `line` or `position` there."
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
-    if "y" not in place:
-        taken = taken.having({"y": np.zeros(taken.size)}, "y = 0 for want of a column")
     names = _experiments(taken, words, experiments, where)
     sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
     if sections is None or "" in sections:
         sections = _sections(taken.numbers["x"])
-    return replace(taken, words={**taken.words, "experiment": names, "section": sections})
+    named = replace(taken, words={**taken.words, "experiment": names, "section": sections})
+    refuse_lost_places(named, where.removesuffix(":"))
+    return named if "y" in place else named.having({"y": np.zeros(named.size)})
 
 
 def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> list[str]:

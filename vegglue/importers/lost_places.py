@@ -1,0 +1,45 @@
+"""A table whose velocities would all fall on the axis, as the column that says where they stand across is not known."""
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError
+from vegglue.importers.column_names import unit_stated
+from vegglue.importers.measured_rows import Taken
+from vegglue.importers.number_words import is_number, number_in
+
+VELOCITIES = ("u", "v", "speed")
+
+
+def refuse_lost_places(taken: Taken, file: str) -> None:
+    """Errors: InputError where velocities of one x differ by a length that is in no role: they are no repeats.
+
+    taken: rows with an experiment, a section and x. What differs by no length, such as the time, may be repeats.
+    """
+    if "y" in taken.numbers or not taken.numbers.keys() & set(VELOCITIES):
+        return
+    for heading, lengths in _lengths_unread(taken).items():
+        seen: dict[tuple[str, str, float], float] = {}
+        places = zip(taken.words["experiment"], taken.words["section"], taken.numbers["x"].tolist(), strict=True)
+        for place, length in zip(places, lengths.tolist(), strict=True):
+            if np.isfinite(length) and seen.setdefault(place, length) != length:
+                raise InputError(
+                    f"{file}: expected where across the channel each velocity was measured, got no column of y, and "
+                    f"velocities at x = {place[2]:g} m that differ in {heading!r}; name it by "
+                    "`columns: {y: ...}` of this file in `files` of the site file, y = 0 on the axis (or by `height` "
+                    "or `z`, if it is one), or take it out where they are repeats at one place."
+                )
+
+
+def _lengths_unread(taken: Taken) -> dict[str, Array]:
+    """By heading: readings along a tape, and columns of no role whose headings state a unit of length."""
+    found = {taken.columns["tape"]: taken.numbers["tape"]} if "tape" in taken.numbers else {}
+    for heading, texts in taken.others.items():
+        if unit_stated(heading, "length") and all(is_number(text) for text in texts if text.strip()):
+            found[heading] = np.array([_value(text) for text in texts])
+    return found
+
+
+def _value(text: str) -> float:
+    value = number_in(text, decimal_comma="," in text)
+    return np.nan if value is None else value
