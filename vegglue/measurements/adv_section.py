@@ -24,6 +24,7 @@ from vegglue.measurements.vertical_profile import (
     FEWEST_POINTS,
     CanopyHeight,
     Column,
+    average_within_plants,
     few_points_average,
     fit_canopy_height,
     fit_log_law,
@@ -285,6 +286,9 @@ def _profile(points: pd.DataFrame) -> dict[str, object]:
     if len(wet) < FEWEST_POINTS:
         average, error = few_points_average(column, bool(first["plants"]))
         return row | {"fitted": average, "fitted_error": error, "law": "few points"}
+    if fit is None and first["plants"]:
+        average, error = average_within_plants(column)
+        return row | {"fitted": average, "fitted_error": error, "law": "uniform at the bed"}
     if fit is None:
         return row | {"fitted": linear, "fitted_error": linear_error, "law": "linear"}
     fitted, fitted_error = fit.average(column.depth)

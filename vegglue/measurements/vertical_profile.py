@@ -124,20 +124,28 @@ def few_points_average(column: Column, among_plants: bool) -> tuple[float, float
     """U and its standard error [m/s] of fewer than FEWEST_POINTS points, which do not tell the profile.
 
     Without plants U = a (L - 1 + e^-L) of the log law u = a (L + ln(z / h)), a by weighted least squares, with L =
-    USUAL_ROUGHNESS; its error that of the points and FEW_POINTS_ERROR. Among plants as `linear_average`, but uniform
-    below the lowest point; what zero at the bed would change is the bound of a uniform distribution.
+    USUAL_ROUGHNESS; its error that of the points and FEW_POINTS_ERROR. Among plants see `average_within_plants`.
     Source: ISO 748:2007 for the errors; the average is the integral of the log law.
     """
     if among_plants:
-        zero_at_bed, sampling = linear_average(column)
-        more = 0.5 * column.height[0] / max(column.depth, column.height[-1]) * float(column.velocity[0])
-        return zero_at_bed + more, float(np.hypot(sampling, more / np.sqrt(3.0)))
+        return average_within_plants(column)
     rise = np.maximum(USUAL_ROUGHNESS + np.log(column.height / column.depth), 0.0)
     weight = rise / column.standard_error**2
     share = (USUAL_ROUGHNESS - 1.0 + np.exp(-USUAL_ROUGHNESS)) / max(float(weight @ rise), TINY)
     average = share * float(weight @ column.velocity)
     sampling = share * float(np.linalg.norm(weight * column.standard_error))
     return average, float(np.hypot(sampling, FEW_POINTS_ERROR[len(column.height)] * average))
+
+
+def average_within_plants(column: Column) -> tuple[float, float]:
+    """U and its standard error [m/s] of points among plants that show no top: stems keep u even down to the bed.
+
+    As `linear_average`, but uniform below the lowest point; what zero at the bed would change is the bound of a uniform
+    distribution.
+    """
+    zero_at_bed, sampling = linear_average(column)
+    more = 0.5 * column.height[0] / max(column.depth, column.height[-1]) * float(column.velocity[0])
+    return zero_at_bed + more, float(np.hypot(sampling, more / np.sqrt(3.0)))
 
 
 def fit_log_law(column: Column) -> ProfileFit | None:
