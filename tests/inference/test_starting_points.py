@@ -15,7 +15,8 @@ from vegglue.case.parameter_space import z_at
 from vegglue.engine.interface import Point, linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
-from vegglue.inference.map_and_errors import distinct_modes, standardised_residual, starting_points
+from vegglue.inference import map_and_errors
+from vegglue.inference.map_and_errors import distinct_modes, find_modes, standardised_residual, starting_points
 from vegglue.inference.refine import log_posterior, refine
 from vegglue.inference.tried_members import points_of_prior
 from vegglue.measurements.observations import read_observations
@@ -92,3 +93,19 @@ def test_what_stands_out_is_standard_normal_otherwise(reach: SolvedReach) -> Non
     value = point.prediction.copy()
     value[4] += 0.1
     assert np.argmax(np.abs(standardised_residual(replace(noise, value=value), point))) == 4
+
+
+def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A floodplain ended without a posterior: from the one mode on coarse cells no flow was found on its own."""
+    case = load_case(write_reach(tmp_path, ("cell: [1.0, 0.5]", "cell: [0.5, 0.375]"), STATED_ERRORS))
+    observations = read_observations(case)
+    model, noise = model_of(case, observations), noise_of(observations.table)
+    with at_most(1):
+        tried = points_of_prior(model)
+        usual = find_modes(model, noise, tried)
+        monkeypatch.setattr(map_and_errors, "_refine", lambda *_: None)
+        anew = find_modes(model, noise, tried)
+    assert usual.on_coarse, "there are coarse cells to begin with"
+    assert anew.fits[0].objective == pytest.approx(usual.fits[0].objective, abs=0.1)

@@ -49,7 +49,7 @@ class FoundModes:
 
 
 def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch = silent) -> FoundModes:
-    """The modes of the posterior under given errors.
+    """The modes of the posterior under given errors. Where none is refined on finer cells, the members start there.
 
     Errors: InputError when no steady flow is found from any of the members.
     """
@@ -57,9 +57,13 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch = s
     before: list[MapEstimate] = []
     ends = _apart(_fit_all(grids[0], noise, starts, watch))
     for coarse, finer in pairwise(grids):
-        before, ends = ends, distinct_modes(_refine_all(finer, coarse, noise, ends, watch))
+        refined = _refine_all(finer, coarse, noise, ends, watch)
+        before, ends = ends, distinct_modes(refined or _fit_all(finer, noise, starts, watch))
     if not ends:
-        raise InputError(f"{model.case.name}: no steady flow was found from the best members; use `--method glue`.")
+        raise InputError(
+            f"{model.case.name}: no steady flow was found from the best members; solve some by "
+            "`vegglue simulate CONFIG` and weigh them by `vegglue infer CONFIG --method glue`."
+        )
     return FoundModes(tuple(ends), len(starts), tuple(before))
 
 
