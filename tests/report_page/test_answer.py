@@ -118,7 +118,7 @@ def test_without_a_diagnosis_the_calibration_speaks_and_the_command_is_named(toy
 
 def test_the_name_of_a_file_is_no_markup(toy: Run) -> None:
     named = replace(toy, case=toy.case.model_copy(update={"source": Path("a<b>&c.yaml")}))
-    assert "vegglue run a&lt;b&gt;&amp;c.yaml" in answer_of(named).ladder_words
+    assert "vegglue run &#x27;a&lt;b&gt;&amp;c.yaml&#x27;" in answer_of(named).ladder_words
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.case.schema import Case
+from vegglue.cli.output import command_line
 from vegglue.errors import shown_path
 from vegglue.figures.typography import PLAIN_TEXT
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
@@ -25,14 +26,19 @@ _number = PLAIN_TEXT.number
 
 def show_posterior(case: Case, folder: Path, posterior: Posterior) -> None:
     """Print what was found of a case; the posterior is kept in its folder."""
-    for line in brief_posterior(posterior, f"{folder / 'posterior.h5'}", shown_path(case.source)):
+    command = command_line("report", shown_path(case.source), runs=folder.parent)
+    for line in brief_posterior(posterior, f"{folder / 'posterior.h5'}", command):
         print(line)
 
 
-def brief_posterior(posterior: Posterior, kept_in: str, config: str) -> list[str]:
-    """At most LINES lines of COLUMNS: how it was found, parameters, fit, doubts, and where all of it is."""
+def brief_posterior(posterior: Posterior, kept_in: str, command: str) -> list[str]:
+    """At most LINES lines of COLUMNS: how it was found, parameters, fit, doubts, and where all of it is.
+
+    command: that makes the report, on one line however long it is, as it is copied.
+    """
     head = _wrapped([_found(posterior)]) + _table(posterior)
-    foot = _wrapped([f"All of it: {kept_in}; in sentences and figures: vegglue report {config}"])
+    where = f"All of it: {kept_in}; in sentences and figures:"
+    foot = [f"{where} {command}"] if len(f"{where} {command}") <= COLUMNS else [where, f"  {command}"]
     body = [_wrapped([text]) for text in (*_fit(posterior), *doubts(posterior))]
     room, shown = LINES - len(head) - len(foot) - 1, []
     while body and len(body[0]) <= room:

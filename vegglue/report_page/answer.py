@@ -4,6 +4,7 @@
 """
 
 import html
+import shlex
 from dataclasses import dataclass
 
 from vegglue.figures.error_rows import draw_error_rows
@@ -45,7 +46,7 @@ class CaseAnswer:
 def answer_of(run: Run) -> CaseAnswer:
     """The answer of a run; its pictures are written to run.folder/figures. run.flow is not asked for."""
     ladder = run.loop.ladder
-    command = f"<code>vegglue run {html.escape(run.case.source.name)}</code>"
+    command = f"<code>vegglue run {html.escape(shlex.quote(run.case.source.name))}</code>"
     missing = f"{command} would show here how far the error falls with what is missing."
     return CaseAnswer(
         name=run.case.name,

@@ -4,6 +4,7 @@ The facts that the terminal prints too are written in posterior_words.py and hom
 """
 
 import html
+import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -185,7 +186,7 @@ def _set_aside_since(run: Run) -> Iterator[Finding]:
     """Readings of the posterior that a diagnosis made after it set aside."""
     if many := run.set_aside_since:
         of = f"{count(many, 'reading')} that the diagnosis set aside {'is' if many == 1 else 'are'}"
-        again = f"<code>vegglue infer {html.escape(run.case.source.name)}</code> makes one without"
+        again = f"<code>vegglue infer {html.escape(shlex.quote(run.case.source.name))}</code> makes one without"
         yield Finding("stations", f"{of} still in this posterior; {again}.", doubt=True)
 
 

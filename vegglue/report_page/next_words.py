@@ -1,6 +1,7 @@
 """What to do next, in words (HTML): the command, the page, the measurement that leads on."""
 
 import html
+import shlex
 from collections.abc import Iterator
 
 from vegglue.effects.library import library
@@ -19,7 +20,7 @@ QUESTIONS_SHOWN = 3
 
 def next_steps(run: Run) -> list[str]:
     """What to do next, the first thing first."""
-    command = html.escape(run.case.source.name)
+    command = html.escape(shlex.quote(run.case.source.name))
     if run.behind is None:
         return [f"<code>vegglue diagnose {command}</code> tells which physical effect this model lacks, if any."]
     return [*_better_model(run), *_measurements(run, command), *_of_instruments(run.behind)]
@@ -34,11 +35,11 @@ def _better_model(run: Run) -> Iterator[str]:
     ladder, found = run.loop.ladder, run.behind
     assert found is not None
     if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
-        command = html.escape(run.case.source.name)
+        command = html.escape(shlex.quote(run.case.source.name))
         yield f"<code>vegglue discover {command}</code> calibrates laws that are in no list, and writes the best."
     if ladder is None:
         if found.steps or found.places:
-            command = html.escape(run.case.source.name)
+            command = html.escape(shlex.quote(run.case.source.name))
             yield f"<code>vegglue extend {command} --auto</code> adds what is missing, and shows the error fall."
         return
     if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:

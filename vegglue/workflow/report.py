@@ -1,5 +1,6 @@
 """case -> page: everything known of a run as one HTML file, and its figures beside it."""
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,7 +82,7 @@ def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
     if last != case.name and page.exists():
         raise InputError(
             f"{shown_path(case.source)}: the run went on to {last}, whose report is {shown_path(page)}; for one of "
-            f"{case.name} itself run `vegglue infer {shown_path(case.source)}` first."
+            f"{case.name} itself run `vegglue infer {shlex.quote(shown_path(case.source))}` first."
         )
 
 

@@ -1,5 +1,6 @@
 """case -> twin: measurements with a hidden effect and a sealed answer; and how well its diagnosis guessed."""
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -55,5 +56,7 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
     lines = guess_in_words(answer, diagnosis)
     if diagnosis is None:
-        lines.append(f"No diagnosis of it in {there}: `vegglue diagnose {config_in(folder)}` makes one.")
+        lines.append(
+            f"No diagnosis of it in {there}: `vegglue diagnose {shlex.quote(str(config_in(folder)))}` makes one."
+        )
     return lines
