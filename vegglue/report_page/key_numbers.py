@@ -9,7 +9,7 @@ from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import UNBELIEVED, identification
+from vegglue.report_page.posterior_words import DOUBTED, UNBELIEVED, identification
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -61,6 +61,8 @@ def against_measurement_error(posterior: Posterior, kind: str, miss: float) -> s
         return "; without standard errors nothing can be said of how large it should be"
     if unexplained_error(posterior, kind, miss):
         return f", {short(miss / error, 2)} times the measurement error of {with_unit(error, kind)}"
+    if miss > error and _misfit_below(posterior, DOUBTED):
+        return f", which the measurement error of {with_unit(error, kind)} hardly explains"
     return f", no more than the measurement error of {with_unit(error, kind)} explains"
 
 
@@ -154,9 +156,14 @@ def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
     """
     used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
     count = max(int(used.sum()), 1)
-    error, refined = measurement_error(posterior, kind), posterior.refinement
-    doubted = refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < UNBELIEVED
+    error, doubted = measurement_error(posterior, kind), _misfit_below(posterior, UNBELIEVED)
     return miss > error * float(np.sqrt(scipy.special.chdtri(count, UNBELIEVED) / count)) or (doubted and miss > error)
+
+
+def _misfit_below(posterior: Posterior, chance: float) -> bool:
+    """Whether stated errors leave so much at all stations together less often than that; unknown counts as no."""
+    refined = posterior.refinement
+    return refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < chance
 
 
 def with_unit(value: float, kind: str) -> str:
