@@ -14,6 +14,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
+from vegglue.flow.joined_problems import joined
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
@@ -58,7 +59,7 @@ def _linearised(
         problem = _problem(model, experiment, members)
         state = _rested(problem, _start(problem, near, experiment), time_step, longest)
         prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
-        flows[experiment] = state[..., :1]
+        flows[experiment] = state[..., :1].copy()
     if not np.isfinite(prediction).all() or not wanted(prediction[0]):
         return None
     ahead, behind = prediction[1 : 1 + z.size], prediction[1 + z.size :]
@@ -76,16 +77,24 @@ def _predicted(model: Model, points: Sequence[Point], z: Array, time_step: float
 
 
 def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: float, longest: float) -> Array:
-    """(f(small) - f(off)) / gain of small, one march for each cause and experiment in which it acts."""
+    """(f(small) - f(off)) / gain of small; all causes that act in an experiment are marched side by side."""
     found = np.zeros((len(model.station), len(causes)))
     theta = theta_at(model.case, point.z)
-    for j, cause in enumerate(causes):
-        value = np.array([cause.amplitude.off + cause.amplitude.small])
-        for experiment in cause.experiments or model.case.experiments:
-            problem = build_problem(cause.case, model.site, experiment, theta | {cause.parameter: value})
-            state = _rested(problem, point.flows[experiment], time_step, longest)
-            moved = _read(model, experiment, problem, state)[0] - point.prediction[model.rows[experiment]]
-            found[model.rows[experiment], j] = moved / cause.amplitude.gain(cause.amplitude.off + cause.amplitude.small)
+    values = [np.array([cause.amplitude.off + cause.amplitude.small]) for cause in causes]
+    gains = np.array([cause.amplitude.gain(value[0]) for cause, value in zip(causes, values, strict=True)])
+    for experiment in model.case.experiments:
+        here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
+        if not here:
+            continue
+        with_causes = [
+            build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: values[j]})
+            for j in here
+        ]
+        problem = joined(with_causes)
+        state = _rested(problem, _start(problem, point, experiment), time_step, longest)
+        rows = model.rows[experiment]
+        moved = _read(model, experiment, problem, state) - point.prediction[rows]
+        found[np.ix_(rows, np.array(here))] = moved.T / gains[here]
     return found
 
 
