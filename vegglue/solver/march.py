@@ -12,7 +12,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.flow.closures import Closures, closures, wall_rates
-from vegglue.flow.equations import Faces, faces, residual, storage
+from vegglue.flow.equations import Faces, faces, residual_of, side_fluxes, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
 from vegglue.solver import sweeps
@@ -35,9 +35,10 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
     now = faces(problem, state)
     # Never below a thousandth, so that dry land keeps a water table.
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
-    along, across = _damping(problem, now, closures(problem, state, now.cell))
-    change, outlet = -residual(problem, state), problem.boundaries.outlet
+    closed, outlet = closures(problem, state, now.cell), problem.boundaries.outlet
     length = _shortest(problem)
+    along, across = _damping(problem, now, closed, length)
+    change = -residual_of(problem, state, now.cell, side_fluxes(problem, now.cell), closed)
     sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
     sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
@@ -96,10 +97,9 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
     return Marched(state, False, steps, f"still changing by {rate:.1e} per second after {steps * how.step:g} s")
 
 
-def _damping(problem: Problem, now: Faces, closed: Closures) -> tuple[Array, Array]:
+def _damping(problem: Problem, now: Faces, closed: Closures, shortest: float) -> tuple[Array, Array]:
     """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    shortest = _shortest(problem)
     cell = (
         2.0 * np.abs(closed.rate) * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / shortest + np.abs(v) / problem.dy
     )
