@@ -96,11 +96,11 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             found = _with_steps(found, (*again, *last))
         else:  # amplitudes that were calibrated with these readings are no longer true
             suspects = {step.accepted: suspects[step.accepted] for step in found.steps}
-        for step in found.steps:
-            suspects[step.accepted] = _in_model(suspects[step.accepted], base)
         watch(Progress("looking for what is missing with it"))
         at_hand = following.screening if base is following.base else None
         screening = at_hand or screen(base, found.flagged)
+        for step in found.steps:
+            suspects[step.accepted] = _in_model(suspects[step.accepted], screening.base)
     return concluded(first, screening, found, suspects, unseen)
 
 

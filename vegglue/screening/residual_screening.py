@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
+from vegglue.calibration.fit import at_point
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.case.parameter_space import z_of
 from vegglue.flow.local_changes import Term
@@ -43,8 +44,8 @@ GROUPS = 4
 class Screening:
     """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
 
-    base: with the noise as estimated here; search: its model that is fitted again and again; flagged: readings of
-    instruments found to be off, indices among the used ones.
+    base: with the noise as estimated here, at the place of its fit; search: its model that is fitted again and again;
+    flagged: readings of instruments found to be off, indices among the used ones.
     whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
     projected out. effects: score tests of candidates. kinds: evidence of all kinds, that of
     listed effects first, then of places by term, then of `instruments`; errors (draws, n): whitened errors alone.
@@ -105,7 +106,8 @@ def screen(
     def against(values: Array) -> score_test.Projected:
         return score_test.project(noise.whiten(slope), noise.whiten(residual), z, noise.whiten(values))
 
-    projected, with_noise = against(of_effects), replace(base, noise=noise)
+    # What is known of the parameters, and told of them, is known under the errors as they are told now.
+    projected, with_noise = against(of_effects), replace(base, noise=noise, fitted=at_point(noise, base.fitted.point))
     in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
     of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
     return Screening(
