@@ -37,6 +37,7 @@ def test_odds_are_told_against_the_closest_other_term() -> None:
     assert "400 to 1 against bed" in said(grounds(places=(a_location(odds=odds),)))[1]
     assert "over 1,000 to 1 against bed" in said(grounds(places=(a_location(odds={"bed": 7000.0}),)))[1]
     assert "against" not in said(grounds(places=(a_location(odds={"wind": 2.0}),)))[1]
+    assert "; 1 to 3 against bed" in said(grounds(places=(a_location(odds={"bed": 0.35}),)))[1], "and not 0 to 1"
 
 
 def test_a_field_is_none_of_the_known_effects() -> None:

@@ -33,9 +33,7 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 
 def _place_words(place: Location) -> str:
     rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
-    against = [
-        f"{_odds(odds)} to 1 against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]
-    ]
+    against = [f"{_odds(odds)} against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]]
     low, high = place.interval95
     unit = f" {place.unit}"
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
@@ -59,7 +57,10 @@ def _give_or_take(error: float) -> str:
 
 
 def _odds(odds: float) -> str:
-    return "over 1,000" if odds > 1000 else f"{odds:.0f}"
+    """30 to 1, or 1 to 3 of what was taken all the same once it was followed further."""
+    if odds < 1.0:
+        return f"1 to {1.0 / odds:.0f}" if odds > 0.001 else "1 to over 1,000"
+    return "over 1,000 to 1" if odds > 1000 else f"{odds:.0f} to 1"
 
 
 def field_sentence(field: FieldFound) -> str:
