@@ -2,15 +2,19 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from diagnoses import NOTHING, a_location, a_suspect, laws_suspected_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+from verdicts import grounds
 
 from vegglue.calibration.noise import GRID_ERROR_SHARE, with_grid_error
+from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.conclusion import estimated_errors
 from vegglue.diagnosis.findings import Findings
+from vegglue.screening.residual_screening import Screening
 
 
 @pytest.mark.parametrize(("kinds", "told"), [(("velocity", "discharge"), 0.001), (("level", "discharge"), np.nan)])
@@ -22,3 +26,25 @@ def test_the_error_of_the_grid_is_that_of_velocities(kinds: tuple[str, str], tol
     difference = np.where(station["kind"] == "velocity", 0.001, 0.02) / GRID_ERROR_SHARE
     screening: Any = SimpleNamespace(base=replace(base, noise=with_grid_error(base.noise, difference)))
     assert estimated_errors(screening, Findings()).grid_error == pytest.approx(told, nan_ok=True)
+
+
+def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They were those of the model with the place, beside scores, misfit and parameters of the one without."""
+    station = stations_of(CASE_OF_TWINS, ("A",), 4)
+    bases = [at_best(CASE_OF_TWINS, station, np.full(12, value), np.zeros((12, 4))) for value in (0.1, 0.2)]
+    first, last = (cast("Screening", SimpleNamespace(base=base)) for base in bases)
+    laws, judged = laws_suspected_of("law_bank_speed_step", chance=0.99), []
+    stubs = {
+        "laws_suspected": lambda *_: laws, "suspects_of": lambda one: {"wind": tested[one is first]},
+        "_misfit": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
+        "_place_map": lambda *_: None, "_parameters": lambda *_: None,
+        "_grounds": lambda used, *_: judged.append(used) or grounds(), "judged": lambda *_: NOTHING.verdict,
+    }  # fmt: skip
+    tested = {True: a_suspect("wind", test={"score": 0.3}), False: a_suspect("wind", test={"score": 4.0})}
+    for name, stub in stubs.items():
+        monkeypatch.setattr(conclusion, name, stub)
+    found = conclusion.concluded(first, last, Findings(places=(a_location(),)), {"wind": tested[False]}, None)
+    assert judged == [first]
+    assert (found.places, found.suspects) == ((), (tested[True],))

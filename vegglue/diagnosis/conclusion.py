@@ -12,7 +12,7 @@ from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
-from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded
+from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded, suspects_of
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
 from vegglue.diagnosis.unseen import unseen_ratio
@@ -54,7 +54,7 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     laws = laws_suspected(first, last, found)
     if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
-        last, found = first, replace(found, places=(), charges=(), of_shape=0.0)
+        last, found, suspects = first, replace(found, places=(), charges=(), of_shape=0.0), suspects_of(first)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit = _misfit(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
