@@ -99,3 +99,15 @@ def test_what_promised_most_and_keeps_less_leaves_room_for_others(
     found = contenders_of(screening, silent)
     assert "".join(tried) == refitted
     assert {one.name for one in found} == set(refitted) - ({"a"} if kept is None else set())
+
+
+def test_without_a_listed_effect_all_else_competes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(competition, "second_look", lambda _: None)
+    monkeypatch.setattr(competition, "refits_of", lambda *_: [])
+    none = SimpleNamespace(name="effect", total=-np.inf, log_evidence=np.zeros(0), log_prior=np.zeros(0))
+    gauge = SimpleNamespace(name="gauge", total=2.0, best=0)
+    fingerprints = SimpleNamespace(candidates=[], columns=[], places=())
+    screening = SimpleNamespace(
+        kinds=(none, gauge), fingerprints=fingerprints, instruments={"gauge": ("the gauge",)}, search=None
+    )
+    assert [one.what for one in contenders_of(screening, silent)] == ["the gauge"]

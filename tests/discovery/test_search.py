@@ -10,11 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import at_point
+from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.discovery.discovered import Discovery
 from vegglue.discovery.search import discover_laws
+from vegglue.effects.library import library
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
+from vegglue.screening.law_screening import law_fingerprints
 from vegglue.screening.laws_in_case import LEAST_SPREAD, laws_in_case, products_in_case
 from vegglue.twins.hidden_effect import TwinBase
 from vegglue.twins.twin import measured_twin, true_place, twin_base
@@ -63,6 +68,19 @@ def test_a_section_of_which_nothing_is_used_has_seen_nothing(model: Model) -> No
     assert point is not None
     kept, left_out = (laws_in_case(replace(coarse, station=table), point, []) for table in (station, without))
     assert [(one.law.name, one.seen) for one in kept] == [(one.law.name, one.seen) for one in left_out]
+
+
+def test_laws_are_looked_for_with_no_listed_effect_beside_them(model: Model) -> None:
+    """`--without` all of them ended in a traceback."""
+    coarse = coarser(model)
+    assert coarse is not None
+    point, noise = linearise(coarse, np.zeros(len(model.names))), noise_of(coarse.station)
+    assert point is not None
+    base = Baseline(coarse, noise, at_point(noise, point), None, None)
+    found = law_fingerprints(base, tuple(library()))
+    assert found.listed.candidates == []
+    assert found.listed.values.shape == (len(coarse.station), 0)
+    assert len(found.every.candidates) == len(found.laws) > 30
 
 
 @cache

@@ -65,7 +65,7 @@ def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     """
     kind, second = screening.kinds[0], second_look(screening)
     linear = _linear_evidence(kind, second)
-    best = max(*(kind.total for kind in screening.kinds), float(linear.max()), elsewhere)
+    best = max(*(kind.total for kind in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
     found, tried = _instrument_contenders(screening), set[str]()
     while True:
         of_round = _round(screening, linear, best, tried)

@@ -119,7 +119,7 @@ def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...]
 def _left(found: Fingerprints, without: tuple[str, ...]) -> Fingerprints:
     """Fingerprints but for those of some listed effects."""
     kept = [j for j, one in enumerate(found.candidates) if one.effect.name not in without]
-    columns = np.concatenate([found.columns[j] for j in kept]).astype(int)
+    columns = np.concatenate([np.zeros(0), *(found.columns[j] for j in kept)]).astype(int)
     starts = np.cumsum([0, *(found.columns[j].size for j in kept)])
     return replace(
         found,
