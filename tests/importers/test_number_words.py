@@ -11,7 +11,7 @@ from vegglue.importers.number_words import has_decimal_comma, is_number, number_
         ("0,5", True, 0.5), ("-1,5e-3", True, -0.0015), ("3", True, 3.0), ("0.5", False, 0.5), (".5", False, 0.5),
         ("1.236,00", True, 1236.0), ("1,236.50", False, 1236.5), ("1'236.5", False, 1236.5),
         ("12 001 236,5", True, 12001236.5),
-        ("1d3", False, 1000.0), ("n/a", True, None), ("", False, None),
+        ("1d3", False, 1000.0), ("n/a", True, None), ("", False, None), ("k.A.", True, None), ("n.d.", False, None),
     ],
 )  # fmt: skip
 def test_a_number_is_read_as_written(text: str, decimal_comma: bool, value: float | None) -> None:

@@ -6,7 +6,10 @@ from collections.abc import Iterable
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
 # Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
 GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
-MISSING_WORDS = ("", "-", "--", "nan", "na", "n/a", "null", "none", "nodata", "#n/a", "inf", "-inf")
+MISSING_WORDS = (
+    "", "-", "--", "---", "nan", "na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "null", "none", "nodata", "no data",
+    "missing", "#n/a", "#nv", "inf", "-inf",
+)  # fmt: skip
 
 
 def is_number(text: str) -> bool:
