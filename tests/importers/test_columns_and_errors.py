@@ -1,5 +1,6 @@
 """Columns are what their headings say, every reading counts once, and stated errors arrive with their values."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from field_folders import CHANNEL, JUNE, folder_of
 
 import vegglue
 from vegglue.case.schema import Case
+from vegglue.errors import InputError
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import read_rows
 from vegglue.measurements.observations import read_observations
@@ -180,3 +182,30 @@ def test_an_error_follows_the_unit_that_the_site_file_says(tmp_path: Path) -> No
     taken = read_rows(tmp_path / "a.csv", FileWords(units={"u": "cm/s"}))
     assert taken.numbers["u_se"].tolist() == pytest.approx([0.003])
     assert taken.units["u_se"] == "cm/s"
+
+
+@pytest.mark.parametrize(
+    ("heading", "level"),
+    [("WL (cm ü. Sohle)", 0.95), ("WL [cm above datum]", 0.95), ("WL (in cm)", 0.95), ("WL (m a.s.l.)", 95.0)],
+)
+def test_a_unit_may_have_words_behind_it(tmp_path: Path, heading: str, level: float) -> None:
+    """Levels in cm above the floor were read as metres."""
+    (tmp_path / "a.csv").write_text(f"x;y;{heading}\n1;2;95\n2;2;95\n", encoding="utf-8")
+    assert read_rows(tmp_path / "a.csv", FileWords()).numbers["level"].tolist() == pytest.approx([level, level])
+
+
+@pytest.mark.parametrize(
+    ("headings", "columns"),
+    [
+        ("Longitude (deg),Latitude (deg)", {"x": "Longitude (deg)", "y": "Latitude (deg)"}),
+        ("lon,lat", {"x": "lon", "y": "lat"}),
+        ("x [°],y [°]", {}),
+        ("Longitude,Latitude", {}),
+    ],
+)
+def test_places_in_degrees_are_refused(tmp_path: Path, headings: str, columns: dict[str, str]) -> None:
+    """Degrees were read as metres: 63 stations of a transect became 2."""
+    site = CHANNEL + JUNE + f"files: {{a.csv: {{columns: {json.dumps(columns)}}}}}\n"
+    folder = folder_of(tmp_path / "brook", site, a__csv=f"{headings},u\n8.5417,47.3769,0.4\n8.5418,47.3769,0.5\n")
+    with pytest.raises(InputError, match="degrees; convert longitudes and latitudes to metres"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

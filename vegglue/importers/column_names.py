@@ -62,6 +62,7 @@ ROLES = {
         Role("device", "", ("device", "instrument", "probe", "sensor")),
     )
 }  # fmt: skip
+DEGREES = {"lat", "latitude", "lon", "long", "lng", "longitude", "breite", "breitengrad", "laenge", "langengrad"}
 _ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
 
 
@@ -86,10 +87,11 @@ def known_name(heading: str) -> tuple[str, str | None] | None:
 
 def unit_stated(heading: str, quantity: str) -> str | None:
     """The unit of a quantity that a heading states, whatever its name is: `cm/s` for `Geschw. (cm/s)`, `V, cm/s` and
-    `V_cm_s`; None where it states none.
+    `V_cm_s`, also with words behind it, `(m above datum)`; None where it states none.
     """
     bare, unit = _apart(heading)
-    words = [unit, *(word for _, word in _suffixed(bare))]
+    first = unit.removeprefix("in ").split(" ", 1)[0]
+    words = [unit, first, *(word for _, word in _suffixed(bare))]
     return next((said for word in words if (said := unit_named(word, quantity))), None)
 
 
@@ -106,6 +108,12 @@ def _suffixed(name: str) -> list[tuple[str, str]]:
     """x_m as x in m, u_cm_s as u in cm/s: the unit as the last part of the name, or the last two."""
     parts = re.split(r"[\s_]+", name.strip())
     return [("_".join(parts[:-last]), "/".join(parts[-last:])) for last in (1, 2) if len(parts) > last]
+
+
+def is_in_degrees(heading: str) -> bool:
+    """Whether a column of places holds degrees of longitude or latitude, by its name or its unit."""
+    name = words_of(heading).split()
+    return bool(name) and (name[0] in DEGREES or unit_stated(heading, "angle") is not None)
 
 
 def words_of(name: str) -> str:

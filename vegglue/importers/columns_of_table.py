@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, known_name, role_of, unit_stated, words_of
+from vegglue.importers.column_names import ROLES, is_in_degrees, known_name, role_of, unit_stated, words_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
 from vegglue.importers.unit_words import UNITS, unit_named
@@ -27,6 +27,7 @@ VALUES_OF = {
     "level_se": ("level",),
     "discharge_se": ("discharge",),
 }
+NO_DEGREES = "degrees; convert longitudes and latitudes to metres on a map, such as UTM or the national grid."
 NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 
 
@@ -100,8 +101,10 @@ def unit_of_column(path: Path, table: LooseTable, columns: Mapping[str, int], ro
     if role in words.units:
         return unit_named(words.units[role], quantity) or words.units[role]
     heading = table.headings[place]
+    if role in ("x", "y") and is_in_degrees(heading):
+        raise InputError(f"{shown_path(path)}: expected lengths in column {heading!r} for {role}, got {NO_DEGREES}")
     known = role_of(heading)
-    by_heading = (known[1] if known else None) or _bracketed(heading) or unit_stated(heading, quantity)
+    by_heading = (known[1] if known else None) or unit_stated(heading, quantity) or _bracketed(heading)
     stated = table.units[place].strip("[]() ") or by_heading
     if not stated:
         values = next((one for one in VALUES_OF.get(role, ()) if one in columns), None)

@@ -8,8 +8,8 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
-from vegglue.importers.column_names import known_name
-from vegglue.importers.columns_of_table import NAMES_OF_BED
+from vegglue.importers.column_names import is_in_degrees, known_name
+from vegglue.importers.columns_of_table import NAMES_OF_BED, NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.known_experiments import KnownExperiments
@@ -96,6 +96,8 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     place = [role for role in ("x", "y") if role in taken.numbers]
     if "x" not in place:
         headings = ", ".join([*taken.columns.values(), *taken.others])
+        if any(map(is_in_degrees, taken.others)):
+            raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
             "`files` of the site file, or give `line` or `position` there."
