@@ -209,3 +209,11 @@ def test_places_in_degrees_are_refused(tmp_path: Path, headings: str, columns: d
     folder = folder_of(tmp_path / "brook", site, a__csv=f"{headings},u\n8.5417,47.3769,0.4\n8.5418,47.3769,0.5\n")
     with pytest.raises(InputError, match="degrees; convert longitudes and latitudes to metres"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+def test_columns_that_are_not_read_are_said(tmp_path: Path) -> None:
+    """An error headed `sd` was dropped, and nothing said so."""
+    table = "no;exp;x;y;u;sd;Remark\n1;June;8;0;0.4;0.01;\n2;June;9;0;0.4;0.01;weed\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv=table), tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert case.imported[0].taken.endswith("2 rows; not read: no, sd and Remark")

@@ -120,6 +120,10 @@ def test_a_workbook_is_read_like_a_table(tmp_path: Path) -> None:
     book.save(tmp_path / "book.xlsx")
     taken = read_rows(tmp_path / "book.xlsx", FileWords(columns={"x": "Station x"}))
     assert taken.numbers["u"].tolist() == [0.5, 0.605]
+    book.create_sheet("Levels")
+    book.save(tmp_path / "book.xlsx")
+    assert "only sheet Sheet; measurements of Levels need a file" in read_loosely(tmp_path / "book.xlsx").form
+    assert "Levels" not in read_loosely(tmp_path / "book.xlsx", "Sheet").form
     with pytest.raises(InputError, match="expected the sheet 'June', got Sheet"):
         read_loosely(tmp_path / "book.xlsx", "June")
     (tmp_path / "none.xlsx").write_bytes(b"PK no workbook")

@@ -14,7 +14,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.number_words import has_decimal_comma, is_number, number_in
 from vegglue.importers.unit_words import is_unit
-from vegglue.in_short import so_many
+from vegglue.in_short import listed, so_many
 
 COMMENTS = ("#", "%", "//", "!", "$")
 # In the order of trust: a comma may also be decimal, and a space stand in a name.
@@ -48,7 +48,7 @@ def read_loosely(path: Path, sheet: str | None = None) -> LooseTable:
     Errors: InputError when the file cannot be read or holds no table of numbers with two columns or more.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        return _table(path, _sheet(path, sheet), "workbook", "")
+        return _table(path, *_sheet(path, sheet), "")
     lines, comments = _without_comments(readable_text(path))
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
@@ -166,7 +166,8 @@ def _padded(fields: list[str], width: int) -> list[str]:
     return (fields + [""] * width)[:width]
 
 
-def _sheet(path: Path, name: str | None) -> list[Line]:
+def _sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
+    """The rows of a sheet, and in words which of several it is."""
     try:
         import openpyxl
     except ImportError:
@@ -181,7 +182,10 @@ def _sheet(path: Path, name: str | None) -> list[Line]:
             if name is not None and name not in book.sheetnames:
                 raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
             chosen = book[name] if name is not None else book.worksheets[0]
-            return list(_lines_of_sheet(path, chosen.iter_rows(values_only=True)))
+            others = [sheet.title for sheet in book.worksheets if sheet.title != chosen.title]
+            only = f" (only sheet {chosen.title}; measurements of {listed(others)} need a file of their own)"
+            form = "workbook" + (only if others and name is None else "")
+            return list(_lines_of_sheet(path, chosen.iter_rows(values_only=True))), form
 
 
 def _lines_of_sheet(path: Path, rows: Iterable[tuple[Any, ...]]) -> Iterator[Line]:

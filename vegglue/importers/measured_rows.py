@@ -15,12 +15,13 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
 from vegglue.importers.placement import Placement
 from vegglue.importers.unit_words import si_factor
-from vegglue.in_short import so_many
+from vegglue.in_short import listed, so_many
 
 # Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
 # 99 m may be a level. Others are named by `missing` in the site file.
 MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
+MOST_UNREAD = 12  # columns that are named of those that were not read: more are a list that nobody reads
 LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
 # What an entry of `files` may say of other files, and does nothing to a table.
 OF_RECORDS = {
@@ -178,13 +179,16 @@ def _in_all(role: str, parts: Sequence[Taken]) -> bool:
 
 
 def taken_in_words(taken: Taken) -> str:
-    """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma, 12 rows`."""
+    """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma; 12 rows; not read: Pt, Remarks`."""
     units = {role: f" [{unit}]" for role, unit in taken.units.items()}
     roles = [
         f"{role} from {_without(heading, taken.units.get(role))}{units.get(role, '')}"
         for role, heading in taken.columns.items()
     ]
-    return f"{', '.join(roles)}; {', '.join(taken.said)}; {so_many(taken.size, 'row')}"
+    unread = [heading for heading in taken.others if heading.strip()]
+    more = [f"{len(unread) - MOST_UNREAD} more"] if len(unread) > MOST_UNREAD else []
+    said = f"; not read: {listed([*unread[:MOST_UNREAD], *more])}" if unread else ""
+    return f"{', '.join(roles)}; {', '.join(taken.said)}; {so_many(taken.size, 'row')}{said}"
 
 
 def _without(heading: str, unit: str | None) -> str:

@@ -41,6 +41,7 @@ def read_tape_table(path: Path, words: FileWords) -> Taken:
             f"{shown_path(path)}: expected rows with place, depth and mean velocity, got {len(table.rows)} rows of "
             f"{', '.join(table.headings)}; export it anew."
         )
+    taken = replace(taken, others={})  # what else the program writes is known, and not wanted
     wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0)
     return on_the_tape(path, last_of_each_place(taken.only(wet)), words)
 
