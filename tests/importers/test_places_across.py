@@ -1,7 +1,9 @@
 """Where across the channel velocities stand: a wading survey must not fall on the axis unsaid."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from field_folders import CHANNEL, JUNE, folder_of
 
@@ -34,3 +36,43 @@ def test_repeats_on_the_axis_are_averaged_and_it_is_said(tmp_path: Path, table: 
     assert case.imported is not None
     assert "1 repeats averaged, too few" in case.imported[0].taken
     assert "y = 0 for want of a column" in case.imported[0].taken
+
+
+WADING = "Chainage (m);Dist. from left bank (m);Velocity (m/s)\n10;0.5;0.41\n10;1.5;0.52\n18;0.5;0.40\n"
+FROM_THE_BANK = '{columns: {y: "Dist. from left bank (m)"}, flip: y, zero: [1, 250 cm]}'
+
+
+@pytest.mark.parametrize(
+    ("words", "table", "places"),
+    [
+        (FROM_THE_BANK, WADING, [(11, 2.0), (11, 1.0), (19, 2.0)]),
+        ("{zero: [0, -1]}", "x;y;u\n1;0.5;0.4\n", [(1, -0.5)]),
+        ("{x: 12 m}", "y;u\n-1;0.4\n1;0.5\n", [(12, -1), (12, 1)]),
+        ("{line: [[8, 2], [8, -2]]}", "Distance (m);Velocity\n0.5;0.4\n1;0.5\n", [(8, 1.5), (8, 1)]),
+        ("{line: [[8, 2], [8, -2]]}", "DMG (m);Depth (m);Mean Speed (m/s)\n0.5;1;0.4\n1;1;0.5\n", [(8, 1.5), (8, 1)]),
+    ],
+)
+def test_the_site_file_helps_a_table_to_its_places(
+    tmp_path: Path, words: str, table: str, places: list[tuple[float, float]]
+) -> None:
+    """A table without x was told to give `line`, and refused with it."""
+    site = CHANNEL + JUNE + f"files: {{a.csv: {words}}}\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", site, a__csv=table), tmp_path / "brook.yaml")
+    found = read_observations(case).table
+    assert found[["x", "y"]].to_numpy() == pytest.approx(np.array(places, dtype=float))
+
+
+@pytest.mark.parametrize(
+    ("words", "table", "said"),
+    [
+        ("{line: [[8, 2], [8, -2]]}", "y;u\n1;0.4\n", "a table that says its own places in y; take it out"),
+        ("{line: [[8, 2], [8, -2]]}", "when;u\n1;0.4\n", "column with readings of the tape for `line`, got u, when;"),
+        ("{x: 8}", "x;y;u\n1;1;0.4\n", "expected no `x` in its entry of `files`"),
+        ("{zero: [0, 1], coordinates: map}", "x;y;u\n1;1;0.4\n", "either `zero`, a place in the channel, or"),
+        ("{zero: 3}", "x;y;u\n1;1;0.4\n", "zero expected 2 numbers in m, got 3"),
+    ],
+)
+def test_words_of_places_that_make_no_sense_are_refused(tmp_path: Path, words: str, table: str, said: str) -> None:
+    site = CHANNEL + JUNE + f"files: {{a.csv: {words}}}\n"
+    with pytest.raises(InputError, match=re.escape(said)):
+        vegglue.import_folder(folder_of(tmp_path / "brook", site, a__csv=table), tmp_path / "brook.yaml")

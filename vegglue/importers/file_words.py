@@ -16,7 +16,8 @@ class FileWords:
     """columns: name of the column of each role; units: unit of each role; missing: numbers that mark no value;
     experiment, section: of all rows; standard_error: by the SI unit of the values that it is of; coordinates,
     directions: whether places and components of velocity are those of the map or of the channel, None for map where
-    the site has a frame; flip: coordinates that run the other way;
+    the site has a frame; flip: coordinates that run the other way; zero: where in the channel those of the file are 0,
+    after `flip`; x: of all rows of a table that has none;
     line: ends of the tape (first its zero), for tables along a tape; start: where a boat started; position: of a probe
     whose record holds no place; sheet: of a workbook; floor, surface: z of the file at the lowest bed and at the water;
     draft: of a raw ADCP below the surface [m], None for that in the file; declination: of its compass, degrees that
@@ -32,6 +33,8 @@ class FileWords:
     coordinates: Literal["map", "channel"] | None = None
     directions: Literal["map", "channel"] | None = None
     flip: tuple[str, ...] = ()
+    zero: tuple[float, float] | None = None
+    x: float | None = None
     line: tuple[tuple[float, float], tuple[float, float]] | None = None
     start: tuple[float, float] | None = None
     position: tuple[float, float, float] | None = None
@@ -55,7 +58,13 @@ def file_words(given: Any, where: str) -> FileWords:
         changes[key] = _by_role(given.get(key, {}), f"{where}.{key}")
     for name, unit in changes["units"].items():
         si_factor(unit, ROLES[name].quantity or "length", f"{where}.units.{name}")
-    for key, quantity in (("floor", "length"), ("surface", "length"), ("draft", "length"), ("declination", "angle")):
+    for key, quantity in (
+        ("x", "length"),
+        ("floor", "length"),
+        ("surface", "length"),
+        ("draft", "length"),
+        ("declination", "angle"),
+    ):
         if key in given:
             changes[key] = in_si(given[key], quantity, f"{where}.{key}")
     if "standard_error" in given:
@@ -63,6 +72,8 @@ def file_words(given: Any, where: str) -> FileWords:
     changes |= _places(given, where)
     for key in {"coordinates", "directions"} & set(given):
         changes[key] = _one_of(given[key], ("map", "channel"), f"{where}.{key}")
+    if "zero" in given and changes.setdefault("coordinates", "channel") != "channel":
+        raise InputError(f"{where} expected either `zero`, a place in the channel, or `coordinates: map`, got both.")
     marks = given.get("missing", ())
     marks = marks if isinstance(marks, list | tuple) else [marks]
     if not all(isinstance(mark, int | float) and not isinstance(mark, bool) for mark in marks):
@@ -101,7 +112,7 @@ def _by_role(given: Any, where: str) -> dict[str, str]:
 
 def _places(given: Mapping[str, Any], where: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
-    for key, count in (("start", 2), ("position", 3)):
+    for key, count in (("zero", 2), ("start", 2), ("position", 3)):
         if key in given:
             found[key] = _numbers(given[key], count, f"{where}.{key}")
     if "line" in given:

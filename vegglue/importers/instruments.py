@@ -8,8 +8,9 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.matlab_exports import MAT_73_BEGINS, MAT_BEGINS, read_matlab
-from vegglue.importers.measured_rows import Taken, read_rows
+from vegglue.importers.measured_rows import Taken
 from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
+from vegglue.importers.placed_tables import read_placed_rows
 from vegglue.importers.qrev_summary import is_qrev_summary, read_qrev_summary
 from vegglue.importers.raw_transects import PD0_BEGINS, read_pd0
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
@@ -34,7 +35,7 @@ LONGEST_MARK = max(map(len, BY_BEGINNING))
 def reader_of(path: Path) -> InstrumentReader:
     """The reader that knows the file, told by how it begins. Errors: InputError for a record that none knows."""
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        return read_rows
+        return read_placed_rows
     begin = _beginning(path)
     known = next((reader for mark, reader in BY_BEGINNING.items() if begin.startswith(mark)), None)
     if known is not None:
@@ -52,7 +53,7 @@ def reader_of(path: Path) -> InstrumentReader:
         return read_qrev_summary
     if is_tape_table(text):
         return read_tape_table
-    return read_nortek if is_nortek(path, text) else read_rows
+    return read_nortek if is_nortek(path, text) else read_placed_rows
 
 
 def _beginning(path: Path) -> bytes:

@@ -26,8 +26,9 @@ def refuse_lost_places(taken: Taken, file: str) -> None:
                 raise InputError(
                     f"{file}: expected where across the channel each velocity was measured, got no column of y, and "
                     f"velocities at x = {place[2]:g} m that differ in {heading!r}; name it by "
-                    "`columns: {y: ...}` of this file in `files` of the site file, y = 0 on the axis (or by `height` "
-                    "or `z`, if it is one), or take it out where they are repeats at one place."
+                    "`columns: {y: ...}` of this file in `files` of the site file, with `flip: y` and `zero: [0, 2.5]` "
+                    "where it counts from a left bank 2.5 m off the axis (or by `height` or `z`, if it is one), or "
+                    "take it out where they are repeats at one place."
                 )
 
 

@@ -123,7 +123,15 @@ def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
     if place.turned and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
         x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])
         taken = taken.having({"x": x, "y": y}, f"places turned from the map into {place.words}")
-    return _flipped(_along_and_across(taken, place, words), words.flip)
+    return _from_zero(_flipped(_along_and_across(taken, place, words), words.flip), words.zero)
+
+
+def _from_zero(taken: Taken, zero: tuple[float, float] | None) -> Taken:
+    """The places counted from those of the channel."""
+    if zero is None:
+        return taken
+    moved = {axis: taken.numbers[axis] + at for axis, at in zip("xy", zero, strict=True) if axis in taken.numbers}
+    return taken.having(moved, f"zero at x = {zero[0]:g}, y = {zero[1]:g} m")
 
 
 def _along_and_across(taken: Taken, place: Placement, words: FileWords) -> Taken:

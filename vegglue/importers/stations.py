@@ -100,7 +100,7 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
             raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
-            "`files` of the site file, or give `line` or `position` there."
+            "`files` of the site file, or give there `x: 12 m` of all rows, `line` of a tape or `position` of a probe."
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
     names = _experiments(taken, words, experiments, where)
