@@ -12,7 +12,7 @@ from vegglue.effects.definition import Effect
 from vegglue.flow.equations import residual
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import read_sensors
+from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.site.gridded_site import Site, build_site
 
 AMPLITUDE = "amplitude"
@@ -110,7 +110,7 @@ def mirrored(state: Array) -> Array:
 
 def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
     """All that an effect can change: the residual (nx, 3, ny, m), and the readings (station, m)."""
-    return residual(problem, state), read_sensors(problem, state, tried.site.grid, TRIAL_STATIONS, ()).prediction.T
+    return residual(problem, state), predictions_at_sensors(problem, state, tried.site.grid, TRIAL_STATIONS).T
 
 
 def sizes(effect: Effect) -> tuple[float, ...]:

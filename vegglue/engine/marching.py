@@ -18,7 +18,7 @@ from vegglue.flow.joined_problems import joined
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import read_sensors
+from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.site.channel_geometry import channel_geometry
 from vegglue.solver.march import march
 
@@ -149,4 +149,4 @@ def _rested(problem: Problem, state: Array, time_step: float, longest: float) ->
 
 
 def _read(model: Model, experiment: str, problem: Problem, state: Array) -> Array:
-    return read_sensors(problem, state, model.site.grid, model.station_of(experiment), ()).prediction
+    return predictions_at_sensors(problem, state, model.site.grid, model.station_of(experiment))

@@ -14,7 +14,7 @@ from vegglue.engine.newton_runs import predict_members
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import EMPTY, Problem, crop
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import read_sensors
+from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.newton import CLOSE
@@ -213,7 +213,7 @@ def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> 
 def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
     """Predictions (m, stations of the experiment) of states in a band."""
     wide = widen(state, model.site.grid.y.size, band)
-    return read_sensors(problem, wide, model.site.grid, model.station_of(experiment), ()).prediction
+    return predictions_at_sensors(problem, wide, model.site.grid, model.station_of(experiment))
 
 
 NEWTON = Engine(

@@ -11,7 +11,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Model, Point
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import read_sensors
+from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import side_by_side
 from vegglue.solver.batch import solve_members
 from vegglue.solver.march import fall_back
@@ -71,7 +71,7 @@ def _read_alone(model: Model, experiment: str, z: Array) -> Array:
     build = partial(_problem_at, model, experiment)
     solved = solve_members(problem, ndtr(z), build, numerics.tolerance, how=how)
     state = np.ascontiguousarray(solved.state)
-    prediction = read_sensors(problem, state, model.site.grid, model.station_of(experiment), ()).prediction
+    prediction = predictions_at_sensors(problem, state, model.site.grid, model.station_of(experiment))
     prediction[solved.status == FAILED] = np.nan
     return prediction
 

@@ -1,8 +1,10 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.case_effects import Theta, active_effects, value_of
@@ -31,6 +33,8 @@ from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_witho
 
 # Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
 WHERE_WATER_ENTERS = 0.2
+# Pairs of a site and a set of patches of which the cells are kept: those of a model and of its coarser ones.
+PLANTED_KEPT = 8
 
 
 def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Problem:
@@ -150,8 +154,7 @@ def _entering(lateral: Array, added: Mapping[str, Array], geometry: ChannelGeome
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int) -> VegetatedCells:
     """Vegetated cells of the patches present; phi is proportional to stems."""
-    column, row = np.ascontiguousarray(np.nonzero(np.isin(site.patch, patches_present(case, experiment))))
-    index = site.patch[column, row]
+    column, row, index = _planted_cells(site, patches_present(case, experiment))
     fields, law = np.empty((3, column.size, members)), np.empty(column.size, dtype=np.int64)
     for patch in np.unique(index):
         stems, name = case.plants.patches[patch].stems, case.plants.patches[patch].stand
@@ -161,6 +164,15 @@ def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int)
         law[index == patch] = plant_laws.PLANT_LAWS.index(stand.law)
     proportional = case.numerics.emergent == "proportional"
     return VegetatedCells(column, row, law, fields[0], fields[1], fields[2], proportional)
+
+
+@lru_cache(PLANTED_KEPT)  # every problem of every member asks for the same
+def _planted_cells(
+    site: Site, patches: tuple[int, ...]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Column, row and patch (cell,) of the cells in which one of some patches stands."""
+    column, row = np.ascontiguousarray(np.nonzero(np.isin(site.patch, patches)))
+    return column, row, site.patch[column, row]
 
 
 def _stand(stand: Stand, override: StandOverride | None, theta: Theta, members: int) -> tuple[Array, Array, Array]:

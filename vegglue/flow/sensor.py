@@ -45,6 +45,23 @@ class Readings:
     fields: NDArray[np.float32]
 
 
+def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Array:
+    """What each station shows, (m, station) [unit of its kind], by the reader of its kind.
+
+    Errors: InputError for a kind of observation that nothing knows.
+    """
+    return _predictions(GriddedFlow(problem, state, grid), station)
+
+
+def _predictions(flow: GriddedFlow, station: pd.DataFrame) -> Array:
+    prediction = np.empty((len(station), flow.problem.members))
+    for kind, rows, x, y in _by_kind(station):
+        prediction[rows] = READERS[kind.name].read(flow, x, y)
+    if any(active.effect.stage == "sensor" for active in flow.problem.effects):
+        prediction = _shown(flow, prediction, station)
+    return prediction.T
+
+
 def read_sensors(
     problem: Problem,
     state: Array,
@@ -58,19 +75,14 @@ def read_sensors(
     Errors: InputError for a kind of observation that nothing knows.
     """
     flow = GriddedFlow(problem, state, grid)
-    now = flow.at_faces
-    prediction = np.empty((len(station), problem.members))
-    for kind, rows, x, y in _by_kind(station):
-        prediction[rows] = READERS[kind.name].read(flow, x, y)
-    if any(active.effect.stage == "sensor" for active in problem.effects):
-        prediction = _shown(flow, prediction, station)
+    now, prediction = flow.at_faces, _predictions(flow, station)
     through = flow.discharge
     entered = _entered(problem, now.cell)
     error = (np.abs(through - entered) / entered[-1]).max(axis=0)
     wet = now.cell[kept] > FILM_ON_LAND * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
     nearest = [nearest_face(grid, x) for _, x in sections]
-    return Readings(prediction.T, through[nearest].T, error, np.moveaxis(fields, -1, 0))
+    return Readings(prediction, through[nearest].T, error, np.moveaxis(fields, -1, 0))
 
 
 def _by_kind(station: pd.DataFrame) -> Iterator[tuple[Kind, NDArray[np.intp], Array, Array]]:
