@@ -4,6 +4,8 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,19 @@ def vegglue(folder: Path, *arguments: str | int | Path, succeed: bool = True) ->
     done = subprocess.run(
         command(*arguments), cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300, check=False
     )
+    assert not succeed or done.returncode == 0, done.stderr
+    return done
+
+
+def here(folder: Path, *arguments: str | int | Path, succeed: bool = True) -> subprocess.CompletedProcess[str]:
+    """As `vegglue`, in this process: libraries are imported, and a model is calibrated, once for all commands."""
+    said, errors = StringIO(), StringIO()
+    with pytest.MonkeyPatch.context() as patched, redirect_stdout(said), redirect_stderr(errors):
+        patched.chdir(folder)
+        patched.setattr(sys, "argv", ["vegglue", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    done = subprocess.CompletedProcess(arguments, int(ended.value.code or 0), said.getvalue(), errors.getvalue())
     assert not succeed or done.returncode == 0, done.stderr
     return done
 

@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 import typer
 import yaml
 from open_cases import WANTED, assert_found
-from reach import ENVIRONMENT, ROOT, block, command, write_reach
+from reach import ROOT, block, here, write_reach
 
 import vegglue
 from vegglue.case.resolved_config import case_hash
@@ -232,9 +231,7 @@ def printed(line: str, folder: Path) -> list[str]:
     """What a command of vegglue prints, in a folder."""
     name, *arguments = line.split()
     assert name == "vegglue", line
-    done = subprocess.run(
-        command(*arguments), cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=900, check=False
-    )
+    done = here(folder, *arguments, succeed=False)
     assert done.returncode == 0, f"$ {line}\n{done.stderr}"
     return done.stdout.splitlines()
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from diagnoses import a_diagnosis, laws_suspected_of
-from reach import vegglue
+from reach import here
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
@@ -24,10 +24,10 @@ WITH_LAW = TWIN.model_copy(update={"name": "twin-law", "source": TWIN.source.wit
 def went(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A folder after `vegglue run` on a channel in which something is hidden, and what it said; no test changes it."""
     folder, config = tmp_path_factory.mktemp("went"), ROOT / "configs" / "twin.yaml"
-    vegglue(folder, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
+    here(folder, "twin", config, "--hide", "discharge_error[high]", "--snr", "10", "--seed", "3", "--to", "hidden")
     told = "extends: hidden.yaml\nname: small\nsimulate: {members: 16}\ninfer: {method: glue}\n"
     (folder / "hidden" / "small.yaml").write_text(told, encoding="utf-8")
-    return folder, vegglue(folder, "run", "hidden/small.yaml").stdout
+    return folder, here(folder, "run", "hidden/small.yaml").stdout
 
 
 @pytest.mark.slow
@@ -36,18 +36,18 @@ def test_a_hidden_effect_is_named_added_and_the_error_falls(went: tuple[Path, st
     folder = shutil.copytree(went[0], tmp_path, dirs_exist_ok=True)  # as deep: configs name each other
     child = next((folder / "hidden").glob("small+*.yaml"))
     child.unlink()
-    said = json.loads(vegglue(folder, "diagnose", "hidden/small.yaml", "--json").stdout)
+    said = json.loads(here(folder, "diagnose", "hidden/small.yaml", "--json").stdout)
     assert said["verdict"] in ("identified", "one-of")
     assert "discharge_error[high]" in said["set"]
     accused = next(one for one in said["effects"] if one["name"] == "discharge_error[high]")
     assert accused["p_family"] < 0.01
-    vegglue(folder, "extend", "hidden/small.yaml", "--auto")
-    rungs = json.loads(vegglue(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
+    here(folder, "extend", "hidden/small.yaml", "--auto")
+    rungs = json.loads(here(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
     assert rungs[1]["held_out_sections"] < rungs[0]["held_out_sections"]
     assert rungs[1]["chi2"] < 0.8 * rungs[0]["chi2"]
     by_hand = f"extends: small.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
     child.write_text(by_hand, encoding="utf-8")
-    again = vegglue(folder, "extend", "hidden/small.yaml", "--auto", succeed=False)
+    again = here(folder, "extend", "hidden/small.yaml", "--auto", succeed=False)
     assert (again.returncode, len(again.stderr.splitlines())) == (2, 1)
     assert "--force" in again.stderr
     assert child.read_text(encoding="utf-8") == by_hand, "what was written by hand is not replaced"
@@ -61,13 +61,13 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(went: tuple[Path, st
     made = {path.name for path in (folder / "runs" / child).iterdir()}
     assert made >= {"ensemble.h5", "posterior.h5", "report.html"}
     assert not (folder / "runs" / "small" / "posterior.h5").exists(), "that model is known to be wrong"
-    parent = vegglue(folder, "report", "hidden/small.yaml", succeed=False).stderr
+    parent = here(folder, "report", "hidden/small.yaml", succeed=False).stderr
     assert f"the run went on to {child}, whose report is runs/{child}/report.html" in parent
-    vegglue(folder, "overview", "hidden/small.yaml")
+    here(folder, "overview", "hidden/small.yaml")
     assert f"{child}/report.html" in (folder / "runs" / "overview.html").read_text(encoding="utf-8")
     assert (folder / "runs" / child / "ladder.png").exists()
     before = {path: path.stat().st_mtime_ns for path in (folder / "runs").rglob("*.h5")}
-    again = vegglue(folder, "run", "hidden/small.yaml").stdout
+    again = here(folder, "run", "hidden/small.yaml").stdout
     assert "up to date" in again
     assert before == {path: path.stat().st_mtime_ns for path in (folder / "runs").rglob("*.h5")}
 
