@@ -1,6 +1,7 @@
 """A table as people have it: any separator, a decimal comma, comments, a title, a row of units; text or XLSX."""
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
@@ -21,6 +22,8 @@ COMMENTS = ("#", "%", "//", "!", "$")
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 # Lines from the end of a file by which its separator is told: titles stand at its head.
 LOOKED_AT = 200
+# `U [m/s]` in a heading parted by spaces is one field; in a row of units none has a name before it.
+UNIT_BEHIND_NAME = re.compile(r"(?<=[^\s\])])\s+([\[(][^\s\[\]()]+[\])])")
 BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or not
 Line = tuple[int, list[str]]  # number in the file, from 1, and fields
 
@@ -97,7 +100,7 @@ def _separator(lines: Sequence[str]) -> str:
 
 def _fields(line: str, separator: str) -> list[str]:
     if separator == " ":
-        return line.split()
+        return UNIT_BEHIND_NAME.sub(lambda found: found[1] if is_unit(found[1]) else found[0], line).split()
     return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
 
 
