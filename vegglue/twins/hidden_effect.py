@@ -83,12 +83,17 @@ def _refuse_beyond_support(candidate: Candidate, size: float) -> None:
 
 
 def candidate_of(model: Model, name: str) -> Candidate:
-    """The effect that a name stands for, listed or `unlisted:NAME`. Errors: InputError."""
+    """The effect that a name stands for, listed or `unlisted:NAME`. Errors: InputError.
+
+    `discharge_error` is the one of the only experiment, if there is one only, by the name that a diagnosis has for it.
+    """
     if not name.startswith(UNLISTED):
         try:
-            return candidate_named(model.case, model.station, name)
+            named = candidate_named(model.case, model.station, name)
         except InputError as error:
             raise InputError(str(error).replace("--add:", "--hide:", 1)) from None
+        told = [one for one in candidates_of(model.case, model.station) if one.effect.name == named.effect.name]
+        return told[0] if len(told) == 1 and "[" not in name else named
     known = {UNLISTED + effect.name: effect for effect in unlisted_objects.EFFECTS}
     if name not in known:
         raise InputError(f"--hide: `{name}` is unknown: {nearest(name, known)}")
