@@ -268,6 +268,7 @@ def test_a_section_measures_what_has_entered_above_it(tmp_path, enters, main, sa
     remarks = list(remarks_on_discharges(case, observations))
     assert bool(remarks) == bool(said)
     assert all(f"the case says {said}." in one for one in remarks)
+    assert len(remarks) == bool(said), "by the rule of the case alone: two rules made a pair of every remark"
 
 
 def test_the_expected_water_is_parallel_to_the_floor_and_nowhere_below_the_outlet(tmp_path):

@@ -69,7 +69,8 @@ def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> f
 
 
 def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[str]:
-    """Discharges [m3/s] that differ from those of the ADV sections by more than their errors."""
+    """Discharges [m3/s] that differ from those of ADV sections, by the rule of the case, by more than their errors."""
+    rules = {(one.experiment, one.section): one.average for one in case.observations}
     for (name, section), by_rule in observations.discharge.items():
         given = entered_above(case, case.experiments[name], section_place(observations.table, name, section))
         if given is None:
@@ -77,6 +78,8 @@ def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[st
         parts = [prior_range(case, value) for value in given]
         total = (sum(low for low, _ in parts), sum(high for _, high in parts))
         for rule, measured in by_rule.items():
+            if rules.get((name, section), rule) != rule:
+                continue
             off = max(total[0] - measured.value, measured.value - total[1])
             if off > max(2.0 * measured.standard_error, 0.03 * measured.value):
                 found = f"{measured.value:.3g} ± {measured.standard_error:.2g} m3/s by the rule `{rule}`"
