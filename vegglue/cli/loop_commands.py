@@ -121,7 +121,8 @@ def extend_command(
     """Write a child config that extends its parent by one effect or more."""
     shapes = dict(number_given(text) for text in shape or [])
     if auto == bool(add):
-        raise InputError("extend: expected either --auto or --add EFFECT, got both or neither; choose one.")
+        got = "both" if add else "neither"
+        raise InputError(f"extend: expected either --auto or --add EFFECT, got {got}; give one.")
     if auto and (to is not None or shape):
         given = "--to" if to is not None else "--shape"
         raise InputError(f"extend: expected {given} with --add only, got it with --auto, which finds its own; drop it.")
