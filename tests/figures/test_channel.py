@@ -1,5 +1,7 @@
 """The channel that `vegglue check` draws: what stands in it is what the case and its measurements say."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,3 +43,14 @@ def test_the_channel_shows_patches_stations_and_boundaries_where_they_are(name: 
     assert np.array_equal(across.lines[0].get_ydata(), site.bed[middle])
     assert set(case.experiments) <= set(texts(across))
     assert off_the_sheet(figure) == []
+
+
+def test_the_place_of_the_section_has_few_digits() -> None:
+    """`Bed across x = 30.3333 m` stood above the channel of a wading survey."""
+    case = load_case(CONFIGS / "twin.yaml")
+    site = build_site(case)
+    odd = replace(site, grid=replace(site.grid, x=site.grid.x + 1.0 / 3.0))
+    title = draw_channel(case, odd, read_observations(case)).axes[-1].get_title(loc="left")
+    place = re.search(r"across x = (\d+(\.\d+)?) m", title)
+    assert place is not None
+    assert len(place[1]) <= 5

@@ -175,4 +175,4 @@ def _draw_section(axes: Axes, case: Case, site: Site, x: float) -> None:
         if (depth > 0).any():
             label(axes, site.grid.y[depth > 0][0], level[0], name, "model")
     axes.set(xlim=case.grid.y, xlabel="y [m]", ylabel="z [m]")
-    axes.set_title(f"Bed across x = {site.grid.x[i]:g} m, and the outlet's depth kept along the floor")
+    axes.set_title(f"Bed across x = {site.grid.x[i]:.4g} m, and the outlet's depth kept along the floor")
