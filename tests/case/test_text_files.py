@@ -31,7 +31,14 @@ def test_what_cannot_be_written_is_told_and_leaves_the_old(tmp_path: Path, monke
 
 @pytest.mark.parametrize(
     ("words", "name"),
-    [("Mill Brook (2024)", "mill-brook-2024"), ("d0-viscosity", "d0-viscosity"), ("Größe", "gr-e"), ("***", "case")],
+    [
+        ("Mill Brook (2024)", "mill-brook-2024"),
+        ("d0-viscosity", "d0-viscosity"),
+        ("Größe", "grosse"),
+        ("Mühlbach", "muhlbach"),
+        ("Ложа", "case"),
+        ("***", "case"),
+    ],
 )
 def test_any_words_become_the_name_of_a_case(words: str, name: str) -> None:
     assert case_name(words) == name

@@ -2,6 +2,7 @@
 
 import re
 import stat
+import unicodedata
 from collections.abc import Iterable, Mapping
 from itertools import chain, count
 from pathlib import Path
@@ -65,11 +66,13 @@ def write_text(path: Path, text: str, advice: str) -> None:
 
 
 def case_name(words: str, otherwise: str = "case") -> str:
-    """The words in lower case, with hyphens for what the schema does not allow in the name of a case.
+    """The words in lower case, letters without their accents, hyphens for what the schema does not allow in a name.
 
     otherwise: the name when nothing is left.
     """
-    return re.sub(r"[^a-z0-9_-]+", "-", words.lower()).strip("-")[:LONGEST_NAME] or otherwise
+    plain = unicodedata.normalize("NFKD", words.lower().replace("ß", "ss"))
+    bare = "".join(sign for sign in plain if not unicodedata.combining(sign))
+    return re.sub(r"[^a-z0-9_-]+", "-", bare).strip("-")[:LONGEST_NAME] or otherwise
 
 
 def names_in_files(names: Iterable[str]) -> dict[str, str]:
