@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from reach import COARSE, ROOT, said_to, vegglue, write_reach
+from reach import COARSE, ROOT, here, said_to, vegglue, write_reach
 
 from vegglue.cli.main import main
 from vegglue.effects.library import SHIPPED, library
@@ -93,7 +93,7 @@ def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, cap
     vegglue(tmp_path, "simulate", "--members", 8, "--jobs", 2, config, "--trust")
     inferred = said_to(monkeypatch, capsys, "infer", "--members", 8, "--method", "glue", config, "--trust")
     assert inferred[0] == 0
-    page = vegglue(tmp_path, "report", config, "--members", 8, "--trust")
+    page = here(tmp_path, "report", config, "--members", 8, "--trust")
     assert "Report" in page.stdout
     assert "slow_stones" in (tmp_path / "runs" / "brook" / "report.html").read_text(encoding="utf-8")
 
@@ -142,5 +142,5 @@ def test_diagnose_weighs_an_effect_of_ones_own_unasked(tmp_path):
     (tmp_path / "slow_stones.py").write_text(OWN, encoding="utf-8")
     named = ("observations:\n", "effect_file: slow_stones.py\nobservations:\n")
     config = write_reach(tmp_path, COARSE, named, WITH_ERROR)
-    found = json.loads(vegglue(tmp_path, "diagnose", config, "--json", "--trust").stdout)
+    found = json.loads(here(tmp_path, "diagnose", config, "--json", "--trust").stdout)
     assert "slow_stones" in {effect["name"] for effect in found["effects"]}

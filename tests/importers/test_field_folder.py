@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from field_folders import field_folder
-from reach import said_to, vegglue
+from reach import here, said_to
 
 from vegglue.case.config import load_case
 from vegglue.engine.interface import linearise
@@ -17,7 +17,7 @@ from vegglue.workflow.import_folder import import_folder
 
 @pytest.mark.slow
 def test_a_folder_becomes_a_case(tmp_path: Path) -> None:
-    said = vegglue(tmp_path, "import", field_folder(tmp_path / "Mill Brook"), "--to", "mill.yaml").stdout
+    said = here(tmp_path, "import", field_folder(tmp_path / "Mill Brook"), "--to", "mill.yaml").stdout
     case = load_case(tmp_path / "mill.yaml")
     assert "vegglue run mill.yaml" in said
     assert case.name == "mill-brook"
