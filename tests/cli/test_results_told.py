@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from posteriors import changed
-from reach import COARSE, vegglue, write_reach
+from reach import COARSE, here, vegglue, write_reach
 
 from vegglue.cli.brief_posterior import COLUMNS, LINES, brief_posterior
 from vegglue.cli.output import left_out_of
@@ -36,7 +36,7 @@ def told(folder: Path) -> list[dict[str, Any]]:
     """What each step prints with `--json`, and that it is one line and all there is."""
     objects = []
     for step, *options in STEPS:
-        done = vegglue(folder, step, "brook.yaml", *options, "--json")
+        done = here(folder, step, "brook.yaml", *options, "--json")
         assert (done.stderr, done.stdout.count("\n")) == ("", 1), step
         objects.append(json.loads(done.stdout))
     return objects
@@ -45,7 +45,7 @@ def told(folder: Path) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def quiet(folder: Path, told: list[dict[str, Any]]) -> str:
     """What an inference prints with `--quiet`, once all steps were taken."""
-    return vegglue(folder, "infer", "brook.yaml", "--quiet").stdout
+    return here(folder, "infer", "brook.yaml", "--quiet").stdout
 
 
 @pytest.mark.slow
@@ -90,9 +90,9 @@ def doubtful(posterior: Any) -> Any:
 
 @pytest.mark.slow
 def test_quiet_leaves_out_how_far_a_command_is(folder: Path, quiet: str) -> None:
-    assert "... " in vegglue(folder, "infer", "brook.yaml", "--method", "refine").stdout
+    assert "... " in here(folder, "infer", "brook.yaml", "--method", "refine").stdout
     assert "... " not in quiet
-    assert "Next: " not in vegglue(folder, "extend", "brook.yaml", "--add", "streamlining", "-q").stdout
+    assert "Next: " not in here(folder, "extend", "brook.yaml", "--add", "streamlining", "-q").stdout
 
 
 def test_a_mistake_leaves_standard_output_empty(tmp_path: Path) -> None:
