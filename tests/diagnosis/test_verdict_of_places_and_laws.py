@@ -6,6 +6,7 @@ from verdicts import MISSES, grounds, said, step
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Undecided
+from vegglue.diagnosis.verdict import TOO_SHALLOW
 
 
 def test_a_place_wins_over_steps_and_all_are_told() -> None:
@@ -98,3 +99,10 @@ def test_a_law_beside_what_was_found_is_a_remark() -> None:
     kind, _, remarks = said(grounds(step("a"), laws=LIKELY), [a_suspect("a")])
     assert kind == "identified"
     assert "rather than a. `vegglue discover`" in remarks
+
+
+def test_water_too_shallow_for_a_place_is_told() -> None:
+    """Else "no place stands out" is said of none."""
+    assert TOO_SHALLOW in said(grounds(places_searched=False))[2]
+    assert "deeper than 5 cm" in TOO_SHALLOW
+    assert TOO_SHALLOW not in said(grounds())[2]

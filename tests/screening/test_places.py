@@ -77,3 +77,12 @@ def test_shapes_are_those_of_the_effect_to_a_centimetre() -> None:
     assert two.shapes(1) == {"x": 1.0, "y": 0.46, "length": 2.0, "width": 0.33}
     named = {shape.name for shape in library()["unlisted_object"].shapes}
     assert set(two.shapes(0)) == named
+
+
+@pytest.mark.filterwarnings("error")
+def test_water_too_shallow_for_a_spot_has_none(flowing: tuple[Model, Point], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flume of 4 cm: the mean of no depth was a warning on the screen, and a plausible size of nan."""
+    monkeypatch.setattr("vegglue.screening.places.LEAST_DEPTH", 10.0)
+    for one in places_of(*flowing, half_width(flowing[0].site)):
+        assert (one.x.size, one.fingerprints.shape[1]) == (0, 0)
+        assert np.isfinite(one.plausible)

@@ -101,6 +101,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
         stretch=stretch_in_words(last.base.model.case, last.base.model.station),
+        places_searched=any(one.x.size for one in last.fingerprints.places),
     )
 
 

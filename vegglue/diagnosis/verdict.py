@@ -33,6 +33,7 @@ from vegglue.results.diagnosis import (
     Verdict,
     VerdictKind,
 )
+from vegglue.screening.places import LEAST_DEPTH
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -64,6 +65,10 @@ FAR_OFF = 4.0
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = 0.01
 NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad probe does not explain"
+TOO_SHALLOW = (
+    "Nothing was looked for at a place, and no law was tried: nowhere is the water deeper than "
+    f"{100 * LEAST_DEPTH:g} cm."
+)
 TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
 
 
@@ -72,7 +77,8 @@ class Grounds:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
     neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
     far; between: errors between the sections that were measured, over those of the data [-], at most; laws: those that
-    stand out; stretch: what is told of the part of the channel that was measured, '' for nothing.
+    stand out; stretch: what is told of the part of the channel that was measured, '' for nothing; places_searched:
+    whether there was water deep enough to look for something at a place.
     """
 
     errors: EstimatedErrors
@@ -87,6 +93,7 @@ class Grounds:
     between: float = 1.0
     laws: LawsSuspected | None = None
     stretch: str = ""
+    places_searched: bool = True
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
@@ -98,6 +105,8 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
     if grounds.stretch:
         remarks.append(grounds.stretch)
+    if not grounds.places_searched:
+        remarks.append(TOO_SHALLOW)
     if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."

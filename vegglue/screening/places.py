@@ -96,7 +96,8 @@ def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Bum
     wet = depth > LEAST_DEPTH
     # Water that enters does so where there is water at all times.
     seen = {term: wet.all(axis=0) if term == "inflow" else wet.any(axis=0) for term in rasters}
-    plausible = {term: plausible_size(model.case, term, float(depth[wet].mean())) for term in rasters}
+    mean_depth = float(depth[wet].mean()) if wet.any() else 0.0
+    plausible = {term: plausible_size(model.case, term, mean_depth) for term in rasters}
     tasks = [(model, responses, term, over, seen[term], plausible[term]) for term, over in rasters.items()]
     return tuple(in_threads(_places_of_term, tasks))
 
