@@ -8,8 +8,11 @@ import pytest
 
 import vegglue
 from vegglue.case.config import load_case
+from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case, Validation
 from vegglue.errors import InputError
+from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.workflow.set_aside import judged_by
 
 
 @pytest.fixture
@@ -51,7 +54,7 @@ def test_errors_are_set_side_by_side_under_the_same_errors_at_the_same_stations(
         vegglue.compare([case, other], runs=tmp_path / "runs")
 
 
-def test_models_are_judged_by_the_same_measurements_for_validation(case: Case, tmp_path: Path) -> None:
+def test_models_arejudged_by_the_same_measurements_for_validation(case: Case, tmp_path: Path) -> None:
     judged = [
         case.model_copy(
             update={
@@ -76,3 +79,17 @@ def test_a_model_may_be_there_twice(case: Case, tmp_path: Path) -> None:
     """Who extends by hand what `extend --auto` has extended has two files of one model."""
     first, second = vegglue.compare([case, case], runs=tmp_path / "runs").rungs
     assert first.in_sample.chi2 == second.in_sample.chi2
+
+
+@pytest.mark.slow
+def test_a_ladder_keeps_the_model_that_it_begins_with(case: Case, tmp_path: Path) -> None:
+    """The diagnosis of that says which readings are set aside; without it they would count again."""
+    runs = tmp_path / "runs"
+    first, second = (
+        case.model_copy(update={"name": name, "eddy_viscosity": value}) for name, value in (("a", 0.02), ("b", 0.03))
+    )
+    vegglue.compare([case, first], runs=runs)
+    vegglue.compare([first, second], runs=runs)
+    kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, first, second)]
+    assert [[step.name for step in one.steps] for one in kept if one] == [["brook", "a"], ["brook", "a"], ["a", "b"]]
+    assert judged_by(first, runs) == {"brook": case_hash(case), "a": case_hash(first)}

@@ -18,7 +18,7 @@ from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.storage.kept_words import write_ladder
+from vegglue.storage.kept_words import ladder_that_fits, write_ladder
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 from vegglue.workflow.set_aside import left_out
 
@@ -43,7 +43,8 @@ class Comparison:
 @one_thread()
 def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each, unless one model is there twice.
+    comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
+    another model.
 
     Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when models have
     other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
@@ -58,8 +59,19 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
     if len({case.name for case in cases}) == len(cases):  # a model beside itself is no ladder
-        keep_ladder(found, cases, hashes, runs)
+        ladder = ladder_of(found, cases, hashes)
+        for case, config_hash in zip(cases, hashes, strict=True):
+            if not _begins_with_another(folder_of(runs, case), config_hash, ladder):
+                write_ladder(folder_of(runs, case), ladder, config_hash)
     return found
+
+
+def _begins_with_another(folder: Path, config_hash: str, ladder: Ladder) -> bool:
+    """Whether a ladder is kept there whose first model is not in this one: the page would lose where it began, and
+    which readings were set aside there.
+    """
+    kept = ladder_that_fits(folder, config_hash)
+    return kept is not None and kept.steps[0].config_hash not in {step.config_hash for step in ladder.steps}
 
 
 def _refuse_other_measurements(cases: Sequence[Case]) -> None:
@@ -109,16 +121,22 @@ def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
 def keep_ladder(
     found: Comparison, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str, reason: str = ""
 ) -> None:
-    """Keep the ladder in the folder of each of its cases, for their pages; hashes: of the cases as they were read;
-    reason: why the ladder ends where it does. Errors: StorageError.
+    """Keep the ladder in the folder of each of its cases, for their pages. Errors: StorageError."""
+    ladder = ladder_of(found, cases, hashes, reason)
+    for case, config_hash in zip(cases, hashes, strict=True):
+        write_ladder(folder_of(runs, case), ladder, config_hash)
+
+
+def ladder_of(found: Comparison, cases: Sequence[Case], hashes: Sequence[str], reason: str = "") -> Ladder:
+    """The ladder of models that were compared; hashes: of the cases as they were read; reason: why it ends where it
+    does.
     """
     before: tuple[str, ...] = ()
     steps = []
     for case, config_hash, one in zip(cases, hashes, found.rungs, strict=True):
         steps.append(_step_of(case, config_hash, one, tuple(name for name in one.effects if name not in before)))
         before = one.effects
-    for case, config_hash in zip(cases, hashes, strict=True):
-        write_ladder(folder_of(runs, case), Ladder(tuple(steps), len(found.left_out), reason), config_hash)
+    return Ladder(tuple(steps), len(found.left_out), reason)
 
 
 def _step_of(case: Case, config_hash: str, one: Rung, added: tuple[str, ...]) -> LadderStep:

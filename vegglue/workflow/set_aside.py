@@ -13,16 +13,21 @@ from vegglue.storage.result_files import diagnosis_that_fits
 
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
-    """The measurements that the diagnosis of any of the cases has set aside, where it fits the case."""
-    return _set_aside({case.name: case_hash(case) for case in cases}, Path(runs))
+    """The measurements that are set aside of any of the cases, see `set_aside_of`."""
+    return _set_aside(dict(one for case in cases for one in judged_by(case, Path(runs)).items()), Path(runs))
 
 
 def set_aside_of(case: Case, runs: Path | str) -> pd.DataFrame:
     """Those that the diagnosis of a case has set aside, or that of the model which its ladder begins with."""
-    wanted, runs = case_hash(case), Path(runs)
+    return _set_aside(judged_by(case, Path(runs)), Path(runs))
+
+
+def judged_by(case: Case, runs: Path) -> dict[str, str]:
+    """Names and hashes of the models whose diagnoses count: its own, and the first of its ladder."""
+    wanted = case_hash(case)
     ladder = ladder_that_fits(runs / case.name, wanted)
     first = {} if ladder is None else {ladder.steps[0].name: ladder.steps[0].config_hash}
-    return _set_aside({**first, case.name: wanted}, runs)
+    return {**first, case.name: wanted}
 
 
 def _set_aside(hashes: dict[str, str], runs: Path) -> pd.DataFrame:
