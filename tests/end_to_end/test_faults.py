@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from reach import COARSE, begin, said_to, vegglue, write_reach
+from reach import COARSE, begin, here, said_to, vegglue, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble
@@ -45,7 +45,7 @@ def several_chunks(folder: Path) -> Path:
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Ensemble:
     """All members in one go in one process."""
     folder = tmp_path_factory.mktemp("uninterrupted")
-    vegglue(folder, "simulate", several_chunks(folder).name, "--jobs", 1)
+    here(folder, "simulate", several_chunks(folder).name, "--jobs", 1)
     return read_ensemble(folder / ENSEMBLE)
 
 
@@ -108,7 +108,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemb
     there, seconds = stored(tmp_path / PART)
     assert 0 < there.size < CHUNKS * CHUNK, "killed in the middle"
     assert not (tmp_path / ENSEMBLE).exists()
-    refused = vegglue(tmp_path, "infer", config.name, succeed=False)
+    refused = here(tmp_path, "infer", config.name, succeed=False)
     assert refused.returncode == 2
     assert "found only a part of the members; run `vegglue simulate CONFIG`" in refused.stderr
     said = vegglue(tmp_path, "simulate", config.name, "--jobs", 3 - jobs).stdout
@@ -145,7 +145,7 @@ def test_a_second_run_of_one_name_is_refused(tmp_path: Path) -> None:
     with running(tmp_path, "simulate", config.name, "--jobs", 1) as process:
         wait_for_chunks(process, tmp_path / PART, 0)
         os.kill(process.pid, signal.SIGSTOP)  # holds its lock for as long as this test wants
-        second = vegglue(tmp_path, "simulate", config.name, "--jobs", 1, succeed=False)
+        second = here(tmp_path, "simulate", config.name, "--jobs", 1, succeed=False)
         assert second.returncode == 3
         assert second.stderr.count("\n") == 1
         assert f"runs/brook is in use by process {process.pid} on " in second.stderr
