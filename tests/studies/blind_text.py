@@ -30,8 +30,8 @@ the same, and 170 more, sized in the truth. What was chosen after seeing some of
   water beside the sides of a flume answered wrongly, and others that CHANGELOG names. No set was made anew for them.
 - The correlation of errors is told otherwise since. The 100 sets of the small channel with nothing hidden and small
   imperfections were diagnosed again: verdicts, names and numbers of places and instruments are the same in all.
-- The flow at both ends, answers beside inflows and the degrees of freedom of chi2 were mended since. 47 of these 100, the
-  first ones, were made anew: verdicts, names and numbers of places and instruments are the same in all.
+- The flow at both ends, answers beside inflows and the degrees of freedom of chi2 were mended since. 47 of these 100,
+  the first ones, were made anew: verdicts, names and numbers of places and instruments are the same in all.
 
 On what nobody had looked at it is right less often than on what it was chosen after. What `extend --auto` keeps is
 counted as it was before the last changes of its rule in all but the last 170: in 42 sets all that was named was
