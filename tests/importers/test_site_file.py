@@ -190,3 +190,9 @@ def test_a_frame_that_points_nowhere_is_refused(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "site", frame={"origin": [10, 20], "towards": [10, 20]})
     with pytest.raises(InputError, match="`frame` expected `towards` a point further down the x axis"):
         read_site(site_file(folder))
+
+
+def test_a_frame_in_degrees_is_refused(tmp_path: Path) -> None:
+    folder = field_folder(tmp_path / "site", frame={"origin": [8.5, 47.4], "angle": 0, "crs": "EPSG:4326"})
+    with pytest.raises(InputError, match=r"expected a projected system, with coordinates in metres.*EPSG:4326"):
+        import_folder(folder, tmp_path / "site.yaml")

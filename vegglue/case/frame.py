@@ -1,11 +1,21 @@
 """The frame of a model in the coordinates of a map: where its origin lies, and where its x axis points."""
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from vegglue.case.parts import Number, Part
+
+# Systems whose coordinates are degrees, the usual ones; WGS 84 alone may be the datum of one in metres.
+IN_DEGREES = {"EPSG:4326", "EPSG:4258", "EPSG:4269", "OGC:CRS84", "CRS84"}
+
+
+def in_metres(crs: str) -> str:
+    """The system, refused where its coordinates are degrees."""
+    if crs.strip().upper() in IN_DEGREES:
+        raise ValueError("a projected system, with coordinates in metres, such as EPSG:2056")
+    return crs
 
 
 class Frame(Part):
@@ -16,7 +26,9 @@ class Frame(Part):
 
     origin: tuple[Number, Number] = Field(description="east and north of x = y = 0 on the map [m]")
     angle: Number = Field(description="from east to the x axis, which runs downstream, anticlockwise [degrees]")
-    crs: str | None = Field(default=None, description="coordinate system of the map, such as EPSG:2056")
+    crs: Annotated[str, AfterValidator(in_metres)] | None = Field(
+        default=None, description="coordinate system of the map, such as EPSG:2056"
+    )
 
     def to_model(self, east: Any, north: Any) -> tuple[Any, Any]:
         """x and y of places on the map [m]."""

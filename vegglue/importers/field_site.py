@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from vegglue.case.frame import Frame
+from vegglue.case.frame import Frame, in_metres
 from vegglue.case.parts import Interval, Number, Polygon, Positive
 from vegglue.case.site_schema import CentrelineShape
 from vegglue.case.text_files import unprintable
@@ -162,7 +162,7 @@ class SiteFrame(_Said):
     origin: tuple[Number, Number] = (0.0, 0.0)
     angle: Annotated[Number, BeforeValidator(_with_unit("angle"))] | None = None
     towards: tuple[Number, Number] | None = None
-    crs: PrintableName | None = None
+    crs: Annotated[PrintableName, AfterValidator(in_metres)] | None = None
 
     @model_validator(mode="after")
     def _one_direction(self) -> Self:
