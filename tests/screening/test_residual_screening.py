@@ -1,5 +1,6 @@
 """Screening of a residual that is errors only: the whole way, errors estimated as for any other."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import scipy.stats
 from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import chi2, covariance
+from vegglue.calibration.fit import at_point, chi2, covariance
+from vegglue.calibration.noise import with_correlation
 from vegglue.case.config import load_case
 from vegglue.effects.definition import Amplitude
 from vegglue.screening.evidence import HypothesisKind, alarm_p
@@ -33,10 +35,12 @@ def changes() -> tuple[Array, Array, Array]:
     return slope, of_effects, of_spots
 
 
-def screened(values: Array, effects: int = EFFECTS, flagged: tuple[int, ...] = ()) -> Screening:
-    """With the first so many effects to be tested."""
+def screened(values: Array, effects: int = EFFECTS, flagged: tuple[int, ...] = (), scale: float = 1.0) -> Screening:
+    """With the first so many effects to be tested; scale: of the errors under which parameters were known [-]."""
     slope, of_effects, of_spots = changes()
     base = at_best(CASE, STATION, values, slope)
+    noise = with_correlation(base.noise, 0.0, scale)
+    base = replace(base, noise=noise, fitted=at_point(noise, base.fitted.point))
     x, one = np.arange(float(SPOTS)), np.ones(SPOTS)
     places = tuple(
         Places(term, x, x, one, one, 1.0, of_spots[:, k * SPOTS : (k + 1) * SPOTS])
@@ -145,6 +149,15 @@ def test_parameters_are_known_under_the_errors_that_are_told() -> None:
     point = found.fitted.point
     assert found.fitted.covariance == pytest.approx(covariance(found.noise, point))
     assert found.fitted.chi2 == pytest.approx(chi2(found.noise, point))
+
+
+def test_parameters_are_known_no_better_than_their_fit_knew_them() -> None:
+    """Under the errors that an effect had made larger before it was found, amplitudes of the blind study held the truth
+    126 times of 132; a fifth narrower, 120 times.
+    """
+    found = screened(measured(np.random.default_rng(3)), scale=2.0).base
+    assert found.noise.scale == 1.0
+    assert np.diag(found.fitted.covariance).min() > 1.5 * np.diag(covariance(found.noise, found.fitted.point)).min()
 
 
 def test_what_was_set_aside_is_not_set_aside_again() -> None:

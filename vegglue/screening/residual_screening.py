@@ -7,7 +7,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
-from vegglue.calibration.fit import at_point
+from vegglue.calibration.fit import MapEstimate, at_point
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.case.parameter_space import z_of
 from vegglue.flow.local_changes import Term
@@ -106,8 +106,7 @@ def screen(
     def against(values: Array) -> score_test.Projected:
         return score_test.project(noise.whiten(slope), noise.whiten(residual), z, noise.whiten(values))
 
-    # What is known of the parameters, and told of them, is known under the errors as they are told now.
-    projected, with_noise = against(of_effects), replace(base, noise=noise, fitted=at_point(noise, base.fitted.point))
+    projected, with_noise = against(of_effects), replace(base, noise=noise, fitted=_known_under(noise, base.fitted))
     in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
     of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
     return Screening(
@@ -191,6 +190,13 @@ def _plausible(
         columns = offset_columns(instruments[name], noise.rows.size)
         parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))
     return np.hstack(parts)
+
+
+def _known_under(noise: Noise, fitted: MapEstimate) -> MapEstimate:
+    """A fit under the errors as they are told now; its parameters are known no better than under those of the fit."""
+    here = at_point(noise, fitted.point)
+    wider = max(fitted, here, key=lambda one: float(np.linalg.slogdet(one.covariance)[1]))
+    return replace(here, covariance=wider.covariance)
 
 
 def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:
