@@ -37,6 +37,8 @@ PAIRS_DRAWN = 3
 HARDLY_CORRELATED = 0.3
 # Letters beside a mark, with which the axes of a marginal keep nine tenths of their width.
 LONGEST_LABEL = 24
+# Share of their range within which values come near a bound: a figure ends there.
+DRAWN_TO_BOUND = 0.1
 
 
 def pictures(run: Run) -> dict[str, list[Picture]]:
@@ -58,17 +60,29 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
 
 def _drawn_parameter(run: Run, name: str) -> DrawnParameter:
     (low, high), logarithmic = run.posterior.marginals.bounds[name], as_power(run.posterior, name)
-    values = run.posterior.sample.theta[name]
+    values, prior = run.posterior.sample.theta[name], _prior_values(run, name)
     return DrawnParameter(
         values,
-        _prior_values(run, name),
-        float(low) if np.isfinite(low) and (low > 0 or not logarithmic) else float(values.min()),
-        float(high) if np.isfinite(high) else float(values.max()),
+        prior,
+        *range_of_figure(np.concatenate([values, prior]), (float(low), float(high)), logarithmic),
         logarithmic,
         run.case.parameters[name].symbol or name,
         run.posterior.sample.unit[name],
         (float(low), float(high)),
     )
+
+
+def range_of_figure(values: np.ndarray, bounds: tuple[float, float], logarithmic: bool) -> tuple[float, float]:
+    """From where to where values of a parameter (n,) and its prior are drawn: to the bounds that they come near, else
+    as far as they go. A prior may have bounds that it never comes near.
+    """
+    ends = np.array([values.min(), values.max()])
+    with np.errstate(divide="ignore", invalid="ignore"):  # a lower bound may be 0
+        there, wanted = (np.log10(some) if logarithmic else some for some in (ends, np.array(bounds)))
+    span = float(np.ptp(there))
+    near = np.isfinite(wanted) & ((np.abs(wanted - there) <= DRAWN_TO_BOUND * span) | (span == 0.0))
+    low, high = np.where(near, bounds, ends)
+    return float(low), float(high)
 
 
 def _prior_values(run: Run, name: str) -> np.ndarray:
