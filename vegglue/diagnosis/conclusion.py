@@ -127,6 +127,7 @@ def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
 
 
 def estimated_errors(screening: Screening, found: Findings) -> EstimatedErrors:
+    """What the errors are taken to be after the last screening; that of the grid is told of velocities alone [m/s]."""
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in found.flagged)
     velocity = velocity_rows(screening.base.model.station.iloc[noise.rows])
