@@ -9,33 +9,21 @@ import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_diagnosis
 from reach import write_reach
+from rungs import a_rung
 from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
 from vegglue.diagnosis.next_measurement import MeasurementPlan, MeasurementWorth
 from vegglue.in_short import in_short, interval_in_short, so_many
-from vegglue.measurements.kinds import KINDS, errors_in_short
+from vegglue.measurements.kinds import errors_in_short
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.compare import Comparison
-from vegglue.workflow.extend import StepwiseExtension
 from vegglue.workflow.next_measurement import Question
+from vegglue.workflow.stepwise_extension import StepwiseExtension
 
 MOST_LINES, MOST_LETTERS = 12, 600
-
-
-def a_rung(name: str, validation: float = np.nan) -> Rung:
-    """Three parameters; held-out errors of 0.03 and 0.04 m/s at its two velocities."""
-    rmse = dict.fromkeys(KINDS, np.nan) | {"velocity": 0.021, "level": 0.002}
-    held_out = HeldOut(
-        np.array([0.03, 0.04]), np.full(2, np.nan), np.array([True, True]), (("June", "A"), ("June", "B"))
-    )
-    values = dict.fromkeys(("n_b", "phi", "k_s"), (1.0, 0.9, 1.1))
-    return Rung(
-        name, "", (), values, InSample(rmse, 8.0, 2, 0.01), held_out, PredictiveScores(1.0, 0.5, 0.95), {}, validation
-    )
 
 
 def test_building_blocks() -> None:

@@ -14,7 +14,8 @@ from vegglue.calibration.fit import at_point
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.cli.tables import show_ladder
-from vegglue.diagnosis.comparison import Rung, homogeneity, improvement, rung, rung_in_short
+from vegglue.diagnosis.comparison import homogeneity, improvement, rung, rung_in_short
+from vegglue.results.rung import Rung
 from vegglue.workflow.compare import Comparison
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vegglue.diagnosis.comparison import By, HeldOut, InSample, PredictiveScores, Rung
+from vegglue.diagnosis.comparison import By
 from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen, why_not_kept
+from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 
 STATIONS = 12
 EXPERIMENTS = ("low", "high")

@@ -16,7 +16,7 @@ from matplotlib.patches import Polygon
 from matplotlib.transforms import Bbox
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.comparison import HeldOut, InSample, PredictiveScores, Rung, held_out_rmse, improvement
+from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.figures.error_ladder import draw_ladder, save_ladder_figure
 from vegglue.figures.misfit import draw_gauges, draw_zones
 from vegglue.figures.plan_view import Outline
@@ -25,6 +25,7 @@ from vegglue.figures.suspects import MARKS, draw_alike, draw_fingerprint, draw_s
 from vegglue.report_page.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
 from vegglue.report_page.diagnosis_words import diagnosis_section, ranked_suspects, rms_residual, suspect_status
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
+from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 from vegglue.site.polygons import corners_of
 
 pytestmark = pytest.mark.slow

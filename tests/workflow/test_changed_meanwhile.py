@@ -18,7 +18,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.storage.result_files import stored_hash
-from vegglue.workflow import compare, extend, infer, next_measurement, run_folder
+from vegglue.workflow import compare, extend, infer, next_measurement, run_folder, stepwise_extension
 
 FEW = ("simulate: {members: 1024,", "infer: {method: glue}\nsimulate: {members: 16,")
 Meanwhile = Callable[[ModuleType, str], None]
@@ -96,7 +96,7 @@ def test_no_ladder_is_kept_of_children_of_other_data(
     case: Case, meanwhile: Meanwhile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(extend, "diagnose", lambda *given, **more: a_diagnosis())
-    one = extend.StepwiseExtension((case,), compare.Comparison((), excluded_by()), "", "")
+    one = stepwise_extension.StepwiseExtension((case,), compare.Comparison((), excluded_by()), "", "")
     meanwhile(extend, "_extended", lambda *given: one)
     with pytest.raises(InputError, match=r"brook\.yaml: a file that it names changed while it was extended; run"):
         vegglue.extend_stepwise(case, jobs=1)

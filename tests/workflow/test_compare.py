@@ -1,8 +1,10 @@
 """Models are compared by the same measurements, each under a name of its own."""
 
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -10,8 +12,12 @@ import vegglue
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case, Validation
+from vegglue.diagnosis.excluded_stations import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
+from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.workflow import compare
 from vegglue.workflow.set_aside import judged_by
 
 
@@ -93,3 +99,27 @@ def test_a_ladder_keeps_the_model_that_it_begins_with(case: Case, tmp_path: Path
     kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, first, second)]
     assert [[step.name for step in one.steps] for one in kept if one] == [["brook", "a"], ["brook", "a"], ["a", "b"]]
     assert judged_by(first, runs) == {"brook": case_hash(case), "a": case_hash(first)}
+
+
+@pytest.mark.slow
+def test_what_a_model_misses_is_computed_once(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also under another title; and again as soon as a measurement is set aside."""
+    runs = tmp_path / "runs"
+    first = vegglue.compare([case], runs=runs).rungs[0]
+    monkeypatch.setattr(compare, "calibrated", pytest.fail)
+    titled = case.model_copy(update={"title": "Brook in June"})
+    again = vegglue.compare([titled], runs=runs).rungs[0]
+    assert again.title == "Brook in June"
+    np.testing.assert_equal(asdict(replace(again, title=first.title)), asdict(first))
+    aside = read_observations(case).table[MEASUREMENT].iloc[[0]]
+    assert compare.kept_rung(case, runs, excluded_by()) is not None
+    assert compare.kept_rung(case, runs, aside) is None
+
+
+def test_a_ladder_that_says_why_it_ends_is_kept() -> None:
+    steps = tuple(LadderStep(name, "", name, (), 4, 0.1, 0.2, 0.3, 0.4, 0.1) for name in ("brook", "a"))
+    extended, compared = Ladder(steps, 1, "Added: wind."), Ladder(steps, 1, "")
+    assert compare.tells_more(extended, compared)
+    assert not compare.tells_more(compared, extended)
+    assert not compare.tells_more(None, compared)
+    assert not compare.tells_more(extended, replace(compared, left_out=2))

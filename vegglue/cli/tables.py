@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from vegglue.cli.output import console, print_table
-from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
+from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.rung import Rung
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.next_measurement import Question
 

@@ -15,7 +15,7 @@ from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
-from vegglue.workflow.extend import StepwiseExtension
+from vegglue.workflow.stepwise_extension import StepwiseExtension
 
 
 def show(case: Case, runs: Path, result: Any) -> None:

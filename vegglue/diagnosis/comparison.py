@@ -9,7 +9,7 @@ C_o between those kept and those left out: what the model errs by in both is cal
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
@@ -24,63 +24,10 @@ from vegglue.in_short import so_many
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, STREAMWISE
+from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 
 # What is left out in turn.
 By = Literal["sections", "experiments"]
-
-
-@dataclass(frozen=True)
-class InSample:
-    """Errors at what the calibration has seen: root mean square by kind [its unit], NaN for what was not measured; chi2
-    of independent errors [-] over so many stations, and the root mean square error of measuring a velocity [m/s].
-    """
-
-    rmse: dict[str, float]
-    chi2: float
-    stations: int
-    noise_floor: float
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
-    nothing could be left out. velocity: which are velocities along x [m/s]; clusters: the experiment and the section
-    of each.
-    """
-
-    sections: Array
-    experiments: Array
-    velocity: np.ndarray
-    clusters: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class PredictiveScores:
-    """How well held-out velocities are predicted with their spread: mean log predictive density by sections, and the
-    share within the 50 % and the 95 % band [-]; NaN where nothing could be left out.
-    """
-
-    log_score: float
-    inside50: float
-    inside95: float
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One model of the ladder. values: parameters with their 95 % intervals; homogeneity: chance that a parameter is
-    the same in all experiments, by name; validation: root mean square error of velocities that no calibration has seen
-    [m/s], NaN without them.
-    """
-
-    name: str
-    title: str
-    effects: tuple[str, ...]
-    values: dict[str, tuple[float, float, float]]
-    in_sample: InSample
-    held_out: HeldOut
-    predictive: PredictiveScores
-    homogeneity: dict[str, float]
-    validation: float
 
 
 def rung(base: Baseline, validation: Model | None = None) -> Rung:

@@ -1,5 +1,5 @@
 """Figures: each draws plain arrays and knows nothing of where they come from.
 
-May import: case, site, measurements, flow, screening, inference, diagnosis.
+May import: case, site, measurements, flow, results, screening, inference, diagnosis.
 Open first: style.py, measured.py.
 """

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.comparison import Rung, held_out_rmse, improvement
+from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.figures.typography import fixed, short
 from vegglue.measurements.kinds import STREAMWISE
+from vegglue.results.rung import Rung
 
 # p-value [-] of one value in all experiments, below which a parameter is drawn as one that moves: 1 in 20.
 MOVES_BELOW = 0.05

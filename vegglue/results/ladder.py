@@ -31,13 +31,14 @@ class LadderStep:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words,
-    '' where nobody searched.
+    """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words;
+    verdict: the sentence of the diagnosis that named what was added. Both are '' where nobody searched.
     """
 
     steps: tuple[LadderStep, ...]
     left_out: int
     reason: str
+    verdict: str = ""
 
 
 def ladder_json(ladder: Ladder) -> dict[str, Any]:
@@ -50,7 +51,8 @@ def ladder_json(ladder: Ladder) -> dict[str, Any]:
 
 def ladder_from(tree: Mapping[str, Any]) -> Ladder:
     """The ladder of such an object. Errors: KeyError, TypeError or ValueError where it is none."""
-    return Ladder(tuple(_step_from(step) for step in tree["steps"]), int(tree["left_out"]), str(tree["reason"]))
+    steps = tuple(_step_from(step) for step in tree["steps"])
+    return Ladder(steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]))
 
 
 def _step_from(step: Mapping[str, Any]) -> LadderStep:

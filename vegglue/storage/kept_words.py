@@ -1,4 +1,5 @@
-"""Small results as JSON in the folder of a run: comparison.json and questions.json, each with the config hash.
+"""Small results as JSON in the folder of a run: rung.json, comparison.json and questions.json, each with the config
+hash.
 
 What belongs to another state of the case, or cannot be read, counts as not there.
 """
@@ -11,11 +12,29 @@ from typing import Any, TypeVar
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.results.ladder import Ladder, ladder_from, ladder_json
 from vegglue.results.open_questions import OpenQuestion, questions_from, questions_json
+from vegglue.results.rung import Rung, rung_from, rung_tree
 from vegglue.whole_files import MAKE_ROOM
 
-LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue comparison 1", "vegglue questions 1"
-COMPARISON_FILE, QUESTIONS_FILE = "comparison.json", "questions.json"
+RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 2", "vegglue questions 1"
+RUNG_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
 Kept = TypeVar("Kept")
+# A measurement that is left out: where it stands, and its value.
+MeasurementRow = Sequence[str | float]
+
+
+def write_rung(folder: Path, rung: Rung, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
+    """Keep what a model misses, calibrated without some measurements. Errors: StorageError."""
+    told = {"left_out": [*map(list, left_out)], "rung": rung_tree(rung)}
+    _write(folder / RUNG_FILE, RUNG_FORMAT, config_hash, told)
+
+
+def rung_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash: str) -> Rung | None:
+    """What the model of exactly this config misses, without exactly these measurements; None where it is not kept."""
+
+    def understand(told: Any) -> Rung | None:
+        return rung_from(told["rung"]) if told["left_out"] == [*map(list, left_out)] else None
+
+    return _read_if_it_fits(folder / RUNG_FILE, RUNG_FORMAT, config_hash, understand)
 
 
 def write_ladder(folder: Path, ladder: Ladder, config_hash: str) -> None:
@@ -49,5 +68,5 @@ def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand:
         if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
             return None
         return understand(tree["told"])
-    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None

@@ -1,14 +1,14 @@
 """cases -> error ladder: how well each predicts what it was fitted to, what was held out, and what no fit has seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import Rung, held_out_rmse, rung, rung_in_short
+from vegglue.diagnosis.comparison import held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
@@ -18,7 +18,8 @@ from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.storage.kept_words import ladder_that_fits, write_ladder
+from vegglue.results.rung import Rung
+from vegglue.storage.kept_words import ladder_that_fits, rung_that_fits, write_ladder, write_rung
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 from vegglue.workflow.set_aside import left_out
 
@@ -46,7 +47,8 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
     another model.
 
-    Stations that the diagnosis of any of them has set aside are left out of all. Errors: InputError when models have
+    Stations that the diagnosis of any of them has set aside are left out of all. What a model misses is kept in
+    rung.json, and not computed again for exactly the same. Errors: InputError when models have
     other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
     """
     _refuse_other_measurements(cases)
@@ -54,24 +56,27 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     rungs = []
     with at_most(jobs):
         for number, case in enumerate(cases):
-            watch(Progress(with_compilation(f"calibrating {case.name}"), number, len(cases), "models"))
+            watch(Progress(with_compilation(f"comparing {case.name}"), number, len(cases), "models"))
             rungs.append(rung_of(case, runs, aside, watch))
     found = Comparison(tuple(rungs), aside)
     draw_ladder_of(found, cases[-1], runs)
     if len({case.name for case in cases}) == len(cases):  # a model beside itself is no ladder
         ladder = ladder_of(found, cases, hashes)
         for case, config_hash in zip(cases, hashes, strict=True):
-            if not _begins_with_another(folder_of(runs, case), config_hash, ladder):
+            if not tells_more(ladder_that_fits(folder_of(runs, case), config_hash), ladder):
                 write_ladder(folder_of(runs, case), ladder, config_hash)
     return found
 
 
-def _begins_with_another(folder: Path, config_hash: str, ladder: Ladder) -> bool:
-    """Whether a ladder is kept there whose first model is not in this one: the page would lose where it began, and
-    which readings were set aside there.
+def tells_more(kept: Ladder | None, ladder: Ladder) -> bool:
+    """Whether a ladder that is kept begins with a model that is not in this one, or says of the same models why it
+    ends there: the page would lose where it began, which readings were set aside there, or that reason.
     """
-    kept = ladder_that_fits(folder, config_hash)
-    return kept is not None and kept.steps[0].config_hash not in {step.config_hash for step in ladder.steps}
+    if kept is None:
+        return False
+    hashes = [step.config_hash for step in ladder.steps]
+    same = kept.left_out == ladder.left_out and [step.config_hash for step in kept.steps] == hashes
+    return kept.steps[0].config_hash not in hashes or (same and bool(kept.reason))
 
 
 def _refuse_other_measurements(cases: Sequence[Case]) -> None:
@@ -104,9 +109,25 @@ def _measured(case: Case) -> pd.DataFrame:
 
 
 def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = silent) -> Rung:
-    """The case where it predicts best, without the measurements set aside."""
-    folder = folder_of(runs, case)
-    return rung(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
+    """The case where it predicts best, without the measurements set aside; kept for the next command."""
+    kept = kept_rung(case, runs, aside)
+    if kept is not None:
+        return kept
+    folder, wanted = folder_of(runs, case), case_hash(case)
+    made = rung(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
+    write_rung(folder, made, rows_set_aside(aside), wanted)
+    return made
+
+
+def kept_rung(case: Case, runs: Path | str, aside: pd.DataFrame) -> Rung | None:
+    """What an earlier command found for exactly this case without these measurements, under its title of now."""
+    kept = rung_that_fits(folder_of(runs, case), rows_set_aside(aside), case_hash(case))
+    return None if kept is None else replace(kept, title=case.title)
+
+
+def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
+    """Measurements that are set aside, in one order whichever diagnosis named them first."""
+    return sorted(aside.itertuples(index=False, name=None))
 
 
 def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
@@ -118,25 +139,22 @@ def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
     return picture
 
 
-def keep_ladder(
-    found: Comparison, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str, reason: str = ""
-) -> None:
+def keep_ladder(ladder: Ladder, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str) -> None:
     """Keep the ladder in the folder of each of its cases, for their pages. Errors: StorageError."""
-    ladder = ladder_of(found, cases, hashes, reason)
     for case, config_hash in zip(cases, hashes, strict=True):
         write_ladder(folder_of(runs, case), ladder, config_hash)
 
 
-def ladder_of(found: Comparison, cases: Sequence[Case], hashes: Sequence[str], reason: str = "") -> Ladder:
-    """The ladder of models that were compared; hashes: of the cases as they were read; reason: why it ends where it
-    does.
-    """
+def ladder_of(
+    found: Comparison, cases: Sequence[Case], hashes: Sequence[str], reason: str = "", verdict: str = ""
+) -> Ladder:
+    """The ladder of compared models; hashes: of the cases as they were read; reason, verdict: see `Ladder`."""
     before: tuple[str, ...] = ()
     steps = []
     for case, config_hash, one in zip(cases, hashes, found.rungs, strict=True):
         steps.append(_step_of(case, config_hash, one, tuple(name for name in one.effects if name not in before)))
         before = one.effects
-    return Ladder(tuple(steps), len(found.left_out), reason)
+    return Ladder(tuple(steps), len(found.left_out), reason, verdict)
 
 
 def _step_of(case: Case, config_hash: str, one: Rung, added: tuple[str, ...]) -> LadderStep:

@@ -1,7 +1,7 @@
 """case -> child case: a config that extends its parent by effects, named, or found by the diagnosis."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +21,13 @@ from vegglue.diagnosis.stepwise_choice import Choice, Names
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_short
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
-from vegglue.workflow.compare import Comparison, keep_ladder
+from vegglue.storage.kept_words import write_rung
+from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
     best_place,
@@ -37,6 +37,7 @@ from vegglue.workflow.run_folder import (
     remember_place,
     validation_of,
 )
+from vegglue.workflow.stepwise_extension import StepwiseExtension, kept_extension
 
 # Why nothing is added where the diagnosis names neither an effect nor a place, by its verdict.
 NOTHING_TO_ADD = {
@@ -46,22 +47,6 @@ NOTHING_TO_ADD = {
     "cannot-tell": "the diagnosis cannot tell what is missing",
 }
 LAW_TO_DISCOVER = "what stands out is a law that is in no list; `vegglue discover` adds one"
-
-
-@dataclass(frozen=True)
-class StepwiseExtension:
-    """How a case was extended: the cases from the first to the last, their errors, the sentence of the verdict, and
-    what was added or not, and why.
-    """
-
-    cases: tuple[Case, ...]
-    comparison: Comparison
-    sentence: str
-    reason: str
-
-    def __repr__(self) -> str:
-        names = " -> ".join(case.name for case in self.cases)
-        return in_short(f"Extension: {names}", [self.sentence, self.reason, *repr(self.comparison).splitlines()])
 
 
 def extend(
@@ -89,19 +74,26 @@ def extend_stepwise(
     case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent, force: bool = False
 ) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
-    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case.
+    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case, and
+    read there where the case, its diagnosis and its children are as they were.
 
     force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
     """
     wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
+    kept = kept_extension(case, found, runs)
+    if kept is not None:
+        return kept
     with at_most(jobs):
         extension = _extended(case, found, runs, watch, force)
     hashes = [case_hash(one) for one in extension.cases]
     if hashes[0] != wanted:  # children are of the files as they are now, their numbers of those before
         source = shown_path(case.source)
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
-    keep_ladder(extension.comparison, extension.cases, hashes, runs, extension.reason)
+    for one, errors, config_hash in zip(extension.cases, extension.comparison.rungs, hashes, strict=True):
+        write_rung(folder_of(runs, one), errors, rows_set_aside(extension.comparison.left_out), config_hash)
+    ladder = ladder_of(extension.comparison, extension.cases, hashes, extension.reason, extension.sentence)
+    keep_ladder(ladder, extension.cases, hashes, runs)
     return extension
 
 

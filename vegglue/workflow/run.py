@@ -12,14 +12,15 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.resume import begun_or_finished
-from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, rung_of
+from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, ladder_of, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover
-from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
+from vegglue.workflow.extend import extend_stepwise
 from vegglue.workflow.infer import chosen_method, infer, is_inferred, needs_ensemble
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of, of_size
 from vegglue.workflow.simulate import is_up_to_date, refuse_to_shrink, simulate
+from vegglue.workflow.stepwise_extension import StepwiseExtension
 
 Show = Callable[[Case, Any], None]
 
@@ -96,7 +97,8 @@ def _with_a_law(
     show(law.child, both)
     if not held_out_rmse(with_law) < held_out_rmse(alone.rungs[0]):  # nor where nothing could be held out: NaN
         return case
-    keep_ladder(both, cases, [case_hash(one) for one in cases], runs)
+    hashes = [case_hash(one) for one in cases]
+    keep_ladder(ladder_of(both, cases, hashes), cases, hashes, runs)
     return law.child
 
 

@@ -1,7 +1,7 @@
 """The folder of a run, runs/<name>/: what one step keeps there for the next, first of all where a model fits best.
 
-ensemble.h5, fields.h5, posterior.h5, flow.h5, diagnosis.h5, comparison.json, questions.json and best.json carry the
-hash of the case; what does not fit is not used.
+ensemble.h5, fields.h5, posterior.h5, flow.h5, diagnosis.h5, rung.json, comparison.json, questions.json and best.json
+carry the hash of the case; what does not fit is not used.
 """
 
 import json

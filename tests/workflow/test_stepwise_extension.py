@@ -1,0 +1,83 @@
+"""An extension that is kept is read back where all it hangs on is as it was, and made again elsewhere."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnoses import a_diagnosis
+from kills import WITH_ERRORS
+from reach import write_reach
+from rungs import a_rung
+
+import vegglue
+from vegglue.case.resolved_config import case_hash
+from vegglue.case.schema import Case
+from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.storage.kept_words import write_rung
+from vegglue.workflow import extend
+from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
+from vegglue.workflow.stepwise_extension import kept_extension
+
+FOUND = a_diagnosis()
+ASIDE = excluded_by(FOUND)
+
+
+@pytest.fixture
+def family(tmp_path: Path) -> tuple[Case, Case]:
+    """A case and its child, and how it was extended to it, kept in `runs`."""
+    parent = vegglue.load_case(write_reach(tmp_path, WITH_ERRORS))
+    cases = parent, vegglue.extend(parent, "streamlining")
+    hashes, comparison = [case_hash(one) for one in cases], Comparison(tuple(a_rung(c.name) for c in cases), ASIDE)
+    ladder = ladder_of(comparison, cases, hashes, "Added: streamlining.", FOUND.verdict.sentence)
+    for one, rung, config_hash in zip(cases, comparison.rungs, hashes, strict=True):
+        (tmp_path / "runs" / one.name).mkdir(parents=True)
+        write_rung(tmp_path / "runs" / one.name, rung, rows_set_aside(ASIDE), config_hash)
+    keep_ladder(ladder, cases, hashes, tmp_path / "runs")
+    return cases
+
+
+def test_it_is_read_back(family: tuple[Case, Case], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parent, child = family
+    monkeypatch.setattr(extend, "diagnose", lambda *given, **more: FOUND)
+    monkeypatch.setattr(extend, "_extended", pytest.fail)
+    found = vegglue.extend_stepwise(parent, runs=tmp_path / "runs")
+    assert [one.name for one in found.cases] == [parent.name, child.name]
+    assert (found.sentence, found.reason) == (FOUND.verdict.sentence, "Added: streamlining.")
+    assert [one.name for one in found.comparison.rungs] == [parent.name, child.name]
+    np.testing.assert_equal(found.comparison.rungs[1].held_out.sections, a_rung("").held_out.sections)
+
+
+def test_another_diagnosis_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    other = replace(FOUND, verdict=replace(FOUND.verdict, sentence="Missing: wind."))
+    assert kept_extension(family[0], other, tmp_path / "runs") is None
+
+
+def test_other_readings_set_aside_extend_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    flagged = () if FOUND.errors.flagged else (0,)
+    other = replace(FOUND, errors=replace(FOUND.errors, flagged=flagged))
+    assert kept_extension(family[0], other, tmp_path / "runs") is None
+
+
+def test_another_model_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    other = family[0].model_copy(update={"eddy_viscosity": 0.03})
+    assert kept_extension(other, FOUND, tmp_path / "runs") is None
+
+
+def test_a_child_that_was_edited_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    path = family[1].source
+    path.write_text(path.read_text(encoding="utf-8") + "eddy_viscosity: 0.03\n", encoding="utf-8")
+    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None
+
+
+def test_a_child_that_is_gone_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    family[1].source.unlink()
+    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None
+
+
+def test_code_that_a_child_names_is_never_run(family: tuple[Case, Case], tmp_path: Path) -> None:
+    """Nor is a child of a case with code of the user's read: what was trusted is the code that the case names."""
+    path = family[1].source
+    (tmp_path / "own.py").write_text("raise AssertionError('it was run')\n", encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8") + "effect_file: own.py\n", encoding="utf-8")
+    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None

@@ -1,0 +1,114 @@
+"""One model of the error ladder, and how it lies in the folder of its run: what it misses, seen and unseen."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from vegglue.arrays import Array
+
+
+@dataclass(frozen=True)
+class InSample:
+    """Errors at what the calibration has seen: root mean square by kind [its unit], NaN for what was not measured; chi2
+    of independent errors [-] over so many stations, and the root mean square error of measuring a velocity [m/s].
+    """
+
+    rmse: dict[str, float]
+    chi2: float
+    stations: int
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
+    nothing could be left out. velocity: which are velocities along x [m/s]; clusters: the experiment and the section
+    of each.
+    """
+
+    sections: Array
+    experiments: Array
+    velocity: np.ndarray
+    clusters: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class PredictiveScores:
+    """How well held-out velocities are predicted with their spread: mean log predictive density by sections, and the
+    share within the 50 % and the 95 % band [-]; NaN where nothing could be left out.
+    """
+
+    log_score: float
+    inside50: float
+    inside95: float
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model of the ladder. values: parameters with their 95 % intervals; homogeneity: chance that a parameter is
+    the same in all experiments, by name; validation: root mean square error of velocities that no calibration has seen
+    [m/s], NaN without them.
+    """
+
+    name: str
+    title: str
+    effects: tuple[str, ...]
+    values: dict[str, tuple[float, float, float]]
+    in_sample: InSample
+    held_out: HeldOut
+    predictive: PredictiveScores
+    homogeneity: dict[str, float]
+    validation: float
+
+
+def rung_tree(rung: Rung) -> dict[str, Any]:
+    """The rung as one object of JSON; what is not a number is null."""
+    return _plain(asdict(rung))
+
+
+def rung_from(tree: Mapping[str, Any]) -> Rung:
+    """The rung of such an object. Errors: KeyError, TypeError or ValueError where it is none."""
+    seen, held_out = tree["in_sample"], tree["held_out"]
+    return Rung(
+        name=str(tree["name"]),
+        title=str(tree["title"]),
+        effects=tuple(tree["effects"]),
+        values={name: _interval(*value) for name, value in tree["values"].items()},
+        in_sample=InSample(
+            rmse={kind: _number(value) for kind, value in seen["rmse"].items()},
+            chi2=_number(seen["chi2"]),
+            stations=int(seen["stations"]),
+            noise_floor=_number(seen["noise_floor"]),
+        ),
+        held_out=HeldOut(
+            sections=np.array([_number(error) for error in held_out["sections"]]),
+            experiments=np.array([_number(error) for error in held_out["experiments"]]),
+            velocity=np.array([bool(one) for one in held_out["velocity"]]),
+            clusters=tuple((str(experiment), str(section)) for experiment, section in held_out["clusters"]),
+        ),
+        predictive=PredictiveScores(**{name: _number(value) for name, value in tree["predictive"].items()}),
+        homogeneity={name: _number(p) for name, p in tree["homogeneity"].items()},
+        validation=_number(tree["validation"]),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Of dicts, lists, words and numbers only, null instead of NaN, which JSON does not know."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _interval(low: float | None, value: float | None, high: float | None) -> tuple[float, float, float]:
+    return _number(low), _number(value), _number(high)
