@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 
+from vegglue.calibration.baseline import Baseline
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.effects.library import library
+from vegglue.results.diagnosis import Suspect
 from vegglue.screening.candidates import Candidate
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.residual_screening import screen
@@ -15,13 +17,16 @@ from vegglue.screening.residual_screening import screen
 STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
 
 
-@pytest.mark.parametrize("visible", [0.2, 5.0])
-def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visible: float) -> None:
-    """Without it an effect that the data hardly see was told to explain more than its refit does."""
+LISTED = library()["bank_trend"]
+
+
+def on_linear_model(visible: float, end: float = 5.0) -> tuple[Suspect, Baseline]:
+    """An effect of 1.5 plausible sizes, each some `visible` standard errors long and `end` of them possible, as it is
+    told to first order, and the model calibrated with it.
+    """
     random = np.random.default_rng(4)
     slope = 0.02 * random.standard_normal((len(STATION), len(CASE_OF_TWINS.parameters)))
-    effect = library()["bank_trend"]
-    own = replace(effect, amplitude=replace(effect.amplitude, scale=1.0))
+    own = replace(LISTED, amplitude=replace(LISTED.amplitude, scale=1.0, low=-end, high=end))
     trace = visible * 0.01 * random.standard_normal((len(STATION), 1)) / len(STATION) ** 0.5
     values = (
         slope @ random.standard_normal(slope.shape[1]) + 1.5 * trace[:, 0] + 0.01 * random.standard_normal(len(STATION))
@@ -31,7 +36,21 @@ def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visibl
         base.fitted.point, [Candidate(own)], [np.array([0])], [{}], [own.amplitude], [], trace, places=()
     )
     screening = screen(base, (), known)
-    refitted = at_best(CASE_OF_TWINS, STATION, values, np.hstack([slope, trace])).fitted
-    (suspect,) = suspects_of(screening).values()
     assert (screening.base.noise.correlation, screening.base.noise.scale) == (0.0, 1.0)
-    assert suspect.amplitude.objective == pytest.approx(refitted.objective, abs=1e-6)
+    (suspect,) = suspects_of(screening).values()
+    return suspect, at_best(CASE_OF_TWINS, STATION, values, np.hstack([slope, trace]))
+
+
+@pytest.mark.parametrize("visible", [0.2, 5.0])
+def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visible: float) -> None:
+    """Without it an effect that the data hardly see was told to explain more than its refit does."""
+    suspect, refitted = on_linear_model(visible)
+    assert suspect.amplitude.objective == pytest.approx(refitted.fitted.objective, abs=1e-6)
+
+
+@pytest.mark.parametrize(("end", "testable"), [(5.0, True), (1.5, False)])
+def test_what_would_be_seen_only_beyond_its_bounds_is_untestable(end: float, testable: bool) -> None:
+    """The turning of the earth ends at 1.5 plausible sizes, and was told to be testable at two."""
+    suspect, _ = on_linear_model(2.6, end)
+    assert 1.5 < suspect.detectability.smallest < 2.0
+    assert suspect.detectability.testable is testable

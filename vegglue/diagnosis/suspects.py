@@ -21,7 +21,7 @@ LARGEST_POSSIBLE = 3.0
 # By how many standard errors a fingerprint must be longer than the threshold to be detected 19 times of 20: the 95 %
 # point of a standard normal score.
 POWER_QUANTILE = 1.645
-# Standard deviations of its prior within which an effect must be detectable to be testable.
+# Standard deviations of its prior within which an effect must be detectable to be testable, and within its support.
 TESTABLE = 2.0
 
 
@@ -85,7 +85,7 @@ def _detectability(screening: Screening, column: int, threshold: float) -> Detec
     return Detectability(
         visibility=float(screening.projected.visible[column]),
         smallest=smallest,
-        testable=smallest < TESTABLE * amplitude.scale,
+        testable=smallest < min(TESTABLE * amplitude.scale, amplitude.furthest),
         confounder=confounder,
         cosine=cosine,
     )

@@ -58,6 +58,11 @@ class Amplitude:
         """The only sign that its gain may have, 0 where it may have both."""
         return int(self.low >= self.off) - int(self.high <= self.off)
 
+    @property
+    def furthest(self) -> float:
+        """The largest |value - off| in the support."""
+        return max(self.high - self.off, self.off - self.low)
+
     def gain(self, value: float) -> float:
         """g = |value - off|^power with the sign of value - off, to which predictions change in proportion."""
         return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)

@@ -69,8 +69,8 @@ class Detectability:
     """Whether these data could show an effect.
 
     visibility: share of its fingerprint that calibration cannot mimic [-]. smallest: distance of the amplitude from off
-    that is detected 19 times of 20; testable: that is less than twice a plausible one. confounder: the parameter whose
-    slope is most like the fingerprint; cosine: between both [-].
+    that is detected 19 times of 20; testable: that is less than twice a plausible one, and within its support.
+    confounder: the parameter whose slope is most like the fingerprint; cosine: between both [-].
     """
 
     visibility: float
