@@ -42,6 +42,16 @@ def on_linear_model(visible: float, end: float = 5.0) -> tuple[Suspect, Baseline
 
 
 @pytest.mark.parametrize("visible", [0.2, 5.0])
+def test_sizes_are_told_with_their_prior_as_those_of_refits(visible: float) -> None:
+    """What the data hardly see was told as 1.4 plausible sizes, give or take 10: its refit says 0, give or take 2."""
+    suspect, refitted = on_linear_model(visible)
+    fitted, told = refitted.fitted, suspect.amplitude
+    error = 1.96 * fitted.covariance[-1, -1] ** 0.5
+    assert told.value == pytest.approx(fitted.point.z[-1], abs=1e-6)
+    assert told.interval95 == pytest.approx((told.value - error, told.value + error), rel=1e-3)
+
+
+@pytest.mark.parametrize("visible", [0.2, 5.0])
 def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visible: float) -> None:
     """Without it an effect that the data hardly see was told to explain more than its refit does."""
     suspect, refitted = on_linear_model(visible)

@@ -59,22 +59,22 @@ def _suspect(screening: Screening, candidate: int, threshold: float) -> Suspect:
 
 
 def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimate:
-    """gain = T / |S_perp|, with a standard error of 1 / |S_perp|; objective F - T^2 a^2 / (1 + a^2), a of `evidence`,
-    F under the errors as they are told now: what the prior of the amplitude costs is in it, as in that of a refit.
+    """gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `evidence`;
+    objective F - T^2 a^2 / (1 + a^2), F under the errors as they are told now: the prior of the amplitude is in all of
+    them, as in those of a refit.
     """
-    base, shrinkage = screening.base, prior_shrinkage(screening.kinds[0].size[column])
-    amplitude, length = screening.fingerprints.amplitudes[column], _length(screening, column)
-    score = screening.effects.scores[column]
-    gain = float(score) / length
+    base, kind, score = screening.base, screening.kinds[0], screening.effects.scores[column]
+    amplitude, gain = screening.fingerprints.amplitudes[column], float(kind.gain[column])
+    reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
     return AmplitudeEstimate(
         value=amplitude.at(gain),
-        interval95=(amplitude.at(gain - NORMAL95 / length), amplitude.at(gain + NORMAL95 / length)),
+        interval95=(amplitude.at(gain - reach), amplitude.at(gain + reach)),
         unit=amplitude.unit,
         off=amplitude.off,
         scale=amplitude.scale,
         refitted=False,
         support=(amplitude.low, amplitude.high),
-        objective=objective(base.noise, base.fitted.point) - float(score**2 * shrinkage),
+        objective=objective(base.noise, base.fitted.point) - float(score**2 * prior_shrinkage(kind.size[column])),
     )
 
 

@@ -33,9 +33,10 @@ VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these"
 class AmplitudeEstimate:
     """How large an effect is, in the unit of its amplitude.
 
-    value, interval95: from its own refit when there was one (refitted), else to first order. off, scale: where the
-    amplitude does nothing, and how far from there is plausible; support: within which it must lie. objective: the least
-    sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where it was not refitted.
+    value, interval95: from its own refit when there was one (refitted), else to first order, its prior taken into
+    account in both. off, scale: where the amplitude does nothing, and how far from there is plausible; support: within
+    which it must lie. objective: the least sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where
+    it was not refitted.
     """
 
     value: float
