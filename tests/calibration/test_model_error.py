@@ -155,19 +155,34 @@ def test_an_error_of_shape_does_not_look_like_another_size(
 ) -> None:
     """Else the size that was calibrated is lost in it: water that enters at a place was all error of shape."""
     model, point = flowing
-    place = {"x": 15.0, "y": 0.2, "length": 0.6, "width": 0.5}
-    candidate = place_candidate(library()[name], place)
-    case = with_effect(model.case, candidate, place)
-    size = z_of(case.parameters[candidate.parameter], amplitude)
-    there = linearise(replace(model, case=case), np.append(point.z, size))
-    assert there is not None
-    columns = model_error_columns(replace(model, case=case), there, CASE_ALLOWS)
-    shape = columns[:, model_error_columns(model, point, CASE_ALLOWS).shape[1] :]
+    there, size, shape = with_a_place(model, point, name, amplitude)
     trace, weight = there.slope[:, -1], model.station["standard_error"].to_numpy(float) ** -2.0
     together = (weight * trace) @ shape / (weight @ trace**2)
     spread = float(np.sqrt(together @ together))
     assert (shape**2).sum() > 0.0
     assert spread < 0.1 * abs(size), "of the size"
+
+
+def test_stations_that_are_not_in_use_change_no_error_of_shape(flowing: tuple[Model, Point]) -> None:
+    model, point = flowing
+    used = np.arange(len(model.station)) % 3 > 0
+    fewer = replace(model, station=model.station[used].reset_index(drop=True))
+    aside = replace(model, station=model.station.assign(used=used))
+    alone, told = (with_a_place(one, point, "unlisted_object", 0.2)[2] for one in (fewer, aside))
+    np.testing.assert_allclose(told[used], alone, rtol=0.0, atol=1e-6 * np.abs(alone).max())
+
+
+def with_a_place(model: Model, point: Point, name: str, amplitude: float) -> tuple[Point, float, Array]:
+    """A model with something at a place: its point, the size of that as z, and the columns of its error of shape."""
+    place = {"x": 15.0, "y": 0.2, "length": 0.6, "width": 0.5}
+    candidate = place_candidate(library()[name], place)
+    case = with_effect(model.case, candidate, place)
+    size = z_of(case.parameters[candidate.parameter], amplitude)
+    there, without = linearise(replace(model, case=case), np.append(point.z, size)), linearise(model, point.z)
+    assert there is not None
+    assert without is not None
+    columns = model_error_columns(replace(model, case=case), there, CASE_ALLOWS)
+    return there, size, columns[:, model_error_columns(model, without, CASE_ALLOWS).shape[1] :]
 
 
 def linear(case: Case) -> tuple[Array, Array]:

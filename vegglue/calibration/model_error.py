@@ -161,8 +161,9 @@ def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one:
 
 
 def _weights_of(model: Model) -> Array:
-    """1 / s^2 of each station [per its unit squared], 0 where no standard error s is told."""
-    return np.nan_to_num(model.station["standard_error"].to_numpy(float) ** -2.0)
+    """1 / s^2 of each station in use [per its unit squared], 0 of others and where no standard error s is told."""
+    error = model.station["standard_error"].where(model.station["used"].astype(bool))
+    return np.nan_to_num(error.to_numpy(float) ** -2.0)
 
 
 def _without(direction: Array, columns: Array, weight: Array) -> Array:

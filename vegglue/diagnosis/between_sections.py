@@ -78,7 +78,7 @@ def _read_at(station: pd.DataFrame, base: Baseline) -> Array:
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
     """The stations of velocities moved halfway to the next section of their experiment downstream, or to the end of the
-    channel [m]: in another one a boat lies some centimetres off.
+    channel [m], where none is in use: in another one a boat lies some centimetres off.
     """
     velocity = station[station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()]
     middle = section_places(velocity)
@@ -89,7 +89,7 @@ def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
         return of_experiment.map(dict(zip(places, steps, strict=True)))
 
     moved = velocity["x"] + middle.groupby(velocity["experiment"]).transform(ahead)
-    return velocity.assign(x=np.minimum(moved, end))
+    return velocity.assign(x=np.minimum(moved, end), used=False)
 
 
 def _errors_between(where: SearchModel) -> tuple[Array, Array] | None:
