@@ -77,6 +77,18 @@ def test_a_model_that_is_known_does_not_err(monkeypatch: pytest.MonkeyPatch) -> 
     assert told_and_true(one, 1, monkeypatch)[0] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("kind", ["speed", "velocity_across"])
+def test_velocities_of_other_directions_are_judged_where_none_is_along_the_channel(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Speeds of a propeller know no direction: nothing was told of what the model may miss between their sections."""
+    one = linear(1, 0.03)
+    along, _ = told_and_true(one, 3, monkeypatch)
+    monkeypatch.setattr(f"{__name__}.STATION", STATION.assign(kind=kind))
+    other, _ = told_and_true(one, 3, monkeypatch)
+    assert other == pytest.approx(along)
+
+
 def test_stations_move_halfway_to_the_next_section_and_to_the_end() -> None:
     kinds = ["velocity", "velocity", "level"]
     station = pd.DataFrame(

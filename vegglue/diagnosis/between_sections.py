@@ -20,7 +20,7 @@ from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import linearise, predict
-from vegglue.measurements.kinds import STREAMWISE
+from vegglue.measurements.kinds import leading_velocities
 from vegglue.measurements.sections import section_places
 
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
@@ -37,7 +37,7 @@ def largest_error_between(base: Baseline) -> float:
     cases. NaN where there are no velocities, or the flow is not found.
     """
     where = model_that_errs(base)
-    seen = base.model.station["kind"].to_numpy()[base.noise.rows] == STREAMWISE
+    seen = leading_velocities(base.model.station)[base.noise.rows]
     found = _errors_between(where)
     if found is None or not seen.any():
         return float("nan")
@@ -53,7 +53,7 @@ def acts_elsewhere(before: Baseline, after: Baseline) -> str:
     its largest change of the velocity halfway between sections, over that at the stations, is below MOSTLY_ELSEWHERE.
     """
     station = before.model.station
-    velocity = station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()
+    velocity = leading_velocities(station)
     there = halfway(station, before.model.case.grid.x[1])
     was, now = (_read_at(there, one) for one in (before, after))
     changed = np.abs(now - was)
@@ -80,7 +80,7 @@ def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
     """The stations of velocities moved halfway to the next section of their experiment downstream, or to the end of the
     channel [m], where none is in use: in another one a boat lies some centimetres off.
     """
-    velocity = station[station["used"].to_numpy(bool) & (station["kind"] == STREAMWISE).to_numpy()]
+    velocity = station[leading_velocities(station)]
     middle = section_places(velocity)
 
     def ahead(of_experiment: "pd.Series[float]") -> "pd.Series[float]":

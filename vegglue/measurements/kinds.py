@@ -81,6 +81,16 @@ def velocity_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
     return np.array([kind_of(str(name)).velocity for name in station["kind"]], dtype=bool)
 
 
+def leading_velocities(station: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which stations in use measure a velocity along x (station,); in whatever direction where none does.
+
+    Errors: InputError for an unknown kind.
+    """
+    used = station["used"].to_numpy(bool)
+    along = used & (station["kind"] == STREAMWISE).to_numpy()
+    return along if along.any() else used & velocity_rows(station)
+
+
 def errors_in_short(by_kind: Mapping[str, float]) -> str:
     """`velocity 0.0098 m/s, level 0.0021 m`: one error of each kind that is known."""
     known = {kind_of(name): value for name, value in by_kind.items() if np.isfinite(value)}
