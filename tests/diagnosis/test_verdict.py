@@ -39,6 +39,7 @@ UNEARNED = {
     ),
     "less model error": ({"model_error": NEEDS_MORE}, {"model_error": replace(NEEDS_MORE, needed=0.25)}, "15%"),
     "unseen": ({"unseen": 1.5}, {"unseen": 1.2}, "1.5 times what is expected"),
+    "few unseen": ({"unseen": 2.1, "by_chance": 1.96}, {"unseen": 1.9, "by_chance": 1.96}, "2.1 times what is exp"),
     "no flow there": ({"unseen": np.inf}, {"unseen": 1.0}, "no steady flow in experiments that were not calibrated"),
     "unseen beside others": ({"unseen": 1.5}, {"unseen": float("nan")}, "not calibrated to"),
 }

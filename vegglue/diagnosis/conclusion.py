@@ -15,7 +15,7 @@ from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded, suspects_of
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
-from vegglue.diagnosis.unseen import unseen_ratio
+from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
 from vegglue.diagnosis.verdict import POOR, Grounds, judged
 from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
@@ -89,6 +89,7 @@ def concluded(
 def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | None) -> Grounds:
     """What the verdict rests on, but for fields and laws."""
     silent = not (found.steps or found.places or found.undecided)
+    there = unseen_errors(last.base, unseen) if silent and unseen is not None else UnseenErrors(float("nan"), 1.0)
     return Grounds(
         errors=estimated_errors(last, found),
         misfit=misfit,
@@ -96,7 +97,8 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         field=None,
         model_error=_model_error(last),
         not_excluded=() if found.absurd else not_excluded(last),
-        unseen=unseen_ratio(last.base, unseen) if silent and unseen is not None else float("nan"),
+        unseen=there.ratio,
+        by_chance=there.by_chance,
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,

@@ -1,43 +1,68 @@
 """Whether measurements that no calibration has seen agree with a calibrated model: errors over what was to be expected.
 
-    ratio = (mean e^2 / mean (s_0^2 + m_i + g^2 + J_i V J_i'))^(1/2)
+    ratio = (tr e e' / tr S)^(1/2),   S = diag(s_0^2) + M + g^2 (c + (1 - c) 1) + J V J'
 
-e are the errors of velocities that were not seen, s_0 their stated standard error (that of what was seen where it is
-not stated), m the variance of the model's own error, g the error of the grid where it was seen, V the covariance of the
-parameters and J the slopes.
+e are the errors of velocities that were not seen, s_0 their stated standard errors (those of what was seen where they
+are not stated), M the covariance of the model's own error, g the error of the grid where it was seen and c its
+correlation, V the covariance of the parameters and J the slopes. Errors alone exceed (chi2 / k)^(1/2) in 5 % of cases,
+chi2 the 95 % point with k = (tr S)^2 / tr S^2 degrees of freedom: few measurements, or many that err alike, are
+few.
+Source: Satterthwaite (1946), doi:10.2307/3002019, for k; not checked against it.
 """
 
-import numpy as np
+from dataclasses import dataclass
 
+import numpy as np
+import scipy.stats
+
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Model, linearise
-from vegglue.measurements.kinds import STREAMWISE
+from vegglue.engine.interface import Model, Point, linearise
+from vegglue.measurements.kinds import leading_velocities
+
+# How often errors alone exceed what is told of them; 5 % is usual.
+BY_CHANCE = 0.05
 
 
-def unseen_ratio(base: Baseline, unseen: Model) -> float:
-    """The ratio [-], NaN without velocities that were not seen, infinite where the model finds no flow for them;
-    unseen: the model at stations it has not seen.
+@dataclass(frozen=True)
+class UnseenErrors:
+    """Errors at what was not seen, over those expected [-], and the ratio that errors alone exceed in 5 % of cases.
+
+    ratio: NaN without velocities that were not seen, infinite where the model finds no flow for them.
     """
+
+    ratio: float
+    by_chance: float
+
+
+def unseen_errors(base: Baseline, unseen: Model) -> UnseenErrors:
+    """Those of a calibrated model; unseen: the model at stations it has not seen."""
     there = Model(_case_there(base, unseen), unseen.site, unseen.station, unseen.engine)
     point = linearise(there, base.fitted.point.z)
-    station = there.station
-    rows = (station["used"] & (station["kind"] == STREAMWISE)).to_numpy(bool)
-    if not rows.any():
-        return float("nan")
-    if point is None:
-        return float("inf")
-    seen = base.model.station["kind"].to_numpy()[base.noise.rows] == STREAMWISE
-    floor = float(np.mean(base.noise.data_error[seen] ** 2)) if seen.any() else 0.0
-    stated = station["standard_error"].to_numpy(float)[rows] ** 2
-    own = (model_error_columns(there, point, there.case.model_error)[rows] ** 2).sum(axis=1)
-    grid = float(np.mean(base.noise.grid_error[seen] ** 2)) if seen.any() else 0.0
-    slope = point.slope[rows]
-    known = np.einsum("ij,jk,ik->i", slope, base.fitted.covariance, slope)
-    expected = np.where(stated > 0, stated, floor) + own + grid + known
-    error = station["value"].to_numpy(float)[rows] - point.prediction[rows]
-    return float(np.sqrt(np.mean(error**2) / np.mean(expected)))
+    rows = np.flatnonzero(leading_velocities(there.station))
+    if not rows.size or point is None:
+        return UnseenErrors(float("inf") if rows.size else float("nan"), 1.0)
+    error = there.station["value"].to_numpy(float)[rows] - point.prediction[rows]
+    expected = _expected(base, there, point, rows)
+    total = float(np.trace(expected))
+    degrees = total**2 / float((expected**2).sum())
+    by_chance = float(np.sqrt(scipy.stats.chi2.isf(BY_CHANCE, degrees) / degrees))
+    return UnseenErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
+
+
+def _expected(base: Baseline, there: Model, point: Point, rows: np.ndarray) -> Array:
+    """S of some stations (n, n) [m2/s2], see the head of this file."""
+    noise, seen = base.noise, leading_velocities(base.model.station)[base.noise.rows]
+    floor, grid = (
+        float(np.mean(error[seen] ** 2)) if seen.any() else 0.0 for error in (noise.data_error, noise.grid_error)
+    )
+    stated = there.station["standard_error"].to_numpy(float)[rows] ** 2
+    own, slope = model_error_columns(there, point, there.case.model_error)[rows], point.slope[rows]
+    of_each = np.where(stated > 0, stated, floor) + (1.0 - noise.grid_correlation) * grid
+    alike = own @ own.T + noise.grid_correlation * grid + slope @ base.fitted.covariance @ slope.T
+    return np.asarray(alike + np.diag(of_each))
 
 
 def _case_there(base: Baseline, unseen: Model) -> Case:

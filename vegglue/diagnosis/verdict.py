@@ -74,11 +74,12 @@ TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, an
 
 @dataclass(frozen=True)
 class Grounds:
-    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown;
-    neighbours: whether readings side by side were set aside; strained: the parameter furthest off its prior, and how
-    far; between: errors between the sections that were measured, over those of the data [-], at most; laws: those that
-    stand out; stretch: what is told of the part of the channel that was measured, '' for nothing; places_searched:
-    whether there was water deep enough to look for something at a place.
+    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; by_chance:
+    what of that errors alone exceed in 5 % of cases; neighbours: whether readings side by side were set aside;
+    strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
+    measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
+    channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
+    something at a place.
     """
 
     errors: EstimatedErrors
@@ -91,6 +92,7 @@ class Grounds:
     neighbours: bool
     strained: tuple[str, float]
     between: float = 1.0
+    by_chance: float = 1.0
     laws: LawsSuspected | None = None
     stretch: str = ""
     places_searched: bool = True
@@ -275,7 +277,7 @@ def _unearned(grounds: Grounds) -> str:
         )
     if grounds.unseen == np.inf:
         return "the model finds no steady flow in experiments that were not calibrated to"
-    if grounds.unseen > UNSEEN_RATIO:
+    if grounds.unseen > max(UNSEEN_RATIO, grounds.by_chance):
         return f"measurements that were not calibrated to are missed by {grounds.unseen:.1f} times what is expected"
     return ""
 
