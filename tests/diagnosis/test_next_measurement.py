@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
@@ -45,3 +46,25 @@ def test_small_discharges_have_names_of_their_own(model: Model) -> None:
     further = [name for name in _with_other_discharges(case, (0.25, 0.5)).experiments if name not in small]
     assert [name.split(" (")[0] for name in further] == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
     assert re.fullmatch(r"at 0.001 m3/s \(level at the outlet about 0\.\d\d m\)", further[0]), further[0]
+
+
+def test_a_section_that_a_boat_measured_beside_itself_is_thought_of_once(model: Model) -> None:
+    """It was listed once for each experiment, 2 cm apart."""
+    station = model.station
+    experiment = {name: 0.02 * number for number, name in enumerate(model.case.experiments)}
+    boat = station.assign(x=station["x"] + station["experiment"].map(experiment))
+    at_line, by_boat = (
+        [plan for plan in planned(replace(model, station=one), model.case)[1] if "again" in plan.name]
+        for one in (station, boat)
+    )
+    assert len(experiment) > 1
+    assert [plan.hours for plan in by_boat] == [plan.hours for plan in at_line]
+    assert [plan.x for plan in by_boat] == pytest.approx([plan.x for plan in at_line], abs=0.03)
+
+
+def test_sections_of_one_experiment_are_two_however_near(model: Model) -> None:
+    station = model.station
+    beside = station[station["section"] == "A"].assign(section="beside", x=lambda of: of["x"] + 0.1)
+    both = pd.concat([station, beside], ignore_index=True)
+    before, after = (planned(replace(model, station=one), model.case)[1] for one in (station, both))
+    assert sum("again" in plan.name for plan in after) == sum("again" in plan.name for plan in before) + 1

@@ -29,8 +29,9 @@ from vegglue.site.gridded_site import build_site
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
-# Places along the reach where a section is thought of.
-SECTIONS = 12
+# Places along the reach where a section is thought of, and how near to one that was measured it is that one, over the
+# distance between these places. Chosen, not measured.
+SECTIONS, AS_MEASURED = 12, 0.3
 # Other discharges, relative to the lowest and to the highest one at hand, with the outlet level that goes with them
 # (h ~ Q^0.6). A quarter brings plants to the surface, where what depends on speed or depth leaves other traces.
 LOWER, HIGHER = (0.25, 0.5), (1.4,)
@@ -135,8 +136,9 @@ def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, 
     usual, y = next(reversed(model.case.experiments)), _verticals(velocity)
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
-    taken, spacing = [float(x) for x in velocity["x"].unique()], places[1] - places[0]
-    new = [float(x) for x in places if taken and min(abs(x - there) for there in taken) > 0.3 * spacing]
+    near = AS_MEASURED * float(places[1] - places[0])
+    taken = _measured_sections(velocity, near)
+    new = [float(x) for x in places if taken and min(abs(x - there) for there, _ in taken) > near]
     ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, _hours(y)) for x in new]
     middle = np.array([_middle(y if y.size else np.array(model.case.grid.y))])
     ideas += [
@@ -144,12 +146,27 @@ def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, 
         for x in places[::2]
     ]
     others = [name for name in case.experiments if name not in model.case.experiments]
-    for x in taken:
-        at, here = f"the section at x = {x:g} m", np.sort(velocity[velocity["x"] == x]["y"].unique().astype(float))
+    for x, here in taken:
+        at = f"the section at x = {round(x, 2):g} m"
         ideas.append((f"{at} again ({usual})", usual, x, here, STREAMWISE, _hours(here)))
         more = _hours(here) + HOURS["discharge"]
         ideas += [(f"{at} {experiment}", experiment, x, here, STREAMWISE, more) for experiment in others]
     return ideas
+
+
+def _measured_sections(velocity: pd.DataFrame, near: float) -> list[tuple[float, Array]]:
+    """x and verticals y [m] of each section, as in the experiment with most of them: in others a boat lay beside it, by
+    `near` at most [m].
+    """
+    verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
+    found: list[tuple[list[str], float, Array]] = []
+    for (experiment, x), y in sorted(verticals.items(), key=lambda one: -one[1].size):
+        same = [of for of, there, _ in found if abs(there - x) <= near and experiment not in of]
+        if same:
+            same[0].append(experiment)
+        else:
+            found.append(([experiment], float(x), np.sort(y.astype(float))))
+    return [(x, y) for _, x, y in sorted(found, key=lambda one: one[1])]
 
 
 def _hours(y: Array) -> float:
