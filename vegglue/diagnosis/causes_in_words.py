@@ -21,6 +21,8 @@ from vegglue.screening.instruments import Instrument
 STATED_BELOW = 0.995
 # Standard error of a place [m] below which its digits say enough.
 TOLD_ERROR = 0.3
+# Terms whose size is part of what acts, in words.
+TOLD_BY_SIZE = ("bed", "inflow")
 # Contenders that are told where none is surely it.
 UNDECIDED_TOLD = 3
 
@@ -35,11 +37,11 @@ def _place_words(place: Location) -> str:
     rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
     against = [f"{_odds(odds)} against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]]
     low, high = place.interval95
-    unit = f" {place.unit}"
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
-    told = f"{place.amplitude:.3g}{unit}, {low:.3g} to {high:.3g}"
+    range95 = f"{low:.3g} to {high:.3g}"
+    told = f"{range95} {place.unit}" if place.term in TOLD_BY_SIZE else f"{place.amplitude:.3g} {place.unit}, {range95}"
     what = _what_acts(place.term, place.amplitude)
-    return f"at {at} it acts as if {what} ({told}{'; ' if against else ''}{''.join(against)})"
+    return f"at {at} it acts as if {what} ({'; '.join([told, *against])})"
 
 
 def _what_acts(term: str, amplitude: float) -> str:
