@@ -153,7 +153,7 @@ def test_what_was_followed_is_told_with_the_chances_that_decided() -> None:
         Contender("effect", name, evidence, 0, None) for name, evidence in (("wind", 2.0), ("elder", 0.0), ("jet", 0.0))
     )
     alone = undecided_of(contenders, (), np.array([])).chances
-    found = undecided_of(contenders, (0, 1), np.array([0.25, 0.75]))
+    found = undecided_of(contenders, ("wind", "elder"), np.array([0.25, 0.75]))
     assert found.chances == pytest.approx((0.25 * (1.0 - alone[2]), 0.75 * (1.0 - alone[2]), alone[2]))
     assert "it may be elder (67%) or wind (22%) or jet" in said(grounds(undecided=found))[1]
 

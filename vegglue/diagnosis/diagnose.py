@@ -136,18 +136,19 @@ def _following(
     ends = in_threads(_screened, [(one,) for _, one in possible])
     score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
     best = chosen_contender([one.what for one in ends], score)
+    followed, chance = [contenders[j].name for j, _ in possible], tempered_chances(score)
     if best is None:
-        return undecided_of(contenders, [j for j, _ in possible], tempered_chances(score))
-    return _told_beside(ends[best], [contenders[j] for j, _ in possible], score)
+        return undecided_of(contenders, followed, chance)
+    return _told_beside(ends[best], followed, chance)
 
 
-def _told_beside(following: Following, followed: Sequence[Contender], score: Array) -> Following:
-    """What was taken, a listed effect with the chances of all that was followed; score (k,): ln evidence of each."""
+def _told_beside(following: Following, followed: Sequence[str], chance: Array) -> Following:
+    """What was taken, a listed effect with the chances of all that was followed; chance (k,): of each, by name."""
     if following.what != "effect":
         return following
     *earlier, last = following.found.steps
-    last = followed_further(last, [one.name for one in followed], tempered_chances(score))
-    return replace(following, found=replace(following.found, steps=(*earlier, last)))
+    steps = (*earlier, followed_further(last, followed, chance))
+    return replace(following, found=replace(following.found, steps=steps))
 
 
 def _screened(one: Following) -> Following:

@@ -59,24 +59,25 @@ def step_found(
     return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
 
 
-def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
-    """The step once some contenders have been followed further: the chances that they have together are shared anew.
+def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Array) -> dict[str, float]:
+    """Chances by name, once some have been followed further: the chances that they have together are shared anew.
 
-    chance (k,): of each contender followed, by name, the accepted one among them.
+    chance (k,): of each that was followed, were it one of them.
     """
-    told = step.chance | step.others
     together = sum(told.get(name, 0.0) for name in followed)
-    told |= {name: float(p) * together for name, p in zip(followed, chance, strict=True)}
-    return with_chances(step, step.accepted, told)
+    return {**told, **{name: float(p) * together for name, p in zip(followed, chance, strict=True)}}
 
 
-def undecided_of(contenders: Sequence[Contender], followed: Sequence[int], chance: Array) -> Undecided:
-    """All contenders, none of them surely it, once some have been followed further: chance (k,), shared as in
-    `followed_further`.
-    """
-    told = chances_of(contenders)
-    told[list(followed)] = chance * told[list(followed)].sum()
-    return Undecided(tuple(contenders), tuple(float(p) for p in told))
+def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
+    """The step once some contenders have been followed further, see `shared_anew`; the accepted one is among them."""
+    return with_chances(step, step.accepted, shared_anew(step.chance | step.others, followed, chance))
+
+
+def undecided_of(contenders: Sequence[Contender], followed: Sequence[str], chance: Array) -> Undecided:
+    """All contenders, none of them surely it, once some have been followed further, see `shared_anew`."""
+    told = dict(zip([one.name for one in contenders], map(float, chances_of(contenders)), strict=True))
+    told = shared_anew(told, followed, chance)
+    return Undecided(tuple(contenders), tuple(told[one.name] for one in contenders))
 
 
 def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
