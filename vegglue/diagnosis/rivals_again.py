@@ -1,20 +1,26 @@
 """Rivals of effects accepted earlier, compared again with what was accepted later in the model.
 
-Where the data could not tell two effects apart while something else was missing too, they may now.
+Where the data could not tell two effects apart while something else was missing too, they may now. Their evidence is
+that of `competition`, and the settings of an effect are charged as there. A rival of which no flow is found keeps the
+chance that it had.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
 
-from vegglue.calibration.baseline import Baseline, search_model
-from vegglue.diagnosis.refits import Refit, RefitTrial, calibrated_with, refits_of, start_with, without_effect
-from vegglue.diagnosis.rivals import with_chances
+from vegglue.calibration.baseline import Baseline, SearchModel, search_model
+from vegglue.diagnosis.refits import RefitTrial, calibrated_with, refits_of, start_with, without_effect
+from vegglue.diagnosis.rivals import shared_anew, with_chances
 from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.engine.interface import responses
 from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening.candidates import candidate_in_case, candidates_of
+from vegglue.screening import score_test
+from vegglue.screening.candidates import Candidate, candidate_in_case, candidates_of, cause_of
+from vegglue.screening.evidence import log_factors
 
 
 def with_rivals_again(
@@ -33,26 +39,27 @@ def with_rivals_again(
 
 
 def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], watch: Watch) -> tuple[Baseline, Step] | None:
-    """One step; None when no flow is found without its effect, or with any of its rivals."""
+    """One step; None when no flow is found without its effect, or with it again."""
     watch(Progress(f"comparing {', '.join(step.rivals)} again"))
-    own = candidate_in_case(base.model.case, step.accepted)
-    less = without_effect(base, own)
+    less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
     if less is None:
         return None
-    refits = _refits_of_rivals(less, step, suspects)
-    if not refits:
+    search, trials = search_model(less), _trials_of_rivals(less, step, suspects)
+    found = {one.candidate.name: one for one in refits_of(search, trials) if one is not None}
+    if step.accepted not in found:
         return None
-    best = max(refits, key=lambda one: one.log_factor)
-    chance = tempered_chances(np.array([one.log_factor for one in refits]))
-    told = {one.candidate.name: float(p) for one, p in zip(refits, chance, strict=True)}
-    again = with_chances(replace(step, others={}), best.candidate.name, told)
-    if best.candidate.name == step.accepted:
+    evidence = np.array([one.log_factor + settings_charge(search, one.candidate) for one in found.values()])
+    before = {one.candidate.name: step.chance[one.candidate.name] for one in trials}
+    told = shared_anew(before, [*found], tempered_chances(evidence))
+    best, whole = [*found][int(np.argmax(evidence))], sum(told.values())
+    again = with_chances(replace(step, others={}), best, {name: p / whole for name, p in told.items()})
+    if best == step.accepted:
         return base, again
-    further = calibrated_with(less, best)
+    further = calibrated_with(less, found[best])
     return None if further is None else (further, again)
 
 
-def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[Refit]:
+def _trials_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[RefitTrial]:
     """The rivals, each from the size it had, in the model without the effect that was accepted.
 
     A rival that a later step accepted acts already, and is none any more.
@@ -66,4 +73,20 @@ def _refits_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect
         one, suspect = possible[name], suspects[name]
         gain = one.amplitude.gain(suspect.amplitude.value)
         trials.append(RefitTrial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
-    return [refit for refit in refits_of(search_model(less), trials) if refit is not None]
+    return trials
+
+
+def settings_charge(search: SearchModel, one: Candidate) -> float:
+    """ln of the mean over the settings of an effect of B, over the largest [-]: what their choice costs, to first order
+    as in `competition`; at least -ln of their number.
+    """
+    settings = one.settings()
+    if len(settings) == 1:
+        return 0.0
+    model, noise, point = search.model, search.noise, search.point
+    traces = responses(model, point, [cause_of(model.case, one, shapes) for shapes in settings])
+    slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
+    projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(traces)))
+    score = score_test.scores(projected, np.full(len(settings), one.amplitude.only_sign))
+    factors = log_factors(score, one.amplitude.plausible_gain * projected.length)
+    return float(logsumexp(factors) - factors.max() - np.log(len(settings)))
