@@ -14,13 +14,12 @@ from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
-from vegglue.diagnosis.next_measurement import MeasurementPlan, MeasurementWorth
 from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
+from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.solver.status import FAILED
 from vegglue.storage.result_files import read_ensemble
 from vegglue.workflow.compare import Comparison
-from vegglue.workflow.next_measurement import Question
 from vegglue.workflow.stepwise_extension import StepwiseExtension
 
 MOST_LINES, MOST_LETTERS = 12, 600
@@ -89,16 +88,13 @@ def test_a_comparison_is_a_line_for_each_model() -> None:
 
 
 def test_a_question_names_its_best_measurements() -> None:
-    plans = [
-        MeasurementPlan(f"section {n}", np.arange(3), pd.DataFrame(), 1.5, 0.0, "June", SimpleNamespace())
-        for n in range(6)
-    ]
-    useful = Question("wind from waves", tuple(MeasurementWorth(plan, 2.0, 9.0) for plan in plans))
+    best = ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, 9.0)
+    useful = Question("wind from waves", tuple(replace(best, name=f"section {n}") for n in range(6)))
     assert repr(useful).splitlines() == [
         "To tell wind from waves (D2 now 2 squared standard errors):",
         *(f"- section {n}: 9, 3 station(s), 1.5 h" for n in range(4)),
     ]
-    useless = Question("wind from waves", (MeasurementWorth(plans[0], 2.0, 2.1),))
+    useless = Question("wind from waves", (replace(best, then=2.1),))
     assert repr(useless).endswith(
         "none of 1 measurements would by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
     )

@@ -18,14 +18,14 @@ from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
 from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.results.open_questions import ProposedMeasurement, Question
 
 FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
 LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
 LADDER = Ladder((FIRST, LAST), 0, "Added: eddies.")
 STEP = Step("eddies", ("eddies",), (0.3,), (("eddies",),), 9.0, 5.0, 1e-3, {"p": 0.6}, {"p": a_location()})
 LIKELIER = a_diagnosis(steps=(STEP,), verdict={"kind": "one-of"})
-GAUGE = ProposedMeasurement("a gauge at x = 5 m", 1, 0.5, 0.2, 9.0, True)
+GAUGE = ProposedMeasurement("a gauge at x = 5 m", "June", 5.0, 1, 0.5, 0.2, 9.0)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,7 @@ def test_the_ladder_is_of_what_was_added_and_not_of_what_is_left(toy: Run) -> No
 
 
 def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:
-    question, page = OpenQuestion("eddies from <wind>", (GAUGE,)), {"toy-eddies": "../toy-eddies/report.html"}
+    question, page = Question("eddies from <wind>", (GAUGE,)), {"toy-eddies": "../toy-eddies/report.html"}
     loop = LoopResults(ladder=LADDER, questions=(question,), pages=page)
     better, measure, *_ = next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))
     assert '<a href="../toy-eddies/report.html">' in better
@@ -179,15 +179,15 @@ def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:
 
 
 def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
-    hidden = OpenQuestion("eddies from a change of k_s", (replace(GAUGE, enough=False),))
-    unknown = OpenQuestion("eddies from wind", ())
+    hidden = Question("eddies from a change of k_s", (replace(GAUGE, then=3.0),))
+    unknown = Question("eddies from wind", ())
     steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden, unknown))))
     said = "to test eddies, which a change of k_s hides; nor to tell eddies from wind."
     assert list(map(plain, steps)) == [f"No single measurement would do {said}"]
 
 
 def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:
-    hidden = OpenQuestion("steep_bank from a change of k_s", (GAUGE,))
+    hidden = Question("steep_bank from a change of k_s", (GAUGE,))
     (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden,))))
     assert "to test “Steep banks touch more water than their width says” (steep_bank), which a change" in plain(step)
 

@@ -10,7 +10,7 @@ import pytest
 from rungs import a_rung
 
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.storage.kept_words import (
     COMPARISON_FILE,
     QUESTIONS_FILE,
@@ -27,7 +27,7 @@ HASH, OTHER = "a" * 64, "b" * 64
 STEP = LadderStep("brook", "brook.yaml", HASH, ("Größe",), 4, 0.011, 0.02, 0.03, 0.04, 0.012)
 LADDER = Ladder((STEP,), 2, "Added: eddies.", "Missing: eddies.")
 ASIDE = [("June", "velocity", "Größe", 1.0, 0.1 + 0.2, 0.5)]
-QUESTIONS = (OpenQuestion("eddies from wind", (ProposedMeasurement("a gauge", 1, 0.5, 0.2, 9.0, True),)),)
+QUESTIONS = (Question("eddies from wind", (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)),)
 
 
 def test_what_is_kept_is_read_back(tmp_path: Path) -> None:

@@ -8,19 +8,24 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_location, a_suspect
+from diagnoses import NOTHING, a_diagnosis, a_location, a_suspect
 from verdicts import step
 
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
+from vegglue.case.resolved_config import case_hash
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model
 from vegglue.engine.newton import NEWTON
+from vegglue.errors import InputError
 from vegglue.results.diagnosis import ParameterEstimates, Step
+from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.screening.candidates import place_candidate, with_effect
 from vegglue.site.gridded_site import build_site
+from vegglue.storage.kept_words import write_questions
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.next_measurement import next_measurement
+from vegglue.workflow.run_folder import folder_of
 
 PLACE = a_location()
 AT = f"{PLACE.effect}[x{PLACE.x:g},y{PLACE.y:g}]"
@@ -76,3 +81,14 @@ def test_what_hides_beside_a_place_is_asked_of_the_model_that_has_it(monkeypatch
     assert model.case.effects[name].values["x"] == PLACE.x
     assert known == pytest.approx([0.0] * len(case.parameters) + [0.4 / PLACE.plausible], abs=1e-6)
     assert verb.with_places(base, NOTHING) is base
+
+
+def test_what_to_measure_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a case as it is; what somebody asks for is asked anew."""
+    case = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
+    kept = (Question("eddies from wind", (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)),)
+    write_questions(folder_of(tmp_path, case), kept, case_hash(case))
+    monkeypatch.setattr(verb, "diagnose", lambda *given, **more: a_diagnosis())
+    assert tuple(next_measurement(case, runs=tmp_path)) == kept
+    with pytest.raises(InputError, match="is not among the effects of the diagnosis"):
+        next_measurement(case, runs=tmp_path, between=["no_such"])

@@ -1,24 +1,24 @@
 """Results as objects, as `--json` prints them: names of files and every number that is told in words."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
-from vegglue.diagnosis.next_measurement import MeasurementWorth
 from vegglue.discovery.discovered import LawFound
 from vegglue.report_page.posterior_words import describe
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.results.ensemble import Ensemble
+from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
-from vegglue.workflow.next_measurement import Question
 from vegglue.workflow.stepwise_extension import StepwiseExtension
 
 Told = dict[str, Any]
@@ -161,9 +161,5 @@ def _question(question: Question) -> Told:
     return {"tells_apart": question.tells_apart, "measurements": [_worth(one) for one in question.measurements]}
 
 
-def _worth(one: MeasurementWorth) -> Told:
-    plan = one.plan
-    return {
-        "name": plan.name, "experiment": plan.experiment, "x": plan.x, "stations": int(plan.rows.size),
-        "hours": plan.hours, "now": one.now, "then": one.then, "gain_per_hour": one.per_hour,
-    }  # fmt: skip
+def _worth(one: ProposedMeasurement) -> Told:
+    return {**asdict(one), "gain_per_hour": one.per_hour}

@@ -9,9 +9,9 @@ from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.open_questions import Question
 from vegglue.results.rung import Rung
 from vegglue.workflow.compare import Comparison
-from vegglue.workflow.next_measurement import Question
 
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")

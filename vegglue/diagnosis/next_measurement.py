@@ -36,8 +36,6 @@ SECTIONS, AS_MEASURED = 12, 0.3
 # (h ~ Q^0.6). A quarter brings plants to the surface, where what depends on speed or depth leaves other traces.
 LOWER, HIGHER = (0.25, 0.5), (1.4,)
 LEVEL_POWER = 0.6
-# Below this D^2 a measurement does not separate anything.
-SEPARATES = 4.0
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class MeasurementPlan:
 
 @dataclass(frozen=True)
 class MeasurementWorth:
-    """A plan, the least D^2 between any two rivals now and with it, and the gain per hour."""
+    """A plan, and the least D^2 between any two rivals now and with it [-]."""
 
     plan: MeasurementPlan
     now: float
@@ -66,6 +64,7 @@ class MeasurementWorth:
 
     @property
     def per_hour(self) -> float:
+        """What it adds to D^2 for each hour of field work [1/h]."""
         return (self.then - self.now) / self.plan.hours
 
 

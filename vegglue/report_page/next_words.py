@@ -10,7 +10,7 @@ from vegglue.report_page.cause_words import OF_KIND, where
 from vegglue.report_page.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ladder import LadderStep
-from vegglue.results.open_questions import OpenQuestion
+from vegglue.results.open_questions import Question
 
 # How a question names an effect that calibration hides.
 HIDDEN_BEHIND = " from a change of "
@@ -65,10 +65,10 @@ def _measurements(run: Run, command: str) -> Iterator[str]:
         yield "What was found needs no further measurement. What that model leaves open stands in its report."
     elif not questions:
         yield "No further measurement is needed."
-    settled = [one for one in questions if one.measurements and one.measurements[0].enough]
-    measurements = {one.measurements[0].name: one.measurements[0] for one in reversed(settled)}
+    settled = [one for one in questions if one.useful]
+    measurements = {one.useful[0].name: one.useful[0] for one in reversed(settled)}
     for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
-        purposes = [_to_see(one) for one in settled if one.measurements[0].name == best.name]
+        purposes = [_to_see(one) for one in settled if one.useful[0].name == best.name]
         yield (
             f"Measure <b>{html.escape(best.name)}</b>, {' and '.join(purposes)}: {count(best.stations, 'station')}, "
             f"some {short(best.hours, 2)}{NARROW}hours of field work."
@@ -78,7 +78,7 @@ def _measurements(run: Run, command: str) -> Iterator[str]:
         yield f"No single measurement would do {'; nor '.join(left)}."
 
 
-def _to_see(question: OpenQuestion) -> str:
+def _to_see(question: Question) -> str:
     """What a question asks, as a purpose."""
     one, hidden, other = question.tells_apart.partition(HIDDEN_BEHIND)
     if hidden:

@@ -20,7 +20,7 @@ from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.ladder import Ladder
-from vegglue.results.open_questions import OpenQuestion
+from vegglue.results.open_questions import Question
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import patches_present
 from vegglue.site.gridded_site import Site, cells_at
@@ -41,7 +41,7 @@ class LoopResults:
 
     behind: Diagnosis | None = None
     ladder: Ladder | None = None
-    questions: tuple[OpenQuestion, ...] | None = None
+    questions: tuple[Question, ...] | None = None
     pages: Mapping[str, str] = field(default_factory=dict)
 
 

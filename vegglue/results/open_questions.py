@@ -1,40 +1,85 @@
-"""What is still to be told apart, and the measurements that could: as `vegglue next` leaves it for the page."""
+"""What is still to be told apart, and the measurements that could: as `vegglue next` tells it, and keeps it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+# Below this D^2 a measurement does not separate anything.
+SEPARATES = 4.0
+# Measurements shown of each question: more than these nobody plans in one season.
+SHOWN = 4
+# A measurement that raises D^2 by less than a tenth is said to add nothing.
+ADDS = 1.1
+
 
 @dataclass(frozen=True)
 class ProposedMeasurement:
-    """A measurement in words, its stations and hours of field work, and the squared standard errors that lie between
-    the nearest rivals now and with it; enough: whether it tells them apart by itself.
+    """A measurement in words, the experiment it is made in, its place x [m], stations and hours of field work, and the
+    squared standard errors D^2 that lie between the nearest rivals now and with it [-].
     """
 
     name: str
+    experiment: str
+    x: float
     stations: int
     hours: float
     now: float
     then: float
-    enough: bool
+
+    @property
+    def per_hour(self) -> float:
+        """What it adds to D^2 for each hour of field work [1/h]."""
+        return (self.then - self.now) / self.hours
 
 
 @dataclass(frozen=True)
-class OpenQuestion:
-    """What is to be told apart, in words; the best measurements, the first one best."""
+class Question:
+    """What is to be told apart, in words, and the measurements that could, by what they add in an hour."""
 
     tells_apart: str
     measurements: tuple[ProposedMeasurement, ...]
 
+    @property
+    def useful(self) -> tuple[ProposedMeasurement, ...]:
+        """Those that would tell it apart by themselves, the few that are worth a thought."""
+        enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
+        return tuple(enough)[:SHOWN]
 
-def questions_json(questions: Sequence[OpenQuestion]) -> list[dict[str, Any]]:
+    @property
+    def nearest(self) -> tuple[ProposedMeasurement, ...]:
+        """The one that comes nearest to it, where there is any."""
+        return tuple(sorted(self.measurements, key=lambda one: -one.then)[:1])
+
+    def __repr__(self) -> str:
+        if not self.useful:
+            return f"To tell {self.tells_apart}: {self._why_none()}."
+        heading = f"To tell {self.tells_apart} (D2 now {self.useful[0].now:.2g} squared standard errors):"
+        return "\n".join([heading, *(f"- {_in_short(one)}" for one in self.useful)])
+
+    def _why_none(self) -> str:
+        """Why no measurement is proposed: they add little to what is known, or are not enough."""
+        many = f"none of {len(self.measurements)} measurements"
+        if not self.nearest:
+            return f"{many} would by itself"
+        best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
+        most = f"D2 at most {best.then:.2g}: {best.name}"
+        if best.then >= SEPARATES:
+            return f"D2 is {best.now:.2g} already, where {enough}, and {many} adds a tenth to it ({most})"
+        return f"{many} would by itself, where {enough} ({most})"
+
+
+def questions_json(questions: Sequence[Question]) -> list[dict[str, Any]]:
     """The questions as a list of objects."""
     return [asdict(one) for one in questions]
 
 
-def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[OpenQuestion, ...]:
+def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
     """The questions of such a list. Errors: KeyError or TypeError where it is none."""
     return tuple(
-        OpenQuestion(str(one["tells_apart"]), tuple(ProposedMeasurement(**each) for each in one["measurements"]))
+        Question(str(one["tells_apart"]), tuple(ProposedMeasurement(**each) for each in one["measurements"]))
         for one in tree
     )
+
+
+def _in_short(one: ProposedMeasurement) -> str:
+    return f"{one.name}: {one.then:.2g}, {one.stations} station(s), {one.hours:.1f} h"

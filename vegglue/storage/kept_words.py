@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.results.ladder import Ladder, ladder_from, ladder_json
-from vegglue.results.open_questions import OpenQuestion, questions_from, questions_json
+from vegglue.results.open_questions import Question, questions_from, questions_json
 from vegglue.results.rung import Rung, rung_from, rung_tree
 from vegglue.whole_files import MAKE_ROOM
 
-RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 2", "vegglue questions 1"
+RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 2", "vegglue questions 2"
 RUNG_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
 Kept = TypeVar("Kept")
 # A measurement that is left out: where it stands, and its value.
@@ -47,12 +47,12 @@ def ladder_that_fits(folder: Path, config_hash: str) -> Ladder | None:
     return _read_if_it_fits(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, ladder_from)
 
 
-def write_questions(folder: Path, questions: Sequence[OpenQuestion], config_hash: str) -> None:
+def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:
     """Keep what to measure next, which may be nothing. Errors: StorageError."""
     _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_json(questions))
 
 
-def questions_that_fit(folder: Path, config_hash: str) -> tuple[OpenQuestion, ...] | None:
+def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:
     """The questions kept there for exactly this config; None where nobody asked, empty where nothing is left to ask."""
     return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_from)
 

@@ -1,7 +1,7 @@
 """case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.next_measurement import SEPARATES, MeasurementWorth, Rival, worth_of_measurements
+from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
 from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.first_use import with_compilation
@@ -21,61 +21,16 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
-from vegglue.results.open_questions import OpenQuestion, ProposedMeasurement
+from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.screening.candidates import Candidate
-from vegglue.storage.kept_words import write_questions
+from vegglue.storage.kept_words import questions_that_fit, write_questions
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import calibrated, folder_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
-# Measurements shown of each question, and kept for the page: more than these nobody plans in one season.
-KEPT = 4
 # Laws that one question is about at most: of more, two that are alike decide what no measurement answers.
 MOST_LAWS = 3
-# A measurement that raises D^2 by less than a tenth is said to add nothing.
-ADDS = 1.1
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is to be told apart, in words, and the measurements that could, the best first."""
-
-    tells_apart: str
-    measurements: tuple[MeasurementWorth, ...]
-
-    @property
-    def useful(self) -> tuple[MeasurementWorth, ...]:
-        """Those that would tell it apart by themselves, the few that are worth a thought."""
-        enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
-        return tuple(enough)[:KEPT]
-
-    @property
-    def nearest(self) -> tuple[MeasurementWorth, ...]:
-        """The one that comes nearest to it, where there is any."""
-        return tuple(sorted(self.measurements, key=lambda one: -one.then)[:1])
-
-    def __repr__(self) -> str:
-        if not self.useful:
-            return f"To tell {self.tells_apart}: {self._why_none()}."
-        heading = f"To tell {self.tells_apart} (D2 now {self.useful[0].now:.2g} squared standard errors):"
-        return "\n".join([heading, *(f"- {_worth_in_short(one)}" for one in self.useful)])
-
-    def _why_none(self) -> str:
-        """Why no measurement is proposed: they add little to what is known, or are not enough."""
-        many = f"none of {len(self.measurements)} measurements"
-        if not self.nearest:
-            return f"{many} would by itself"
-        best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
-        most = f"D2 at most {best.then:.2g}: {best.plan.name}"
-        if best.then >= SEPARATES:
-            return f"D2 is {best.now:.2g} already, where {enough}, and {many} adds a tenth to it ({most})"
-        return f"{many} would by itself, where {enough} ({most})"
-
-
-def _worth_in_short(one: MeasurementWorth) -> str:
-    plan = one.plan
-    return f"{plan.name}: {one.then:.2g}, {plan.rows.size} station(s), {plan.hours:.1f} h"
 
 
 @one_thread()
@@ -87,10 +42,13 @@ def next_measurement(
     between: names of effects or laws, else those that the diagnosis could not tell apart, step by step, and a place
     that is likelier than they are; where a law stands out, the laws that could be it; where it found nothing, the
     strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept, in
-    questions.json. Errors: InputError for a name that is not in the diagnosis.
+    questions.json, and read there for exactly this case. Errors: InputError for a name that is not in the diagnosis.
     """
     wanted = case_hash(case)
     found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
+    kept = None if between else questions_that_fit(folder_of(runs, case), wanted)
+    if kept is not None:
+        return [*kept]
     by_name = [one.name for one in found.suspects]
     possible = [*by_name, *_laws_by_name(found)]
     unknown = [name for name in between if name not in possible]
@@ -104,9 +62,9 @@ def next_measurement(
             base = with_places(calibrated(case, folder_of(runs, case), excluded_by(found), watch), found)
             watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
-        questions = [Question(what, tuple(worth)) for (what, _), worth in zip(asked, worths, strict=True)]
+        questions = [Question(what, (*map(_proposed, worth),)) for (what, _), worth in zip(asked, worths, strict=True)]
     if not between:
-        write_questions(folder_of(runs, case), [open_question(one) for one in questions], wanted)
+        write_questions(folder_of(runs, case), questions, wanted)
     return questions
 
 
@@ -123,16 +81,9 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def open_question(question: Question) -> OpenQuestion:
-    """A question with the few measurements that would answer it, or the one that comes nearest."""
-    enough = bool(question.useful)
-    return OpenQuestion(
-        question.tells_apart,
-        tuple(
-            ProposedMeasurement(one.plan.name, one.plan.rows.size, one.plan.hours, one.now, one.then, enough)
-            for one in (question.useful or question.nearest)
-        ),
-    )
+def _proposed(one: MeasurementWorth) -> ProposedMeasurement:
+    plan = one.plan
+    return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, one.now, one.then)
 
 
 def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
