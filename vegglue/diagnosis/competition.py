@@ -28,7 +28,7 @@ from vegglue.screening.evidence import HypothesisKind
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
-from vegglue.screening.second_look import SecondLook, second_look
+from vegglue.screening.second_looks import SecondLook, second_looks
 
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
@@ -63,8 +63,8 @@ def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     To first order an effect may promise more than it keeps, or have no flow at all. Then what is within reach of the
     rest is refitted, too, until nothing is.
     """
-    kind, second = screening.kinds[0], second_look(screening)
-    linear = _linear_evidence(kind, second)
+    kind, looks = screening.kinds[0], second_looks(screening)
+    linear = _linear_evidence(kind, looks)
     best = max(*(kind.total for kind in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
     found, tried = _instrument_contenders(screening), set[str]()
     while True:
@@ -72,7 +72,7 @@ def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         if not of_round.effects and not of_round.places:
             return sorted(found, key=lambda one: -one.log_evidence)
         watch(Progress(f"comparing {', '.join(of_round.names(screening))}"))
-        found += _refitted(screening, of_round, (linear, second), watch)
+        found += _refitted(screening, of_round, (linear, looks), watch)
         tried |= set(of_round.names(screening))
         kept = [one.log_evidence for one in found]
         best = max(elsewhere, *kept, *_promises(screening, linear, tried))
@@ -112,9 +112,9 @@ def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[floa
 
 
 def _refitted(
-    screening: Screening, of_round: _Round, promised: tuple[Array, SecondLook | None], watch: Watch
+    screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[SecondLook]], watch: Watch
 ) -> list[Contender]:
-    """Contenders of one round, those that found a flow; promised: evidence to first order, and the second look."""
+    """Contenders of one round, those that found a flow; promised: evidence to first order, and the second looks."""
     linear, kinds = promised[0], {kind.name: kind for kind in screening.kinds}
     effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
     trials = [_effect_trial(screening, j, *promised) for j in effects]
@@ -154,10 +154,10 @@ def _within_reach(evidence: float, best: float) -> bool:
     return bool((best - evidence) / tempering(np.array(best)) < REACH)
 
 
-def _linear_evidence(kind: HypothesisKind, second: SecondLook | None) -> Array:
-    """E of every column of the listed effects (c,), from the place that promises more."""
-    at_best = kind.log_evidence
-    return at_best if second is None else np.maximum(at_best, second.log_factor + kind.log_prior)
+def _linear_evidence(kind: HypothesisKind, looks: Sequence[SecondLook]) -> Array:
+    """E of every column of the listed effects (c,), from the place that promises most."""
+    promised = [kind.log_evidence, *(one.log_factor + kind.log_prior for one in looks)]
+    return np.asarray(np.max(promised, axis=0))
 
 
 def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[int]:
@@ -195,15 +195,17 @@ def _column_of(screening: Screening, candidate: int, linear: Array) -> int:
     return int(columns[np.argmax(linear[columns])])
 
 
-def _effect_trial(screening: Screening, candidate: int, linear: Array, second: SecondLook | None) -> RefitTrial:
-    """A listed effect at its best setting, from the best place, and from the second one where that promises more."""
+def _effect_trial(screening: Screening, candidate: int, linear: Array, looks: Sequence[SecondLook]) -> RefitTrial:
+    """A listed effect at its best setting, from the best place, and from others that promise more there."""
     column, one = _column_of(screening, candidate, linear), screening.fingerprints.candidates[candidate]
     shapes, case = screening.fingerprints.settings[column], screening.search.model.case
-    starts = [refit_start(screening, candidate, column)]
     by_score = screening.kinds[0].log_evidence[column] - screening.kinds[0].log_prior[column]
-    if second is not None and second.log_factor[column] > by_score:
-        starts.append(start_with(case, one, shapes, second.point.z, float(second.gain[column])))
-    return RefitTrial(one, shapes, tuple(starts))
+    others = tuple(
+        start_with(case, one, shapes, look.point.z, float(look.gain[column]))
+        for look in looks
+        if look.log_factor[column] > by_score
+    )
+    return RefitTrial(one, shapes, (refit_start(screening, candidate, column), *others))
 
 
 def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
