@@ -166,6 +166,8 @@ def _with_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> t
     rates = residual(crop(ends, *flow.band), np.repeat(flow.state, 2 * p, axis=3))
     causes = (rates[..., :p] - rates[..., p:]) / (2.0 * DIFFERENCE_STEP)
     base = crop(problem_at(model, experiment, z), *flow.band)
+    if flow.moved >= CLOSE:  # made only now: of a flow that is not wanted none are
+        flow = replace(flow, factors=factors(base, flow.state), moved=0.0)
     slopes = tangents(base, flow.state, flow.factors, causes, TANGENT_TOLERANCE)
     moved = DIFFERENCE_STEP * slopes
     states = np.concatenate([flow.state + moved, flow.state - moved], axis=3)
@@ -196,10 +198,7 @@ def _borrowed(problem: Problem, before: SteadyFlow, warm: Array, tolerance: floa
     end = chord_in_band(problem, start, before.factors, before.band, tolerance, BORROWED_STEPS)
     if not end.converged[0]:
         return None
-    moved = before.moved + float(np.abs(end.state - before.state).max())
-    if moved < CLOSE:
-        return replace(before, state=end.state, moved=moved)
-    return replace(before, state=end.state, factors=factors(crop(problem, *before.band), end.state), moved=0.0)
+    return replace(before, state=end.state, moved=before.moved + float(np.abs(end.state - before.state).max()))
 
 
 def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> Array:
