@@ -3,6 +3,7 @@
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ class ActiveEffect:
     sections: tuple[str, ...] = ()
     devices: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def on(self) -> NDArray[np.bool_]:
         """Members (m,) in which the amplitude is not at its off value."""
         return np.asarray(self.values[self.effect.amplitude.name] != self.effect.amplitude.off)
@@ -42,13 +43,13 @@ def applied(
     added = ADDED.get(stage, ())
     now = dict(neutral)
     for active in effects:
-        on = active.on
-        if active.effect.stage != stage or not on.any():
+        if active.effect.stage != stage or not active.on.any():
             continue
+        on = active.on
         change = _change(active, surroundings, now)
         for name, value in change.items():
             if name in added:
-                now[name] = now[name] + _chosen(on, value, np.zeros(1))
+                now[name] = now[name] + (value if on.all() else np.where(on, value, 0.0))
             else:
                 now[name] = _chosen(on, value, now[name])
         if not added:
@@ -103,6 +104,9 @@ def _refuse_misfits(effect: Effect, change: Any, now: Mapping[str, Array]) -> No
 
 def _chosen(on: NDArray[np.bool_], value: Array, otherwise: Array) -> Array:
     """np.where, without a copy when all members are on."""
-    if on.all():
-        return np.broadcast_to(value, np.broadcast_shapes(np.shape(value), np.shape(otherwise)))
-    return np.where(on, value, otherwise)
+    if not on.all():
+        return np.where(on, value, otherwise)
+    value = np.asarray(value)
+    if value.shape == np.shape(otherwise):  # nearly always: to ask which shape both have takes longer than most effects
+        return value
+    return np.broadcast_to(value, np.broadcast_shapes(value.shape, np.shape(otherwise)))
