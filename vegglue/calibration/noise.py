@@ -236,15 +236,18 @@ def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[
     variance = np.outer(noise.error, noise.error)
     # Few pairs of stations share a section: a power of all distances took more time than the factors.
     pairs = np.nonzero(np.isfinite(noise.separation) & ~np.eye(residual.size, dtype=bool))
-    apart, shared = noise.separation[pairs], variance[pairs]
+    apart, shared, own = noise.separation[pairs], variance[pairs], np.diag(variance)
 
     def deviance(rho: float, scale: float, log_t: float) -> float:
         covariance = known + np.exp(2.0 * log_t) * gram
-        np.einsum("ii->i", covariance)[:] += scale**2 * np.diag(variance)
+        np.einsum("ii->i", covariance)[:] += scale**2 * own
         if rho > 0.0:
             covariance[pairs] += scale**2 * shared * np.exp(apart * np.log(rho))
-        factor, lower = scipy.linalg.cho_factor(covariance, lower=True, overwrite_a=True, check_finite=False)
-        solved = scipy.linalg.cho_solve((factor, lower), residual, check_finite=False)
+        # Asked by name, and for the transpose, which it need not copy: half the time of scipy's own words for it.
+        factor, failed = scipy.linalg.lapack.dpotrf(covariance.T, lower=1, clean=0, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError("The covariance of the errors is not positive definite.")
+        solved, _ = scipy.linalg.lapack.dpotrs(factor, residual, lower=1)
         return float(2.0 * np.log(np.diag(factor)).sum() + residual @ solved)
 
     return deviance
