@@ -1,11 +1,15 @@
 """What all tests share, and the order in which their files are begun."""
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from joblib import cpu_count
 from threadpoolctl import threadpool_limits
+
+import vegglue.parallel
 
 TESTS = Path(__file__).parent
 # Files that take minutes: begun last, one of them would keep one process at work while the others wait.
@@ -44,6 +48,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _one_thread_of_linear_algebra() -> Iterator[None]:
     """Blocks are small: threads of linear algebra would only wait for each other, here as in `simulate`."""
     with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_share_of_the_cores() -> Iterator[None]:
+    """Side by side, each process of the tests has its share of the cores: threads beyond would wait for those of others
+    and spend a sixth more of a core. Commands in processes of their own, and tests that ask for so many, have them.
+    """
+    cores = max(cpu_count() // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), 1)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(vegglue.parallel, "cpu_count", lambda: cores)
         yield
 
 
