@@ -1,9 +1,9 @@
 """Whether measurements that no calibration has seen agree with a calibrated model: errors over what was to be expected.
 
-    ratio = (tr e e' / tr S)^(1/2),   S = diag(s_0^2) + M + g^2 (c + (1 - c) 1) + J V J'
+    ratio = (|e|^2 / tr S)^(1/2),   S = diag(s_0^2 + (1 - c) g^2) + A A',   A = [M, c^(1/2) g 1, J V^(1/2)]
 
 e are the errors of velocities that were not seen, s_0 their stated standard errors (those of what was seen where they
-are not stated), M the covariance of the model's own error, g the error of the grid where it was seen and c its
+are not stated), M the columns of the model's own error, g the error of the grid where it was seen and c its
 correlation, V the covariance of the parameters and J the slopes. Errors alone exceed (chi2 / k)^(1/2) in 5 % of cases,
 chi2 the 95 % point with k = (tr S)^2 / tr S^2 degrees of freedom: few measurements, or many that err alike, are
 few.
@@ -45,24 +45,26 @@ def unseen_errors(base: Baseline, unseen: Model) -> UnseenErrors:
     if not rows.size or point is None:
         return UnseenErrors(float("inf") if rows.size else float("nan"), 1.0)
     error = there.station["value"].to_numpy(float)[rows] - point.prediction[rows]
-    expected = _expected(base, there, point, rows)
-    total = float(np.trace(expected))
-    degrees = total**2 / float((expected**2).sum())
+    own, alike = _expected(base, there, point, rows)
+    squares = (alike**2).sum(axis=1)
+    total = float((own + squares).sum())
+    degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
     by_chance = float(np.sqrt(scipy.stats.chi2.isf(BY_CHANCE, degrees) / degrees))
     return UnseenErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
-def _expected(base: Baseline, there: Model, point: Point, rows: np.ndarray) -> Array:
-    """S of some stations (n, n) [m2/s2], see the head of this file."""
+def _expected(base: Baseline, there: Model, point: Point, rows: np.ndarray) -> tuple[Array, Array]:
+    """The diagonal that each station has of its own (n,) [m2/s2] and A (n, k) [m/s], see the head of this file."""
     noise, seen = base.noise, leading_velocities(base.model.station)[base.noise.rows]
     floor, grid = (
         float(np.mean(error[seen] ** 2)) if seen.any() else 0.0 for error in (noise.data_error, noise.grid_error)
     )
     stated = there.station["standard_error"].to_numpy(float)[rows] ** 2
-    own, slope = model_error_columns(there, point, there.case.model_error)[rows], point.slope[rows]
-    of_each = np.where(stated > 0, stated, floor) + (1.0 - noise.grid_correlation) * grid
-    alike = own @ own.T + noise.grid_correlation * grid + slope @ base.fitted.covariance @ slope.T
-    return np.asarray(alike + np.diag(of_each))
+    of_model = model_error_columns(there, point, there.case.model_error)[rows]
+    of_grid = np.full((rows.size, 1), np.sqrt(noise.grid_correlation * grid))
+    of_parameters = point.slope[rows] @ np.linalg.cholesky(base.fitted.covariance)
+    own = np.where(stated > 0, stated, floor) + (1.0 - noise.grid_correlation) * grid
+    return own, np.hstack([of_model, of_grid, of_parameters])
 
 
 def _case_there(base: Baseline, unseen: Model) -> Case:
