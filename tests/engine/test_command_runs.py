@@ -176,3 +176,20 @@ def test_a_command_is_not_given_what_only_effects_need(tmp_path: Path) -> None:
     effect = f"effects: {{wind: {{values: {{speed: gust}}}}}}\nparameters:\n  {gust}\n  #"
     case = commanded(tmp_path, "", "", ("parameters:  ", effect))
     assert own_parameters(case) == ("n_b", "phi")
+
+
+def test_a_command_that_is_given_no_parameter_is_refused(tmp_path: Path) -> None:
+    """All that is calibrated stands in `effects`: slopes of nothing ended in a traceback."""
+    effect = "effects: {bank_trend: {values: {trend: n_b}}, wind: {values: {speed: phi}}}\nparameters:  "
+    case = commanded(
+        tmp_path,
+        "",
+        "",
+        ("n: n_b", "n: 0.05"),
+        ("phi: phi,", "phi: 9,"),
+        ("high: 100", "high: 20"),
+        ("parameters:  ", effect),
+    )
+    assert own_parameters(case) == ()
+    with pytest.raises(InputError, match=r"`engine` expected a parameter that the command is given, got none"):
+        command_runs(case, tmp_path / "runs")

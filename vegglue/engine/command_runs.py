@@ -55,7 +55,8 @@ class CommandRuns:
 def command_runs(case: Case, folder: Path) -> CommandRuns:
     """The command of a case, with its runs kept in `engine` below the folder of the case's results.
 
-    Errors: InputError when its program is not there, or on a cluster, whose machines need not have it.
+    Errors: InputError when its program is not there, when it is given no parameter, or on a cluster, whose machines
+    need not have it.
     """
     settings = case.engine
     assert settings is not None
@@ -63,6 +64,12 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
         raise InputError(
             f"--cluster: {case.name} runs the command of its `engine`, on this machine only; leave --cluster out, or "
             "let the command itself hand its work to the cluster."
+        )
+    if not own_parameters(case):
+        raise InputError(
+            f"{shown_path(case.source)}: `engine` expected a parameter that the command is given, got none: those of "
+            "`effects` act in the built-in engine alone. Calibrate something that the command knows, or take `engine` "
+            "out of the config."
         )
     words = settings.words(sys.executable)
     from_here = os.sep in words[0] and not os.path.isabs(words[0])  # but it is started in a folder of its own
