@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
@@ -25,6 +26,10 @@ ONE_PLACE = 0.001
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
 VERTICALS = 0.2
+# By how much verticals are moved to the line of their section before it is said [m].
+NEAR_LINE = 0.01
+# Number of x over that of places, up to which places stand on lines across the channel [-]. Chosen, not measured.
+ON_LINES = 2.0 / 3.0
 # Stations of one section lie within so much of one another along the channel [m], where no section is named.
 SECTION_GAP = 0.25
 Row = list[str]
@@ -106,7 +111,7 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     names = _experiments(taken, words, experiments, where)
     sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
     if sections is None or "" in sections:
-        sections = _sections(taken.numbers["x"])
+        sections = _sections(taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size)))
     named = replace(taken, words={**taken.words, "experiment": names, "section": sections})
     refuse_lost_places(named, where.removesuffix(":"))
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
@@ -127,16 +132,28 @@ def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], whe
     )
 
 
-def _sections(x: Array) -> list[str]:
-    """x12.5 for what stands together there: sections begin where stations are further apart than SECTION_GAP."""
-    order = np.argsort(x, kind="stable")
-    distinct = np.unique(np.round(x, 3))
-    # Equal x on many lines are sections as they are, however near; scattered ones are joined.
-    gap = ONE_PLACE if distinct.size * 2 <= x.size else SECTION_GAP
-    group = np.zeros(x.size, dtype=int)
-    group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > gap)])
+def _sections(x: Array, y: Array) -> list[str]:
+    """x12.5 for what stands together there: sections begin where stations are further apart than SECTION_GAP; what
+    reaches further along the channel than across it is no section, and stands as it is.
+    """
+    places = np.unique(np.round(np.column_stack([x, y]), 3), axis=0)
+    # Equal x of many places are sections as they are, however near; scattered ones are joined.
+    scattered = np.unique(places[:, 0]).size > ON_LINES * len(places)
+    apart, group = _groups_along(x, ONE_PLACE), _groups_along(x, SECTION_GAP if scattered else ONE_PLACE)
+    for one in np.unique(group):
+        here = group == one
+        if np.ptp(x[here]) > np.ptp(y[here]):
+            group[here] = x.size + apart[here]
     names = {number: f"x{np.median(x[group == number]):.2f}" for number in np.unique(group)}
     return [names[number] for number in group]
+
+
+def _groups_along(x: Array, gap: float) -> NDArray[np.int_]:
+    """A number for each station (n,), the same where no gap along the channel is wider [m]."""
+    order = np.argsort(x, kind="stable")
+    group = np.zeros(x.size, dtype=int)
+    group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > gap)])
+    return group
 
 
 def _vertical_role(taken: Taken) -> str | None:
@@ -210,10 +227,12 @@ def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
     for one in set(sections):
         here = np.array([section == one for section in sections])
         x[here] = np.median(x[here])
+    moved = float(np.abs(x - kept.numbers["x"]).max(initial=0.0))
     kept = kept.having({"x": x})
     z = np.round(kept.numbers[upward] / ONE_PLACE).tolist()
     heights = [(*place, height) for place, height in zip(_places(kept), z, strict=True)]
-    return without_repeats(kept, heights, errors_of_rows(kept, KINDS[STREAMWISE], words))
+    kept, said = without_repeats(kept, heights, errors_of_rows(kept, KINDS[STREAMWISE], words))
+    return kept, f"{said}, moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else said
 
 
 def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
