@@ -76,3 +76,18 @@ def test_words_of_places_that_make_no_sense_are_refused(tmp_path: Path, words: s
     site = CHANNEL + JUNE + f"files: {{a.csv: {words}}}\n"
     with pytest.raises(InputError, match=re.escape(said)):
         vegglue.import_folder(folder_of(tmp_path / "brook", site, a__csv=table), tmp_path / "brook.yaml")
+
+
+def test_depths_of_a_wading_sheet_are_told_as_not_read(tmp_path: Path) -> None:
+    """They were told among what was read, and nothing was made of them."""
+    table = "x;y;Depth (m);Velocity (m/s)\n10;-1;0.8;0.41\n10;0;0.9;0.52\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert case.imported[0].taken.endswith("not read: Depth (m)")
+    assert "depth" not in case.imported[0].columns
+
+
+def test_velocities_of_other_depths_are_no_repeats_on_the_axis(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="x;Depth (m);u\n10;0.8;0.41\n10;0.9;0.52\n")
+    with pytest.raises(InputError, match=r"at x = 10 m that differ in 'Depth \(m\)'"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

@@ -84,7 +84,19 @@ def read_rows(path: Path, words: FileWords) -> Taken:
             f"{shown_path(path)}: expected no `{idle}` in its entry of `files`, which is for {OF_RECORDS[idle]}, got a "
             "table that says its own places and directions; take it out."
         )
-    return rows_of_table(path, without_copies(read_loosely(path, words.sheet)), words)
+    table = without_copies(read_loosely(path, words.sheet))
+    return _without_depths(rows_of_table(path, table, words), table)
+
+
+def _without_depths(taken: Taken, table: LooseTable) -> Taken:
+    """Depths of water count among what is not read: water is as deep as levels and the bed of the case make it."""
+    heading = taken.columns.get("depth")
+    if heading is None or len(taken.numbers) == 1:
+        return taken
+    place = table.headings.index(heading)
+    columns, units = ({role: one for role, one in of.items() if role != "depth"} for of in (taken.columns, taken.units))
+    others = {**taken.others, heading: [row[place] for _, row in table.rows]}
+    return replace(taken.without("depth"), columns=columns, units=units, others=others)
 
 
 def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
