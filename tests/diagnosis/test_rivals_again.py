@@ -10,6 +10,7 @@ from diagnoses import a_suspect
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
 from vegglue.calibration.baseline import Baseline, SearchModel, baseline, search_model
+from vegglue.calibration.noise import with_unknown_errors
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of
 from vegglue.diagnosis.rivals_again import settings_charge, with_rivals_again
@@ -21,9 +22,10 @@ from vegglue.screening.candidates import Candidate
 EARLIER, LATER = "viscosity", "floor_level_error"
 
 
-def a_step(*rivals: str) -> Step:
-    groups = tuple((name,) for name in rivals)
-    return Step(rivals[0], rivals, tuple(1.0 / len(rivals) for _ in rivals), groups, 200.0, 100.0, 1e-4)
+def a_step(*rivals: str, **others: float) -> Step:
+    """Rivals that are as likely; others: chances of what else it may be."""
+    groups, left = tuple((name,) for name in rivals), 1.0 - sum(others.values())
+    return Step(rivals[0], rivals, tuple(left / len(rivals) for _ in rivals), groups, 200.0, 100.0, 1e-4, others)
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +36,9 @@ def base() -> Baseline:
     return baseline(replace(model, case=with_additions(model.case, added)))
 
 
-def compared_again(base: Baseline, *rivals: str) -> Step:
+def compared_again(base: Baseline, *rivals: str, **others: float) -> Step:
     suspects = {name: a_suspect(name) for name in (*rivals, LATER)}
-    _, (first, second) = with_rivals_again(base, (a_step(*rivals), a_step(LATER)), suspects, silent)
+    _, (first, second) = with_rivals_again(base, (a_step(*rivals, **others), a_step(LATER)), suspects, silent)
     assert second == a_step(LATER), "without rivals there is nothing to compare"
     return first
 
@@ -57,6 +59,19 @@ def test_a_rival_of_which_no_flow_is_found_keeps_its_chance(base: Baseline, monk
 
     monkeypatch.setattr("vegglue.diagnosis.rivals_again.refits_of", without_elder)
     assert compared_again(base, EARLIER, "elder", LATER).chance == pytest.approx({EARLIER: 0.5, "elder": 0.5})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("aside", "told"), [(False, {"probe": 0.4}), (True, {})])
+def test_what_else_it_may_be_keeps_its_chance_unless_it_was_accepted_since(
+    base: Baseline, aside: bool, told: dict[str, float]
+) -> None:
+    """A probe of 40 % vanished, and the effects were told as surely it."""
+    offset = np.ones((base.noise.rows.size, 1))
+    known = replace(base, noise=with_unknown_errors(base.noise, offset)) if aside else base
+    again = compared_again(known, EARLIER, "elder", probe=0.4)
+    assert again.others == pytest.approx(told)
+    assert sum(again.chances) > 0.95 - sum(told.values())
 
 
 @pytest.mark.slow

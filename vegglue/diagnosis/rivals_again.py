@@ -1,17 +1,17 @@
 """Rivals of effects accepted earlier, compared again with what was accepted later in the model.
 
 Where the data could not tell two effects apart while something else was missing too, they may now. Their evidence is
-that of `competition`, and the settings of an effect are charged as there. A rival of which no flow is found keeps the
-chance that it had.
+that of `competition`, and the settings of an effect are charged as there. What is not compared keeps the chance that it
+had: a rival of which no flow is found, and what else it may be, a place or an instrument.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
+from vegglue.calibration.model_error import unlisted_in
 from vegglue.diagnosis.refits import RefitTrial, calibrated_with, refits_of, start_with, without_effect
 from vegglue.diagnosis.rivals import shared_anew, with_chances
 from vegglue.diagnosis.tempered_chances import tempered_chances
@@ -49,14 +49,23 @@ def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], watch: W
     if step.accepted not in found:
         return None
     evidence = np.array([one.log_factor + settings_charge(search, one.candidate) for one in found.values()])
-    before = {one.candidate.name: step.chance[one.candidate.name] for one in trials}
+    before = {one.candidate.name: step.chance[one.candidate.name] for one in trials} | _others_left(base, step)
     told = shared_anew(before, [*found], tempered_chances(evidence))
     best, whole = [*found][int(np.argmax(evidence))], sum(told.values())
-    again = with_chances(replace(step, others={}), best, {name: p / whole for name, p in told.items()})
+    again = with_chances(step, best, {name: p / whole for name, p in told.items()})
     if best == step.accepted:
         return base, again
     further = calibrated_with(less, found[best])
     return None if further is None else (further, again)
+
+
+def _others_left(base: Baseline, step: Step) -> dict[str, float]:
+    """The chances of what else it may be, by name: of places while nothing acts at a place by the same term, and of
+    instruments while none is set aside, which may be what was accepted since.
+    """
+    acting, aside = {one.term for one in unlisted_in(base.model.case)}, bool(base.noise.unknown.size)
+    gone = {name for name in step.others if (step.places[name].term in acting if name in step.places else aside)}
+    return {name: chance for name, chance in step.others.items() if name not in gone}
 
 
 def _trials_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[RefitTrial]:
