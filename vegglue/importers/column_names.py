@@ -31,7 +31,8 @@ ROLES = {
                                   "elevation above bed", "z above bed", "above bed", "hab", "hohe uber sohle")),
         Role("u", "velocity", ("u", "vx", "ux", "u mean", "mean u", "umean", "velocity", "vel", "mean velocity",
                                "mean vel", "meanv", "velocity x", "vel x", "x velocity", "streamwise velocity",
-                               "u velocity", "geschwindigkeit", "vitesse", "u depthavg", "u avg", "depth averaged u")),
+                               "u velocity", "geschwindigkeit", "fliessgeschwindigkeit", "vitesse", "u depthavg",
+                               "u avg", "depth averaged u")),
         Role("v", "velocity", ("v", "vy", "uy", "v mean", "mean v", "vmean", "velocity y", "vel y", "y velocity",
                                "transverse velocity", "lateral velocity", "v velocity", "v depthavg", "v avg",
                                "depth averaged v", "cross stream velocity")),
@@ -120,6 +121,10 @@ def is_in_degrees(heading: str) -> bool:
 
 
 def words_of(name: str) -> str:
-    """Letters and digits in lower case, apart where anything else stood: `u se` for `U_SE`."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    return " ".join(re.findall(r"[a-z0-9]+", plain))
+    """Letters and digits in lower case, apart where anything else stood: `u se` for `U_SE`.
+
+    Signs that make another quantity of a letter stay with it: `u*`, `u'`, `Δx`. Quotes around a name go.
+    """
+    bare = re.sub(r"^(['’])(.*)\1$", r"\2", name.strip())
+    plain = "".join(sign for sign in unicodedata.normalize("NFKD", bare).casefold() if not unicodedata.combining(sign))
+    return " ".join(re.findall(r"[∆∂±]*[^\W_]+[*'’′+]*", plain))

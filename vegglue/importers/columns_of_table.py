@@ -16,7 +16,8 @@ NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
 # magnitude of the velocity.
 LESS_SAID = {
     "z": NAMES_OF_BED,
-    "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "geschwindigkeit", "vitesse"},
+    "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
+    | {"fliessgeschwindigkeit"},
 }
 # What errors and scatters are of, and so in the unit of where they state none.
 VALUES_OF = {
