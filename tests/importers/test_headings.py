@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vegglue.importers.column_names import role_of
+from vegglue.errors import InputError
+from vegglue.importers.column_names import role_of, unit_stated
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.measured_rows import read_rows
 
@@ -34,3 +35,42 @@ def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str)
 )
 def test_accents_and_quotes_change_no_name(heading: str, role: str) -> None:
     assert role_of(heading) == (role, None)
+
+
+@pytest.mark.parametrize(
+    ("heading", "stated"),
+    [
+        ("Flow (m/s)", "'m/s', which is no unit of discharge"),
+        ("Q (Mgal/d)", "'Mgal/d', which is no unit of discharge"),
+        ("u (%)", "'%', which is no unit of velocity"),
+        ("level (m/s)", "'m/s', which is no unit of length"),
+        ("x, ft/s", "'ft/s', which is no unit of length"),
+    ],
+)
+def test_a_unit_of_something_else_is_refused_in_round_brackets_too(tmp_path: Path, heading: str, stated: str) -> None:
+    """It was left out of account, and the numbers taken for SI: a velocity was a discharge."""
+    (tmp_path / "a.csv").write_text(f"a;b;{heading}\n1;2;3\n2;2;3\n", encoding="utf-8")
+    with pytest.raises(InputError, match=stated):
+        read_rows(tmp_path / "a.csv", FileWords())
+
+
+@pytest.mark.parametrize("heading", ["u (mean)", "u (60 s)", "u (A/B)", "u (m/s, mean of 60 s)", "u (-)"])
+def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> None:
+    (tmp_path / "a.csv").write_text(f"x;y;{heading}\n1;2;3\n2;2;3\n", encoding="utf-8")
+    assert read_rows(tmp_path / "a.csv", FileWords()).units["u"] == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("heading", "quantity", "unit"),
+    [
+        ("x (US survey feet)", "length", "ft"),
+        ("level (ft, NAVD88)", "length", "ft"),
+        ("WL (above datum, in cm)", "length", "cm"),
+        ("Q (gpm)", "discharge", "gal/min"),
+        ("direction (gon)", "angle", "gon"),
+        ("x (in the channel)", "length", None),
+    ],
+)
+def test_a_unit_is_known_among_other_words(heading: str, quantity: str, unit: str | None) -> None:
+    """Survey feet were metres, and gon degrees."""
+    assert unit_stated(heading, quantity) == unit

@@ -91,12 +91,17 @@ def known_name(heading: str) -> tuple[str, str | None] | None:
 
 def unit_stated(heading: str, quantity: str) -> str | None:
     """The unit of a quantity that a heading states, whatever its name is: `cm/s` for `Geschw. (cm/s)`, `V, cm/s` and
-    `V_cm_s`, also with words behind it, `(m above datum)`; None where it states none.
+    `V_cm_s`, also among other words, `(m above datum)` and `(US survey feet)`; None where it states none.
     """
     bare, unit = _apart(heading)
-    first = unit.removeprefix("in ").split(" ", 1)[0]
-    words = [unit, first, *(word for _, word in _suffixed(bare))]
+    among = [word for word in re.findall(r"[^\s,;]+", unit) if word != "in"]
+    words = [unit, *among, *(word for _, word in _suffixed(bare))]
     return next((said for word in words if (said := unit_named(word, quantity))), None)
+
+
+def bracketed(heading: str) -> str:
+    """What stands in brackets or after a comma at the end of a heading, '' where nothing does."""
+    return _apart(heading)[1].strip()
 
 
 def _apart(heading: str) -> tuple[str, str]:

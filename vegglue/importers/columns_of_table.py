@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, is_in_degrees, known_name, role_of, unit_stated, words_of
+from vegglue.importers.column_names import ROLES, bracketed, is_in_degrees, known_name, role_of, unit_stated, words_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
-from vegglue.importers.unit_words import UNITS, unit_named
+from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
@@ -114,10 +114,13 @@ def unit_of_column(path: Path, table: LooseTable, columns: Mapping[str, int], ro
     if unit is None:
         raise InputError(
             f"{shown_path(path)}: column {heading!r} is headed {stated!r}, which is no unit of "
-            f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file."
+            f"{quantity} known here ({', '.join(UNITS[quantity])}); say it in `units.{role}` of this file, or by "
+            "`columns` which column holds what."
         )
     return unit
 
 
 def _bracketed(heading: str) -> str:
-    return heading[heading.rfind("[") + 1 : -1] if heading.endswith("]") and "[" in heading else ""
+    """What stands in brackets at the end of a heading, in round ones only where it is like a unit of something."""
+    unit = bracketed(heading)
+    return unit if heading.rstrip().endswith("]") or is_like_unit(unit) else ""

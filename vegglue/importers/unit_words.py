@@ -9,15 +9,18 @@ from vegglue.errors import InputError
 _FOOT = 0.3048  # m, the international foot
 # SI value of one of each unit, by quantity; the SI unit comes first.
 UNITS: dict[str, dict[str, float]] = {
-    "length": {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": _FOOT, "in": _FOOT / 12.0},
+    "length": {
+        "m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": _FOOT, "in": _FOOT / 12.0, "yd": 3.0 * _FOOT,
+    },
     "velocity": {
         "m/s": 1.0, "dm/s": 0.1, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1.0 / 3.6, "ft/s": _FOOT, "in/s": _FOOT / 12.0,
-        "kn": 1852.0 / 3600.0,
+        "kn": 1852.0 / 3600.0, "m/min": 1.0 / 60.0,
     },
     "discharge": {
-        "m3/s": 1.0, "l/s": 0.001, "ml/s": 1e-6, "m3/h": 1.0 / 3600.0, "l/min": 0.001 / 60.0, "ft3/s": _FOOT**3,
+        "m3/s": 1.0, "l/s": 0.001, "ml/s": 1e-6, "m3/h": 1.0 / 3600.0, "m3/min": 1.0 / 60.0, "m3/d": 1.0 / 86400.0,
+        "l/min": 0.001 / 60.0, "l/h": 0.001 / 3600.0, "ft3/s": _FOOT**3, "gal/min": 231.0 * (_FOOT / 12.0) ** 3 / 60.0,
     },
-    "angle": {"degrees": 1.0, "rad": 180.0 / math.pi},
+    "angle": {"degrees": 1.0, "rad": 180.0 / math.pi, "gon": 0.9},
     "time": {"s": 1.0, "min": 60.0, "h": 3600.0},
     "density": {"1/m2": 1.0, "1/ft2": _FOOT**-2},
 }  # fmt: skip
@@ -25,9 +28,10 @@ UNITS: dict[str, dict[str, float]] = {
 SPELLINGS = {
     "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "usft": "ft", "inch": "in",
     "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "cms": "m3/s",
-    "deg": "degrees", "degree": "degrees", "°": "degrees", "gon": "", "radians": "rad", "sec": "s", "seconds": "s",
+    "deg": "degrees", "degree": "degrees", "°": "degrees", "radians": "rad", "sec": "s", "seconds": "s",
     "minutes": "min", "hours": "h", "m/sec": "m/s", "cm/sec": "cm/s", "ft/sec": "ft/s", "ms": "m/s", "mps": "m/s",
-    "lps": "l/s", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s", "qm3/s": "m3/s",
+    "lps": "l/s", "gpm": "gal/min", "m3/day": "m3/d", "yards": "yd", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s",
+    "qm3/s": "m3/s",
 }  # fmt: skip
 
 
@@ -43,6 +47,12 @@ def is_unit(word: str) -> bool:
     return _plain(word) in ("", "-", "1", "db", "degc", "%", "*d", "cnt", "counts", "hpa", "dbar", "m2", "ft2") or any(
         unit_named(word, quantity) for quantity in UNITS
     )
+
+
+def is_like_unit(word: str) -> bool:
+    """Whether a word is a unit of any quantity, or looks like one that is not known here, `acre-ft/d`."""
+    known = is_unit(word) and _plain(word) not in ("", "-", "1")
+    return known or re.fullmatch(r"[a-z0-9-]+/(s|sec|min|h|hr|d|day)", _plain(word)) is not None
 
 
 def si_factor(word: str, quantity: str, where: str) -> float:
