@@ -13,6 +13,7 @@ from vegglue.importers.column_names import is_in_degrees, known_name
 from vegglue.importers.columns_of_table import NAMES_OF_BED, NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.gauged_discharges import whole_discharges
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.lost_places import refuse_lost_places
 from vegglue.importers.measured_rows import Taken
@@ -66,7 +67,7 @@ def station_tables(
     """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
     at = [role for role in ("x", "y") if role in taken.numbers]
     no_place = _lacking(taken, at, np.all)
-    taken = _named(taken, words, known.names, f"{file}:")
+    taken, shares = whole_discharges(_named(taken, words, known.names, f"{file}:"))
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
@@ -76,7 +77,7 @@ def station_tables(
         return StationTables([_points(taken, stem, words)], lacking)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value))
+    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares))
 
 
 def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str) -> None:
@@ -111,7 +112,9 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     names = _experiments(taken, words, experiments, where)
     sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
     if sections is None or "" in sections:
-        sections = _sections(taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size)))
+        x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
+        of_one_tape = "tape" in taken.columns and "tape" not in taken.numbers
+        sections = [_section_at(x)] * taken.size if of_one_tape else _sections(x, y)
     named = replace(taken, words={**taken.words, "experiment": names, "section": sections})
     refuse_lost_places(named, where.removesuffix(":"))
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
@@ -144,8 +147,12 @@ def _sections(x: Array, y: Array) -> list[str]:
         here = group == one
         if np.ptp(x[here]) > np.ptp(y[here]):
             group[here] = x.size + apart[here]
-    names = {number: f"x{np.median(x[group == number]):.2f}" for number in np.unique(group)}
+    names = {number: _section_at(x[group == number]) for number in np.unique(group)}
     return [names[number] for number in group]
+
+
+def _section_at(x: Array) -> str:
+    return f"x{np.median(x):.2f}"
 
 
 def _groups_along(x: Array, gap: float) -> NDArray[np.int_]:
