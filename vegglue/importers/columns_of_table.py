@@ -12,10 +12,11 @@ from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
-# Names that stand for a role where no other column has it: beside z of a point there may be the bed, and beside Vx the
-# magnitude of the velocity.
+# Names that stand for a role where no other column has it: beside z of a point there may be the bed, beside Vx the
+# magnitude of the velocity, and beside the depth of the water that of a point.
 LESS_SAID = {
     "z": NAMES_OF_BED,
+    "depth": {"depth", "tiefe"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
     | {"fliessgeschwindigkeit"},
 }

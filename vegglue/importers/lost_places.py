@@ -1,5 +1,7 @@
 """A table whose velocities would all fall on the axis, as the column that says where they stand across is not known."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vegglue.arrays import Array
@@ -35,12 +37,13 @@ def refuse_lost_places(taken: Taken, file: str) -> None:
 def _lengths_unread(taken: Taken) -> dict[str, Array]:
     """By heading: readings along a tape, and columns of no role whose headings state a unit of length."""
     found = {taken.columns["tape"]: taken.numbers["tape"]} if "tape" in taken.numbers else {}
-    for heading, texts in taken.others.items():
-        if unit_stated(heading, "length") and all(is_number(text) for text in texts if text.strip()):
-            found[heading] = np.array([_value(text) for text in texts])
-    return found
+    said = {heading: texts for heading, texts in taken.others.items() if unit_stated(heading, "length")}
+    return found | {heading: numbers for heading, texts in said.items() if (numbers := numbers_of(texts)) is not None}
 
 
-def _value(text: str) -> float:
-    value = number_in(text, decimal_comma="," in text)
-    return np.nan if value is None else value
+def numbers_of(texts: Sequence[str]) -> Array | None:
+    """A column of numbers, NaN where there is none; None of a column that has words."""
+    if not all(is_number(text) for text in texts if text.strip()):
+        return None
+    values = (number_in(text, decimal_comma="," in text) for text in texts)
+    return np.array([np.nan if value is None else value for value in values])

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
-from vegglue.importers.column_names import is_in_degrees, known_name
-from vegglue.importers.columns_of_table import NAMES_OF_BED, NO_DEGREES
+from vegglue.importers.column_names import is_in_degrees
+from vegglue.importers.columns_of_table import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.gauged_discharges import whole_discharges
@@ -18,6 +18,7 @@ from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.lost_places import refuse_lost_places
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.placement import Placement
+from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
 from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
@@ -73,8 +74,9 @@ def station_tables(
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
-        lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(_vertical_role(taken))], np.all), *beside)
+        lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(vertical_role(taken))], np.all), *beside)
         return StationTables([_points(taken, stem, words)], lacking)
+    refuse_lost_heights(taken, _places(taken), file)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares))
@@ -163,17 +165,9 @@ def _groups_along(x: Array, gap: float) -> NDArray[np.int_]:
     return group
 
 
-def _vertical_role(taken: Taken) -> str | None:
-    """What says how high each velocity was measured: above the bed there, else z; None where z is that of the bed."""
-    if "height" in taken.numbers:
-        return "height"
-    known = known_name(taken.columns.get("z", ""))
-    return "z" if "z" in taken.numbers and (known is None or known[0] not in NAMES_OF_BED) else None
-
-
 def _in_verticals(taken: Taken) -> bool:
     """Whether VERTICALS of the places have velocities at several heights: shallow ones are often measured at one."""
-    role = _vertical_role(taken)
+    role = vertical_role(taken)
     if role is None or "u" not in taken.numbers:
         return False
     there = np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[role])
@@ -200,7 +194,7 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
         for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
     ]
     devices = kept.words.get("device", ["ADV"] * kept.size)
-    upward = str(_vertical_role(kept))
+    upward = str(vertical_role(kept))
     places = [kept.numbers[role] for role in ("x", "y", upward)]
     columns = [
         *(map(_place, one) for one in places),
@@ -227,7 +221,7 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
 
 def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
     """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
-    upward = str(_vertical_role(taken))
+    upward = str(vertical_role(taken))
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
     sections = list(zip(kept.words["experiment"], kept.words["section"], strict=True))
     x = kept.numbers["x"].copy()

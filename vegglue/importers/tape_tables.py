@@ -62,7 +62,7 @@ def on_the_tape(path: Path, taken: Taken, words: FileWords) -> Taken:
     east, north = (x1 - x0) / length, (y1 - y0) / length
     t = taken.numbers["tape"]
     places = {"x": x0 + t * east, "y": y0 + t * north}
-    return taken.having(places, f"places along a tape of {length:.4g} m").without("tape", "depth")
+    return taken.having(places, f"places along a tape of {length:.4g} m").without("tape")
 
 
 def _columns(table: LooseTable) -> dict[str, str]:
