@@ -196,6 +196,8 @@ REFUSED = [
     ("name: small", "name: small\nsimulate: {members: 1.5}", "expected a valid integer, got 1.5"),
     ("name: small", "name: small\ninfer: {behavioural: 0.3}", "`infer.behavioural` goes with an informal likelihood"),
     ("name: small", "name: small\nsurvey: {file: no.csv}", "expected an existing file, got no.csv: put it there"),
+    ("name: small", "name: small\ntitle: 5", "expected a text, got 5; write it in quotes"),
+    ("stand: reed", "stand: true", "expected a text, got True; write it in quotes"),
     ("name: small", "name: small\nname: smaller", "the key `name` stands twice"),
     ("name: small", "name: small\n\tx: 1", "correct the YAML there or just before"),
 ]

@@ -88,7 +88,7 @@ def test_aliases_and_merged_keys_of_common_size_are_read() -> None:
 @pytest.mark.parametrize("text", ["{discharge: 2,66, level: 3}", "{a: 0,95 m}", "a: {b: {c: 7,3}}"])
 def test_a_decimal_comma_within_braces_cuts_no_number_short(text: str) -> None:
     assert "has no value: write decimals with a point, not a comma; correct the YAML there" in refused(text)
-    assert safe_yaml("{a: 1, 2: '', 3: {}}") == {"a": 1, 2: "", 3: {}}
+    assert safe_yaml("{a: 1, 2: '', 3: {}}") == {"a": 1, "2": "", "3": {}}
 
 
 def test_a_config_is_a_file_of_some_size() -> None:
@@ -103,3 +103,9 @@ def test_a_long_chain_of_extends_is_refused() -> None:
         Path(f"{number}.yaml").write_text(f"extends: {number + 1}.yaml\n", encoding="utf-8")
     with pytest.raises(InputError, match="more than 50 files in a row"):
         load_case("0.yaml")
+
+
+@pytest.mark.parametrize("name", ["1", "007", "1.10", "on", "no", "null", "2024-06-03", "1:30"])
+def test_a_key_is_called_as_it_is_written(name: str) -> None:
+    """Runs 1, 2 and 3 were refused, as no text, and `on` was called True."""
+    assert safe_yaml(f"{{{name}: {{a: 1}}}}") == {name: {"a": 1}}

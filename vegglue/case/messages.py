@@ -40,6 +40,8 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     ):
         expected = expected.replace(said, meant)
     advice = _how_numbers_are_written(got) if isinstance(got, str) and "number" in expected else ""
+    if problem["type"] == "string_type":
+        expected, advice = "a text", "; write it in quotes" if isinstance(got, int | float) else ""
     return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
 
 

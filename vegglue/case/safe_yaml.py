@@ -16,6 +16,9 @@ from vegglue.case.text_files import unprintable
 
 WHOLE = re.compile(r"[-+]?[0-9]+")
 BROKEN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+TEXT = "tag:yaml.org,2002:str"
+# What a key is written as is its name: an experiment is called 1, 007 or on, and JSON has no other keys either.
+TEXT_AS_KEY = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float", "bool", "null"))
 # Kinds of plain words that YAML 1.1 reads as something else than a person means, or with rules of its own.
 ANOTHER_WAY = ("int", "float", "timestamp", "value")
 
@@ -76,6 +79,8 @@ class _Loader(yaml.SafeLoader):
             if node.flow_style and _is_end_of_number(key_node, value_node):
                 raise _refused(f"`{key_node.value}` has no value: write decimals with a point, not a comma", key_node)
             keys.add(key_node.value if isinstance(key_node, yaml.ScalarNode) else id(key_node))
+            if isinstance(key_node, yaml.ScalarNode) and key_node.tag in TEXT_AS_KEY:
+                key_node.tag = TEXT
         return super().construct_mapping(node, deep)
 
 

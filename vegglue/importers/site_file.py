@@ -106,6 +106,10 @@ def _sentence(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"`{place}` is missing; add it."
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    for said, meant in (("valid number", "number"), ("valid dictionary or instance of", "keys and values of")):
+    for said, meant in (
+        ("valid number", "number"),
+        ("valid string", "text in quotes"),
+        ("valid dictionary or instance of", "keys and values of"),
+    ):
         expected = expected.replace(said, meant)
     return f"`{place}` expected {expected}, got {repr(problem['input'])[:80]}; correct it."
