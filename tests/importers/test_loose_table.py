@@ -1,5 +1,6 @@
 """Rows that are not as the others: refused where their numbers may stand in wrong columns, else read or counted."""
 
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -111,3 +112,14 @@ def test_text_with_decimal_commas_in_a_workbook_is_numbers(tmp_path: Path) -> No
     book.save(tmp_path / "v.xlsx")
     table = read_loosely(tmp_path / "v.xlsx")
     assert [[table.number(text) for text in row] for _, row in table.rows] == [[1.5, 2.0, 0.25], [2.5, 2.5, 0.3]]
+
+
+def test_a_date_in_a_workbook_is_the_day(tmp_path: Path) -> None:
+    """It was `2024-06-03 00:00:00`, and no experiment of that name is in a site file."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["date", "x", "u"], [datetime(2024, 6, 3), 8, 0.4], [datetime(2024, 6, 3, 14, 30), 9, 0.5]):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    rows = read_loosely(tmp_path / "a.xlsx").rows
+    assert [row[0] for _, row in rows] == ["2024-06-03", "2024-06-03 14:30:00"]

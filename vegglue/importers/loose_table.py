@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -202,6 +203,10 @@ def _lines_of_sheet(path: Path, rows: Iterable[tuple[Any, ...]]) -> Iterator[Lin
 
 
 def _with_point(cell: Any) -> str:
-    """A cell as text; a number that was typed as text with a decimal comma has a point then, as true numbers have."""
+    """A cell as text; a number that was typed as text with a decimal comma has a point then, as true numbers have. A
+    date has no time of day, which a workbook keeps of it: 2024-06-03.
+    """
     text = str(cell).strip()
+    if isinstance(cell, datetime):
+        return text.removesuffix(" 00:00:00")
     return text.replace(",", ".") if isinstance(cell, str) and is_number(text) and "." not in text else text

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
 # Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
 GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
+# The minus of mathematics, hyphens and dashes that word processors write.
+DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d", "-"))
 MISSING_WORDS = (
     "", "-", "--", "---", "nan", "na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "null", "none", "nodata", "no data",
     "missing", "#n/a", "#nv", "inf", "-inf",
@@ -14,7 +16,8 @@ MISSING_WORDS = (
 
 def is_number(text: str) -> bool:
     """Whether a field is a number, however it is written."""
-    return NUMBER.fullmatch(text.strip()) is not None or GROUPED.fullmatch(text.strip()) is not None
+    plain = _plain(text)
+    return NUMBER.fullmatch(plain) is not None or GROUPED.fullmatch(plain) is not None
 
 
 def has_decimal_comma(fields: Iterable[str]) -> bool:
@@ -25,7 +28,7 @@ def has_decimal_comma(fields: Iterable[str]) -> bool:
 
 def number_in(text: str, decimal_comma: bool) -> float | None:
     """A field as a number; None where it says that there is none. Errors: ValueError, which says what to do."""
-    plain = text.strip()
+    plain = _plain(text)
     if plain.lower() in MISSING_WORDS:
         return None
     sign = "," if decimal_comma else "."
@@ -41,6 +44,11 @@ def number_in(text: str, decimal_comma: bool) -> float | None:
 
 def _decimal_sign(text: str) -> str:
     """The sign before the decimals of a number, '' where there is none."""
-    if (grouped := GROUPED.fullmatch(text.strip())) is not None:
+    if (grouped := GROUPED.fullmatch(_plain(text))) is not None:
         return grouped["decimal"]
-    return next((sign for sign in ",." if sign in text), "") if NUMBER.fullmatch(text.strip()) else ""
+    return next((sign for sign in ",." if sign in text), "") if NUMBER.fullmatch(_plain(text)) else ""
+
+
+def _plain(text: str) -> str:
+    """Without spaces around it, and with the minus of a keyboard where a word processor wrote another."""
+    return text.strip().translate(DASHES)
