@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import pytest
+from field_folders import CHANNEL, JUNE, folder_of
 
+import vegglue
 from vegglue.errors import InputError
 from vegglue.importers.column_names import role_of, unit_stated
 from vegglue.importers.file_words import FileWords
@@ -74,3 +76,10 @@ def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> N
 def test_a_unit_is_known_among_other_words(heading: str, quantity: str, unit: str | None) -> None:
     """Survey feet were metres, and gon degrees."""
     assert unit_stated(heading, quantity) == unit
+
+
+def test_columns_that_may_be_the_measurements_are_named(tmp_path: Path) -> None:
+    """A folder whose velocities have an unknown heading was told that it had no table."""
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="x,y,surface velocity (m/s)\n8,0,0.4\n9,0,0.4\n")
+    with pytest.raises(InputError, match=r"a\.csv: .*not read: surface velocity \(m/s\)\. Name the column by what"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

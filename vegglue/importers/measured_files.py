@@ -57,12 +57,21 @@ def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
     found = _read(_candidates(folder, said, used), said, target, place, known)
     if not found.observations:
-        files = ", ".join(kind.file for kind in KINDS.values())
-        raise InputError(
-            f"{shown_path(folder)}: expected one of {files}, or other tables of measurements, got none; put what was "
-            "measured there."
-        )
+        raise InputError(f"{shown_path(folder)}: {_nothing_measured(found)}")
     return found
+
+
+def _nothing_measured(found: MeasuredFiles) -> str:
+    """The end of a sentence about a folder without measurements: what its tables hold, where there are any."""
+    if found.imported:
+        held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
+        kinds = ", ".join(kind.words for kind in KINDS.values())
+        return (
+            f"expected columns of {kinds}, got none that is known. {held} Name "
+            "the column by what it holds, such as `columns: {u: ...}` of its file in `files` of the site file."
+        )
+    files = ", ".join(kind.file for kind in KINDS.values())
+    return f"expected one of {files}, or other tables of measurements, got none; put what was measured there."
 
 
 def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
