@@ -181,6 +181,43 @@ def test_places_of_a_map_are_said_first(tmp_path):
     assert not [one for one in odd(tmp_path, rows=one_inside) if "on a map" in one]
 
 
+HEAD = ROWS.splitlines()[0] + "\n"
+PLACES = [(x, y) for x in (8, 20, 36) for y in (-1, 0.7)]
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [
+        (
+            0.3048,
+            "4 of 6 velocities are outside the grid, the first at x = 65.6168, y = -3.28084 m, and all would lie ",
+        ),
+        (
+            0.01,
+            "6 of 6 velocities are outside the grid, the first at x = 800, y = -100 m, and all would lie inside if ",
+        ),
+        (0.001, "all would lie inside if x and y were in mm: check their unit."),
+        (1000.0, "within 0.028 m of a grid of 40 m, the first at x = 0.008, y = -1 m, as if x were in km: check its "),
+    ],
+)
+def test_places_in_another_unit_are_said(tmp_path, size, said):
+    """Stations at 0.1, 0.3 and 0.5 km stood within half a metre, and nothing was odd."""
+    across = 1.0 if size > 1.0 else size
+    rows = "".join(f"low,A{x},{x / size},{y / across},0.4,0.01\n" for x, y in PLACES)
+    assert [one for one in odd(tmp_path, rows=HEAD + rows) if said in one]
+
+
+def test_places_of_one_section_are_in_no_other_unit(tmp_path):
+    rows = "".join(f"low,A,{x},{y},0.4,0.01\n" for x in (0.01, 0.02) for y in (-1, 0.7, 30))
+    assert not [one for one in odd(tmp_path, rows=HEAD + rows) if "unit" in one]
+
+
+def test_a_floor_that_rises_is_said(tmp_path):
+    """A slope with the sign of dz/dx was taken for what it says."""
+    found = odd(tmp_path, text=SOUND.replace("bed_slope: 0.001", "bed_slope: -0.001"))
+    assert "The floor rises by 0.04 m downstream (`bed_slope` -0.001): the slope of a floor that falls" in found[0]
+
+
 def test_exchanged_axes_are_said_first(tmp_path):
     exchanged = "".join(f"low,A,{y},{x},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))
     first, second, *_ = odd(tmp_path, rows=ROWS.splitlines()[0] + "\n" + exchanged)

@@ -10,6 +10,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_canopies,
     remarks_on_friction_classes,
     remarks_on_patches,
+    remarks_on_rising_floor,
     remarks_on_unnamed_banks,
 )
 from vegglue.checks.directions import remarks_on_directions
@@ -27,6 +28,7 @@ from vegglue.checks.stations import (
     remarks_on_stations,
 )
 from vegglue.checks.steep_flow import remarks_on_steep_flow
+from vegglue.checks.units_of_places import remarks_on_units_of_places
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
 
@@ -42,6 +44,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_absurd_values(case, site, observations),
         *remarks_on_exchanged_axes(case, observations),
         *remarks_on_map_places(case, observations),
+        *remarks_on_units_of_places(case, observations),
         *remarks_on_directions(case, observations),
     ]
 
@@ -52,10 +55,12 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_absurd_values(case, site, observations),
         remarks_on_exchanged_axes(case, observations),
         remarks_on_map_places(case, observations),
+        remarks_on_units_of_places(case, observations),
         remarks_on_stations(case, site, observations),
         remarks_on_directions(case, observations),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
+        remarks_on_rising_floor(case),
         remarks_on_patches(case, site),
         remarks_on_friction_classes(site),
         remarks_on_unnamed_banks(case, site),

@@ -55,6 +55,17 @@ def _why_none(case: Case, site: Site, corners: Array) -> str:
     return "it is outside the grid, or smaller than a cell"
 
 
+def remarks_on_rising_floor(case: Case) -> Iterator[str]:
+    """A floor by its numbers that rises downstream: the slope of a falling one is often written as negative."""
+    west, east = case.grid.x
+    for layer in case.bed:
+        if layer.trapezoid is not None and (fall := layer.trapezoid.bed_slope) < 0.0:
+            yield (
+                f"The floor rises by {-fall * (east - west):.2g} m downstream (`bed_slope` {fall:g}): "
+                "the slope of a floor that falls downstream is above 0."
+            )
+
+
 def remarks_on_friction_classes(site: Site) -> Iterator[str]:
     """Friction classes that hold in no cell."""
     for index, name in enumerate(site.class_names):

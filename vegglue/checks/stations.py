@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.schema import Case
+from vegglue.checks.units_of_places import fitting_unit
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations
 from vegglue.measurements.suspicious_values import absurd_values
@@ -57,7 +58,8 @@ def remarks_on_map_places(case: Case, observations: Observations) -> Iterator[st
     table = observations.table[velocity_rows(observations.table)]
     west, east = case.grid.x
     beyond = np.maximum(west - table["x"], table["x"] - east) > east - west
-    if len(table) and case.frame is None and (table["reason"] == OUTSIDE).all() and beyond.all():
+    unknown = case.frame is None and fitting_unit(case, table) is None
+    if len(table) and unknown and (table["reason"] == OUTSIDE).all() and beyond.all():
         first = table.iloc[0]
         yield (
             f"All velocities lie more than the length of the grid away from it, the first at x = {first['x']:.10g}, "
