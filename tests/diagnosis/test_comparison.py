@@ -14,7 +14,7 @@ from vegglue.calibration.fit import at_point
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.cli.tables import show_ladder
-from vegglue.diagnosis.comparison import homogeneity, improvement, rung, rung_in_short
+from vegglue.diagnosis.comparison import held_out_rmse, homogeneity, improvement, rung, rung_in_short
 from vegglue.results.rung import Rung
 from vegglue.workflow.compare import Comparison
 
@@ -131,12 +131,23 @@ def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) ->
     assert np.mean(means > 2.0 * errors) < 0.1
 
 
+@pytest.mark.parametrize("kind", ["speed", "velocity_across"])
+def test_velocities_of_other_directions_judge_where_none_is_along_the_channel(slope: Array, kind: str) -> None:
+    """Of speeds alone nothing was held out, and `extend --auto` could keep no effect."""
+    station, values = stations(), measured(slope, np.zeros(slope.shape))
+    along, other = (rung(at_best(CASE, one, values, slope)) for one in (station, station.assign(kind=kind)))
+    assert np.isfinite(held_out_rmse(along))
+    assert held_out_rmse(other) == held_out_rmse(along)
+    assert other.in_sample.velocity == along.in_sample.velocity
+    assert other.in_sample.noise_floor == along.in_sample.noise_floor
+
+
 def test_a_ladder_of_levels_alone_tells_no_number_that_is_none(
     slope: Array, capsys: pytest.CaptureFixture[str]
 ) -> None:
     station = stations().assign(kind="level")
     one = rung(at_best(CASE, station, measured(slope, np.zeros(slope.shape)), slope))
-    assert rung_in_short(one) == "twin, 4 parameters: no velocity along the channel"
+    assert rung_in_short(one) == "twin, 4 parameters: no velocity"
     show_ladder(Comparison((one, one), pd.DataFrame()))
     told = capsys.readouterr().out
     assert "nan" not in told

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.stats
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
@@ -23,7 +23,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.in_short import so_many
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
-from vegglue.measurements.kinds import KINDS, STREAMWISE
+from vegglue.measurements.kinds import KINDS, leading_velocities
 from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 
 # What is left out in turn.
@@ -34,7 +34,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     """What there is to say of one calibrated model; validation: the same at stations it has not seen."""
     model, noise, point = base.model, base.noise, base.fitted.point
     used = model.station.iloc[noise.rows]
-    velocity = (used["kind"] == STREAMWISE).to_numpy()
+    velocity = leading_velocities(used)
     section, spread = _held_out(base, used["section"].astype(str).to_numpy())
     experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
     clusters = tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True))
@@ -43,7 +43,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
         title=model.case.title,
         effects=tuple(model.case.effects),
         values={name: interval95(model, base.fitted, name) for name in model.names},
-        in_sample=_in_sample(noise, noise.residual(point.prediction), used["kind"].to_numpy()),
+        in_sample=_in_sample(noise, noise.residual(point.prediction), used["kind"].to_numpy(), velocity),
         held_out=HeldOut(section, experiment, velocity, clusters),
         predictive=_predictive_scores(section[velocity], spread[velocity]),
         homogeneity=homogeneity(base),
@@ -60,16 +60,14 @@ def held_out_rmse(rung: Rung, by: By = "sections", untold: Collection[str] = ())
 def rung_in_short(rung: Rung) -> str:
     """One line: errors of velocity [m/s] at what the model has seen, and at what was held out or never seen."""
     told = {
-        "seen": rung.in_sample.rmse[STREAMWISE],
+        "seen": rung.in_sample.velocity,
         "section held out": held_out_rmse(rung),
         "experiment held out": held_out_rmse(rung, "experiments"),
         "never seen": rung.validation,
         "noise floor": rung.in_sample.noise_floor,
     }
     known = [f"{words} {value:.2g}" for words, value in told.items() if np.isfinite(value)]
-    return (
-        f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known) or 'no velocity along the channel'}"
-    )
+    return f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known) or 'no velocity'}"
 
 
 def rung_json(rung: Rung) -> dict[str, Any]:
@@ -149,12 +147,12 @@ def _of_velocities(rung: Rung, by: By, untold: Collection[str]) -> Array:
     return np.where([one in untold for one in group], np.nan, error)[held_out.velocity]
 
 
-def _in_sample(noise: Noise, left: Array, kind: np.ndarray) -> InSample:
+def _in_sample(noise: Noise, left: Array, kind: np.ndarray, velocity: Mask) -> InSample:
     return InSample(
         rmse={name: root_mean_square(left[kind == name]) for name in KINDS},
         chi2=float(np.sum((left / noise.error) ** 2)),
         stations=int(noise.rows.size),
-        noise_floor=root_mean_square(noise.error[kind == STREAMWISE]),
+        noise_floor=root_mean_square(noise.error[velocity]),
     )
 
 
@@ -197,8 +195,7 @@ def _validated(base: Baseline, validation: Model) -> float:
     point = linearise(validation, base.fitted.point.z)
     if point is None:
         return float("nan")
-    station = validation.station
-    rows = (station["used"] & (station["kind"] == STREAMWISE)).to_numpy(bool)
+    station, rows = validation.station, leading_velocities(validation.station)
     return root_mean_square(station["value"].to_numpy(float)[rows] - point.prediction[rows])
 
 

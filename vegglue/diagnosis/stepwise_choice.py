@@ -164,7 +164,7 @@ def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold
         return "the model finds no steady flow with it"
     gains = _gains(before, after, untold)
     if not gains:
-        where = "one section in one experiment" if after.held_out.velocity.any() else "no velocity along the channel"
+        where = "one section in one experiment" if after.held_out.velocity.any() else "no velocity"
         return f"there is nothing to hold out: {where}"
     together = sum(gain for gain, _ in gains.values())
     for by, (gain, error) in gains.items():

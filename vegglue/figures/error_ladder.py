@@ -14,7 +14,6 @@ from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.figures.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.figures.typography import fixed, short
-from vegglue.measurements.kinds import STREAMWISE
 from vegglue.results.rung import Rung
 
 # p-value [-] of one value in all experiments, below which a parameter is drawn as one that moves: 1 in 20.
@@ -22,7 +21,7 @@ MOVES_BELOW = 0.05
 # Panels of parameters side by side; ratio [-] of largest to smallest value, 1.5 decades, from which an axis is
 # logarithmic: on a linear one the smallest could not be read.
 LADDER_COLUMNS, LOGARITHMIC_FROM = 5, 30.0
-# The axis of errors reaches up to this at least [m/s]: where no velocity along x was measured, there is none to show.
+# The axis of errors reaches up to this at least [m/s]: where no velocity was measured, there is none to show.
 LEAST_AXIS_END = 1e-3
 # Letters of a parameter's name in a line above its panel.
 TITLE_LETTERS = 26
@@ -58,7 +57,7 @@ def _paint_errors(axes: Axes, rungs: Sequence[Rung]) -> None:
     place = np.arange(1, len(rungs) + 1)
     held = np.array([held_out_rmse(rung) for rung in rungs])
     alone = np.array([held_out_rmse(rung, "experiments") for rung in rungs])
-    inside = np.array([rung.in_sample.rmse[STREAMWISE] for rung in rungs])
+    inside = np.array([rung.in_sample.velocity for rung in rungs])
     unseen, floor = np.array([(rung.validation, rung.in_sample.noise_floor) for rung in rungs]).T
     bars = np.array([np.nan, *(_spread(*pair) for pair in pairwise(rungs))])
     axes.errorbar(place, held, np.nan_to_num(bars), fmt="o-", color=COLOUR["model"], markersize=6, linewidth=1.6,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.measurements.kinds import KINDS
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,18 @@ class InSample:
     stations: int
     noise_floor: float
 
+    @property
+    def velocity(self) -> float:
+        """That of velocities along x, else of the first other direction that was measured [m/s]; NaN without any."""
+        of_kinds = (self.rmse[kind.name] for kind in KINDS.values() if kind.velocity)
+        return next((error for error in of_kinds if np.isfinite(error)), float("nan"))
+
 
 @dataclass(frozen=True)
 class HeldOut:
     """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
-    nothing could be left out. velocity: which are velocities along x [m/s]; clusters: the experiment and the section
-    of each.
+    nothing could be left out. velocity: which are velocities along x, or in whatever direction where none is [m/s];
+    clusters: the experiment and the section of each.
     """
 
     sections: Array

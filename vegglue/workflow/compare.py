@@ -13,7 +13,6 @@ from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.in_short import in_short, so_many
-from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -164,7 +163,7 @@ def _step_of(case: Case, config_hash: str, one: Rung, added: tuple[str, ...]) ->
         config_hash=config_hash,
         added=added,
         parameters=len(one.values),
-        in_sample=one.in_sample.rmse[STREAMWISE],
+        in_sample=one.in_sample.velocity,
         held_out_sections=held_out_rmse(one),
         held_out_experiments=held_out_rmse(one, "experiments"),
         unseen=one.validation,
