@@ -102,7 +102,32 @@ def crashing(cells, strength):
     return {"rate": cells.no_such_thing}
 
 
+def of_far_upstream(cells, strength):
+    return {"rate": cells.rate * (1.0 + strength * np.roll(cells.speed, -8, axis=0))}
+
+
+def root_of_a_speed(cells, strength):
+    return {"rate": cells.rate + strength * np.sqrt(cells.u)}
+
+
+def kinked(cells, strength):
+    return {"rate": cells.rate + np.abs(strength)}
+
+
+def by_lot(cells, strength):
+    return {"rate": cells.rate + strength * np.random.default_rng().uniform()}
+
+
+BOTH_SIGNS = replace(GOOD.amplitude, low=-0.05)
+WIDTH = Shape("width", "m", "width", 1.0, 0.1, 2.0)
+
 BROKEN = {
+    "far downstream": replace(GOOD, act=of_far_upstream),
+    "invalid value encountered in sqrt": replace(GOOD, act=root_of_a_speed),
+    "does not turn the answer round": replace(GOOD, act=kinked, amplitude=BOTH_SIGNS),
+    "asked again": replace(GOOD, act=by_lot),
+    "two parameters are called width": replace(GOOD, shapes=(WIDTH, WIDTH)),
+    "have to be finite": replace(GOOD, amplitude=replace(GOOD.amplitude, high=np.inf)),
     "drag would push": replace(GOOD, act=pushing),
     "look no further": replace(GOOD, act=of_far),
     "each member alone": replace(GOOD, act=of_others),

@@ -10,7 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.checks.trial_channel import PAIRS, Trial, answer, at_rest, dry, mirrored, moving_water, sizes, trial
+from vegglue.checks.trial_channel import (
+    PAIRS,
+    Trial,
+    answer,
+    at_rest,
+    dry,
+    mirrored,
+    moving_water,
+    running_back,
+    sizes,
+    trial,
+)
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
@@ -18,8 +29,11 @@ from vegglue.errors import InputError
 from vegglue.flow.backwater import backwater
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
-from vegglue.flow.problem import Problem, crop, take
+from vegglue.flow.problem import ALONG, Problem, crop, take
 from vegglue.solver.newton import newton
+
+# Column of cells from which on water is made faster, and how many upstream of it may feel that.
+CHANGED, FELT_AFAR = 20, 4
 
 
 def breaches(effect: Effect, own: Path | None = None) -> list[str]:
@@ -30,7 +44,7 @@ def breaches(effect: Effect, own: Path | None = None) -> list[str]:
     tried = trial(effect, own)
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise", under="ignore"):
-            return [sentence for check in CHECKS for sentence in check(tried)]
+            return list(_repeats(tried)) or [sentence for check in CHECKS for sentence in check(tried)]
     except InputError as error:
         return [str(error)]
     except (ArithmeticError, *OF_ITS_FUNCTION) as error:
@@ -48,7 +62,12 @@ def undeclared(effect: Effect) -> Iterator[str]:
     for parameter in effect.parameters:
         if not (parameter.unit and parameter.meaning):
             yield f"the parameter {parameter.name} has no unit or no meaning: say both (- for a pure number)"
+    names = [parameter.name for parameter in effect.parameters]
+    yield from (f"two parameters are called {name}" for name in sorted({one for one in names if names.count(one) > 1}))
     amplitude = effect.amplitude
+    if not np.isfinite([amplitude.low, amplitude.high, amplitude.off, amplitude.scale]).all():
+        yield "`low`, `high`, `off` and `scale` of the amplitude have to be finite: say what it may be at all"
+        return
     if not (amplitude.low <= amplitude.off <= amplitude.high and amplitude.low < amplitude.high):
         yield f"off = {amplitude.off:g} lies outside {amplitude.low:g} to {amplitude.high:g}"
     if not (0.0 < amplitude.scale <= amplitude.high - amplitude.low) or amplitude.power < 1:
@@ -56,6 +75,15 @@ def undeclared(effect: Effect) -> Iterator[str]:
     for shape in effect.shapes:
         if not all(shape.low <= value <= shape.high for value in (shape.default, *shape.grid)):
             yield f"default or grid of {shape.name} lie outside {shape.low:g} to {shape.high:g}"
+
+
+def _repeats(tried: Trial) -> Iterator[str]:
+    """The same flow feels the same, whenever it is asked."""
+    problem = tried.problem(*sizes(tried.effect))
+    state = moving_water(problem)
+    first, again = answer(tried, problem, state), answer(tried, problem, state)
+    if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(first, again, strict=True)):
+        yield "the same flow is answered otherwise when asked again: keep nothing between calls, use no random numbers"
 
 
 def _off_is_off(tried: Trial) -> Iterator[str]:
@@ -80,11 +108,25 @@ def _acts(tried: Trial) -> Iterator[str]:
         yield f"nothing changes with {a.name} in moving water: neither the flow nor a reading"
     elif np.abs(half * 2.0**a.power - whole).max() > 0.1 * largest + 1e-11:
         yield f"the answer to a small {a.name} is not of the power {a.power}: correct `power`, or avoid a jump at off"
+    elif a.only_sign == 0 and "search" not in tried.effect.tags:
+        yield from _turns(tried, whole)
+
+
+def _turns(tried: Trial, above: Array) -> Iterator[str]:
+    """An amplitude of both signs turns the answer round with its own; above: that to a small one above off. Water that
+    enters at a place brings no momentum, and that which leaves takes its own: what is searched may turn otherwise.
+    """
+    a = tried.effect.amplitude
+    problem = tried.problem(a.off, a.off - a.small)
+    told = answer(tried, problem, moving_water(problem))
+    below = np.concatenate([(t[..., 1] - t[..., 0]).ravel() for t in told])
+    if np.abs(above + below).max() > 0.1 * np.abs(above).max() + 1e-11:
+        yield f"{a.name} below off does not turn the answer round: give it one sign by `low` or `high`, or avoid a kink"
 
 
 def _finite(tried: Trial) -> Iterator[str]:
     problem = tried.problem(*sizes(tried.effect))
-    for state_of in (at_rest, moving_water, dry):
+    for state_of in (at_rest, moving_water, running_back, dry):
         if not all(np.isfinite(values).all() for values in answer(tried, problem, state_of(problem))):
             yield f"something is not finite in {_name(state_of)} water"
 
@@ -149,6 +191,11 @@ def _parts(tried: Trial) -> Iterator[str]:
     cut = residual(crop(problem, rows.start, rows.stop), np.ascontiguousarray(state[:, :, rows]))
     if not _alike(cut[3:, :, 3:-3], whole[3:, :, 5:-5]):
         yield "rows answer otherwise when those beyond them are left out: look no further than the next cell"
+    faster = state.copy()
+    faster[CHANGED:, ALONG:] *= 1.1
+    upstream = slice(CHANGED - FELT_AFAR)
+    if not _alike(residual(problem, faster)[upstream], whole[upstream]):
+        yield "water answers otherwise when that far downstream is faster: look no further than the next cell"
 
 
 def _settles(tried: Trial) -> Iterator[str]:
@@ -167,4 +214,4 @@ def _alike(found: Array, wanted: Array) -> bool:
 
 
 def _name(state_of: Callable[[Problem], Array]) -> str:
-    return {"at_rest": "still", "moving_water": "moving", "dry": "no"}[state_of.__name__]
+    return {"at_rest": "still", "moving_water": "moving", "running_back": "backward", "dry": "no"}[state_of.__name__]

@@ -100,6 +100,13 @@ def moving_water(problem: Problem) -> Array:
     return state
 
 
+def running_back(problem: Problem) -> Array:
+    """Water in motion the other way, as in an eddy."""
+    state = moving_water(problem)
+    state[:, ALONG] *= -1.0
+    return state
+
+
 def mirrored(state: Array) -> Array:
     """The state seen in a mirror along the axis."""
     other = np.zeros_like(state)

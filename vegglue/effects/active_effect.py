@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.effects.definition import ADDED, Effect, Stage
 from vegglue.errors import InputError
+
+# What numpy says of an array that nobody may write into.
+READ_ONLY = "read-only"
 
 
 @dataclass(frozen=True)
@@ -63,18 +66,36 @@ def _change(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -
     Errors: InputError where the effect of a user fails, or gives what the stage does not hand on.
     """
     act = active.effect.act
+    if not act.__module__.startswith("vegglue."):
+        return _change_by_a_stranger(active, surroundings, now)
+    return act(surroundings, **active.values)
+
+
+def _change_by_a_stranger(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -> Mapping[str, Array]:
+    """What the effect of a user makes of its surroundings, which it cannot write into: others see them, too."""
+    act = active.effect.act
     try:
-        change = act(surroundings, **active.values)
+        values = {name: _unwritable(value) for name, value in active.values.items()}
+        change = act(_unwritable(surroundings), **values)
     except SystemExit:  # it would end the command as if all were well
         raise InputError(f"The effect `{active.effect.name}` ends the program when it acts; mend it.") from None
     except Exception as error:
-        if act.__module__.startswith("vegglue."):
-            raise
         what, name = f"{type(error).__name__}: {error}", active.effect.name
-        raise InputError(f"The effect `{name}` fails when it acts{_in_line(act, error)}: {what}; mend it.") from None
-    if not act.__module__.startswith("vegglue."):
-        _refuse_misfits(active.effect, change, now)
+        advice = "return new arrays, and change none that it is given" if READ_ONLY in str(error) else "mend it"
+        raise InputError(f"The effect `{name}` fails when it acts{_in_line(act, error)}: {what}; {advice}.") from None
+    _refuse_misfits(active.effect, change, now)
     return change
+
+
+def _unwritable(given: Any) -> Any:
+    """The same array, or dataclass of arrays, to be read only."""
+    if isinstance(given, np.ndarray):
+        seen = given.view()
+        seen.flags.writeable = False
+        return seen
+    if not is_dataclass(given) or isinstance(given, type):
+        return given
+    return replace(given, **{one.name: _unwritable(getattr(given, one.name)) for one in fields(given)})
 
 
 def _in_line(act: Any, error: Exception) -> str:

@@ -54,14 +54,25 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
     except (Exception, SystemExit) as error:  # whatever a file of the user's may raise
         raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
     found = getattr(module, "EFFECTS", None)
+    found = tuple(found) if isinstance(found, list) else found
     if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):
-        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {type(found).__name__}; add it.")
+        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {_other_effects(found)}.")
     if not found:
         raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got none in it; add one.")
     for effect in found:
         _refuse_wrong_kinds(effect, shown)
         _refuse_unusable(effect, shown)
     return found
+
+
+def _other_effects(found: object) -> str:
+    """What stands for EFFECTS in a file, and what to do."""
+    if found is None:
+        return "none; add it"
+    if isinstance(found, Effect):
+        return "one Effect; put it in brackets with a comma, (Effect(...),)"
+    other = next((one for one in found if not isinstance(one, Effect)), found) if isinstance(found, tuple) else found
+    return f"{type(other).__name__}; correct it"
 
 
 def _refuse_wrong_kinds(effect: Effect, shown: str) -> None:
