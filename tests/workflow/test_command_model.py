@@ -21,7 +21,7 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of, with_effect
-from vegglue.workflow.command_model import _kept_place, with_command
+from vegglue.workflow.command_model import _kept_place, command_tried, with_command
 from vegglue.workflow.run_folder import validation_of
 
 SMALL = ("members: 1024", "members: 8")
@@ -209,3 +209,19 @@ def test_slopes_of_a_code_that_does_not_rest_are_told_to_be_rough(
     case = commanded(tmp_path, f"import math\n{restless}", f", step: {step}", COARSE, SMALL)
     own = model_of(case, read_observations(case))
     assert correction_at(command_runs(case, tmp_path), own, HERE).rough == rough
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ("100 * (", "times as large: check their unit, and that stations keep their numbers)"),
+        ("-(", "from the built-in engine (the other way: check their sign)"),
+        ("(", "from the built-in engine"),
+    ],
+)
+def test_velocities_of_another_unit_or_sign_are_said(tmp_path: Path, times: str, said: str) -> None:
+    """Predictions in cm/s were told as they came, as if all were well."""
+    program = SMOOTH.replace("{0.2 / n**0.5 - 0.05 * phi**0.2 + float(row['x']) / 1000!r}",
+                             f"{{{times}0.2 / n**0.5 - 0.05 * phi**0.2 + float(row['x']) / 1000)!r}}")  # fmt: skip
+    case = commanded(tmp_path, program, "", COARSE, SMALL, WITH_ERROR)
+    assert command_tried(model_of(case, read_observations(case)), tmp_path).removesuffix(".").endswith(said)

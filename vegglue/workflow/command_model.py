@@ -21,7 +21,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
-from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Verdict
 from vegglue.whole_files import MAKE_ROOM
@@ -33,6 +33,8 @@ CLOSE_ENOUGH = 0.5
 # Standard errors by which it may differ before no verdict is believed: larger than what names rest on. Chosen after a
 # command that gave the same numbers for all parameters was told as water that enters the channel.
 BEYOND_BELIEF = 3.0
+# How many times as large as those of the built-in engine velocities are that may be in another unit: 10 is dm/s.
+OF_ANOTHER_UNIT = 5.0
 TO_CALM = "let its flow come to rest, or set `engine.step` larger"
 
 
@@ -135,9 +137,20 @@ def command_tried(model: Model, folder: Path) -> str:
     told = []
     for name, rows in stations_by_kind(model.station).items():
         kind, found = kind_of(name), end.prediction[rows]
-        off = "" if own is None else f", {root_mean_square(found - own.prediction[rows]):.2g} from the built-in engine"
+        off = "" if own is None else _beside_the_own(found, own.prediction[rows], name == STREAMWISE)
         told.append(f"{kind.words} {found.min():.3g} to {found.max():.3g} {kind.unit}{off}")
     return f"The command of `engine` took {end.seconds:.1f} s at the medians of the priors: {'; '.join(told)}."
+
+
+def _beside_the_own(found: Array, own: Array, along: bool) -> str:
+    """How far the command is from the built-in engine, and why velocities along x may be of another size or sign."""
+    said = f", {root_mean_square(found - own):.2g} from the built-in engine"
+    times = float(found @ own) / float(own @ own) if along and own.any() else 1.0
+    if times < 0.0:
+        return f"{said} (the other way: check their sign)"
+    if not 1.0 / OF_ANOTHER_UNIT < times < OF_ANOTHER_UNIT:
+        return f"{said} ({times:.2g} times as large: check their unit, and that stations keep their numbers)"
+    return said
 
 
 def refuse_command(case: Case, verb: str) -> None:
