@@ -108,3 +108,10 @@ def test_a_case_has_as_many_members_as_were_solved(case: Case, tmp_path: Path, m
 def test_no_ensemble_is_larger_than_the_largest(members: int) -> None:
     with pytest.raises(InputError, match="members: expected 1 to 1,048,576, got"):
         run_folder.of_size(load_case(CONFIG), members)
+
+
+@pytest.mark.parametrize("members", ["8", 8.0])
+def test_a_number_of_members_is_whole(members: int) -> None:
+    """8.0 went on into the config; and '8' was an error within the package."""
+    with pytest.raises(InputError, match=f"members: expected a whole number, got {members!r}"):
+        run_folder.of_size(load_case(CONFIG), members)

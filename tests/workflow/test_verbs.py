@@ -50,6 +50,19 @@ def test_every_name_is_there_and_the_same_for_editors() -> None:
         vegglue.simulat  # noqa: B018
 
 
+def test_what_no_verb_can_do_is_said_in_its_words(tmp_path: Path) -> None:
+    """An unknown method was weighed as `refine`; nothing to add was told as a config that extends itself."""
+    case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR))
+    with pytest.raises(vegglue.InputError, match="--method: expected refine or glue, got 'gleu'"):
+        vegglue.infer(case, runs=tmp_path / "runs", method="gleu")  # type: ignore[arg-type]
+    with pytest.raises(vegglue.InputError, match="--add: expected the name of an effect or more, got none"):
+        vegglue.extend(case, [])
+    with pytest.raises(vegglue.InputError, match="compare: expected one model or more, got none"):
+        vegglue.compare([], runs=tmp_path / "runs")
+    with pytest.raises(vegglue.InputError, match=r"expected a folder with site\.yaml, .*, got no such folder"):
+        vegglue.import_folder(tmp_path / "nowhere")
+
+
 @pytest.mark.slow
 def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
     runs, heard = tmp_path / "runs", list[Progress]()

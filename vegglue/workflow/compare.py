@@ -82,6 +82,8 @@ def _refuse_other_measurements(cases: Sequence[Case]) -> None:
     """Errors are compared station by station, under the same errors of the data, and kept in a folder for each name;
     one model may be there twice.
     """
+    if not cases:
+        raise InputError("compare: expected one model or more, got none; give the cases as a list.")
     first, *others = cases
     for number, case in enumerate(others, 1):
         if any(one.name == case.name and case_hash(one) != case_hash(case) for one in cases[:number]):

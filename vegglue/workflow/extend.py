@@ -64,6 +64,8 @@ def extend(
     too. Errors: InputError for an unknown effect, place or shape, or a file that would be replaced.
     """
     names = [add] if isinstance(add, str) else list(dict.fromkeys(add))
+    if not names:
+        raise InputError("--add: expected the name of an effect or more, got none; `vegglue effects` lists them.")
     added = named_candidates(case, names, shapes or {})
     target = child_path(case.source, [one for one, _ in added]) if to is None else Path(to)
     return write_child(case, target, added, force)

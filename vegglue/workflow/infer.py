@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -114,6 +114,8 @@ def needs_ensemble(case: Case, method: Method) -> bool:
 
 def chosen_method(case: Case, asked: Method | None) -> Method:
     """What is asked for, else what the case says; an informal likelihood is always weighed. Errors: InputError."""
+    if asked not in (None, *get_args(Method)):
+        raise InputError(f"--method: expected {' or '.join(get_args(Method))}, got {asked!r}.")
     if refinable(case):
         return asked or case.infer.method
     if asked == "refine":

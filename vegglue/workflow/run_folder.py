@@ -6,6 +6,7 @@ carry the hash of the case; what does not fit is not used.
 
 import json
 from collections.abc import Mapping
+from numbers import Integral
 from pathlib import Path
 
 import numpy as np
@@ -43,12 +44,14 @@ def folder_of(runs: Path | str, case: Case) -> Path:
 
 
 def of_size(case: Case, members: int | None) -> Case:
-    """The case with another number of members, or as it is. Errors: InputError for none, or for more than the most."""
+    """The case with another number of members, or as it is. Errors: InputError for none, a part, or too many."""
     if members is None:
         return case
+    if not isinstance(members, Integral):
+        raise InputError(f"members: expected a whole number, got {members!r}; give another.")
     if not 0 < members <= MOST_MEMBERS:
         raise InputError(f"members: expected 1 to {MOST_MEMBERS:,}, got {members:,}; give another number.")
-    return case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": members})})
+    return case.model_copy(update={"simulate": case.simulate.model_copy(update={"members": int(members)})})
 
 
 def as_solved(case: Case, folder: Path) -> Case:
