@@ -1,5 +1,6 @@
 """Headings of columns: what a name with a sign is, and a unit that is of something else."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,38 @@ def test_columns_that_may_be_the_measurements_are_named(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="x,y,surface velocity (m/s)\n8,0,0.4\n9,0,0.4\n")
     with pytest.raises(InputError, match=r"a\.csv: .*not read: surface velocity \(m/s\)\. Name the column by what"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+@pytest.mark.parametrize(
+    ("heading", "named"),
+    [("x,u (y=-1),u (y=0),u (y=1)", "'u (y=-1)', 'u (y=0)' and 'u (y=1)'"), ("x,u,x,u", "'u' and 'u'")],
+)
+def test_two_columns_of_one_name_are_no_repeats_to_choose_from(tmp_path: Path, heading: str, named: str) -> None:
+    """The first of them was taken, at y = 0, and the others were named at the end of a line only."""
+    (tmp_path / "a.csv").write_text(f"{heading}\n8,0.4,0.5,0.4\n9,0.4,0.5,0.4\n", encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(f"expected one column of u, got {named}; put their values below")):
+        read_rows(tmp_path / "a.csv", FileWords())
+
+
+def test_one_reading_in_two_units_is_one(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("x [m],x [ft],u\n8,26.2,0.5\n9,29.5,0.5\n", encoding="utf-8")
+    assert read_rows(tmp_path / "a.csv", FileWords()).numbers["x"].tolist() == [8.0, 9.0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (FileWords(units={"u": "cm/s"}), "expected in `units` what its columns hold, x, east_velocity, north_velocity"),
+        (FileWords(columns={"x": "x", "y": "x"}), "expected a column of its own for y, got 'x', which is that of x"),
+    ],
+)
+def test_words_of_the_site_file_that_reach_no_column_are_refused(tmp_path: Path, words: FileWords, said: str) -> None:
+    """`units: {u: cm/s}` beside Ve and Vn did nothing, and these were m/s."""
+    (tmp_path / "a.csv").write_text("x,Ve,Vn\n8,40,3\n9,41,3\n", encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_rows(tmp_path / "a.csv", words)
+
+
+@pytest.mark.parametrize("heading", ["Velocity in cm/s", "u in cm/s", "Depth-averaged velocity [cm/s]"])
+def test_a_unit_may_stand_behind_in(heading: str) -> None:
+    assert role_of(heading) == ("u", "cm/s")

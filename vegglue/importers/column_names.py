@@ -32,7 +32,8 @@ ROLES = {
         Role("u", "velocity", ("u", "vx", "ux", "u mean", "mean u", "umean", "velocity", "vel", "mean velocity",
                                "mean vel", "meanv", "velocity x", "vel x", "x velocity", "streamwise velocity",
                                "u velocity", "geschwindigkeit", "fliessgeschwindigkeit", "vitesse", "u depthavg",
-                               "u avg", "depth averaged u")),
+                               "u avg", "depth averaged u", "average velocity", "avg velocity", "velocity mean",
+                               "velocity avg", "depth averaged velocity", "depth average velocity")),
         Role("v", "velocity", ("v", "vy", "uy", "v mean", "mean v", "vmean", "velocity y", "vel y", "y velocity",
                                "transverse velocity", "lateral velocity", "v velocity", "v depthavg", "v avg",
                                "depth averaged v", "cross stream velocity")),
@@ -44,8 +45,8 @@ ROLES = {
         Role("speed", "velocity", ("speed", "magnitude", "velocity magnitude", "vmag", "vel mag", "magn",
                                    "mean speed")),
         Role("direction", "angle", ("direction", "dir", "flow direction", "velocity direction", "azimuth")),
-        Role("level", "length", ("level", "water level", "wse", "water surface", "water surface elevation", "stage",
-                                 "ws", "wl", "wasserstand", "wasserspiegel", "pegel", "z ws", "waterlevel",
+        Role("level", "length", ("level", "water level", "wse", "wsel", "water surface", "water surface elevation",
+                                 "stage", "ws", "wl", "wasserstand", "wasserspiegel", "pegel", "z ws", "waterlevel",
                                  "gauge height")),
         Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q")),
         Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
@@ -117,9 +118,10 @@ def _apart(heading: str) -> tuple[str, str]:
 
 
 def _suffixed(name: str) -> list[tuple[str, str]]:
-    """x_m as x in m, u_cm_s as u in cm/s: the unit as the last part of the name, or the last two."""
+    """x_m as x in m, u_cm_s and `u in cm/s` as u in cm/s: the unit as the last part of the name, or the last two."""
     parts = re.split(r"[\s_]+", name.strip())
-    return [("_".join(parts[:-last]), "/".join(parts[-last:])) for last in (1, 2) if len(parts) > last]
+    ends = [(parts[:-last], "/".join(parts[-last:])) for last in (1, 2) if len(parts) > last]
+    return [("_".join(bare[:-1] if bare[1:] and bare[-1] == "in" else bare), unit) for bare, unit in ends]
 
 
 def is_in_degrees(heading: str) -> bool:

@@ -8,6 +8,7 @@ from vegglue.importers.column_names import ROLES, bracketed, is_in_degrees, know
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
 from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
+from vegglue.in_short import listed
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
@@ -18,7 +19,7 @@ LESS_SAID = {
     "z": NAMES_OF_BED,
     "depth": {"depth", "tiefe"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
-    | {"fliessgeschwindigkeit"},
+    | {"fliessgeschwindigkeit", "average velocity", "avg velocity", "velocity mean", "velocity avg"},
 }
 # What errors and scatters are of, and so in the unit of where they state none.
 VALUES_OF = {
@@ -29,6 +30,8 @@ VALUES_OF = {
     "level_se": ("level",),
     "discharge_se": ("discharge",),
 }
+# What a place has one of.
+MEASURED_ROLES = {"x", "y", "u", "v", "east_velocity", "north_velocity", "speed", "direction", "level", "discharge"}
 NO_DEGREES = "degrees; convert longitudes and latitudes to metres on a map, such as UTM or the national grid."
 NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 
@@ -36,22 +39,16 @@ NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
     """The place of the column of each role: of two the first, unless its name says less than that of the other.
 
-    Errors: InputError for one that the site file names and that is not there.
+    Errors: InputError for one that the site file names and that is not there, and for two of one name.
     """
-    found: dict[str, int] = {}
-    for role, heading in words.columns.items():
-        if heading not in table.headings:
-            raise InputError(
-                f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
-                f"correct `columns` of this file."
-            )
-        found[role] = table.headings.index(heading)
+    found = _named_in_site_file(path, table, words)
     for place, heading in enumerate(table.headings):
         known = role_of(heading)
         if known is None or _is_passed_over(heading, known[0], table.headings, words):
             continue
         if known[0] not in found and place not in found.values():
             found[known[0]] = place
+    _refuse_doubles(path, table, found, words)
     if "v" not in words.columns and _is_the_speed(found, table.headings):
         found["u"] = found.pop("v")
     if "u_se" not in words.columns and (kind := _only_kind(found)) and not _of_one(table.headings[found["u_se"]]):
@@ -61,6 +58,42 @@ def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[st
     if across and "v_se" not in found and "u_se" in found and not _of_one(table.headings[found["u_se"]]):
         found["v_se"] = found["u_se"]
     return found
+
+
+def _named_in_site_file(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
+    """The places of the columns that the site file names. Errors: InputError where one is not there, or is of two."""
+    found: dict[str, int] = {}
+    for role, heading in words.columns.items():
+        if heading not in table.headings:
+            raise InputError(
+                f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
+                f"correct `columns` of this file."
+            )
+        place = table.headings.index(heading)
+        if place in found.values():
+            other = next(name for name, taken in found.items() if taken == place)
+            raise InputError(
+                f"{shown_path(path)}: expected a column of its own for {role}, got {heading!r}, which is that of "
+                f"{other}; correct `columns` of this file."
+            )
+        found[role] = place
+    return found
+
+
+def _refuse_doubles(path: Path, table: LooseTable, found: Mapping[str, int], words: FileWords) -> None:
+    """Errors: InputError for a second column of the same name: a table beside another, or a column for each place.
+
+    The same reading in two units is one.
+    """
+    for role in sorted(MEASURED_ROLES & found.keys() - words.columns.keys()):
+        first = table.headings[found[role]]
+        alike = [one for one in table.headings if (known_name(one) or ("",))[0] == (known_name(first) or (None,))[0]]
+        units = {unit_stated(one, ROLES[role].quantity) for one in alike}
+        if len(alike) > max(len(units), 1):
+            raise InputError(
+                f"{shown_path(path)}: expected one column of {role}, got {listed([repr(one) for one in alike])}; put "
+                "their values below one another, each row with its own place, or give all but one another heading."
+            )
 
 
 def _is_passed_over(heading: str, role: str, headings: Sequence[str], words: FileWords) -> bool:

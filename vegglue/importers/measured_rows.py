@@ -85,7 +85,13 @@ def read_rows(path: Path, words: FileWords) -> Taken:
             "table that says its own places and directions; take it out."
         )
     table = without_copies(read_loosely(path, words.sheet))
-    return _without_depths(rows_of_table(path, table, words), table)
+    taken = rows_of_table(path, table, words)
+    if (of_none := next((role for role in words.units if role not in taken.numbers), None)) is not None:
+        raise InputError(
+            f"{shown_path(path)}: expected in `units` what its columns hold, {', '.join(taken.numbers)}, got "
+            f"`{of_none}`; correct it, or name that column by `columns`."
+        )
+    return _without_depths(taken, table)
 
 
 def _without_depths(taken: Taken, table: LooseTable) -> Taken:
