@@ -95,9 +95,11 @@ def read_rows(path: Path, words: FileWords) -> Taken:
 
 
 def _without_depths(taken: Taken, table: LooseTable) -> Taken:
-    """Depths of water count among what is not read: water is as deep as levels and the bed of the case make it."""
+    """Depths of water count among what is not read, but beside points below the surface: water is as deep as levels and
+    the bed of the case make it.
+    """
     heading = taken.columns.get("depth")
-    if heading is None or len(taken.numbers) == 1:
+    if heading is None or len(taken.numbers) == 1 or "below" in taken.numbers:
         return taken
     place = table.headings.index(heading)
     columns, units = ({role: one for role, one in of.items() if role != "depth"} for of in (taken.columns, taken.units))
