@@ -346,3 +346,20 @@ def test_a_bare_case_is_drawn_too(tmp_path):
     case = load_case(tmp_path / "sound.yaml")
     save_channel_figure(case, build_site(case), read_observations(case), tmp_path / "channel.png")
     assert (tmp_path / "channel.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("turned", "said"), [(True, True), (False, False)])
+def test_heights_that_count_from_the_surface_are_said(tmp_path, turned, said):
+    """A log law of 0.71 m/s, upside down, was 0.64 m/s, and nothing was odd."""
+    law = [(z, 0.125 * np.log(1000.0 * z)) for z in (0.1, 0.3, 0.5, 0.8)]
+    points = [(x, y, 0.99 - z if turned else z, u) for x in (20, 30) for y in (-1, 0.7) for z, u in law]
+    rows = "".join(f"s{x},ADV,{x},{y},{z},{u:.4f},0.01\n" for x, y, z, u in points)
+    adv = "case,device,x,y,z,u,u_se\n" + rows
+    entries = "".join(
+        f"  - {{kind: adv, file: velocities.csv, experiment: low, section: s{x}, case: s{x}, average: profile}}\n"
+        for x in (20, 30)
+    )
+    text = SOUND.replace("  - {kind: velocity, file: velocities.csv}\n", entries)
+    found = [one for one in odd(tmp_path, text=text, rows=adv) if "as if their heights counted from the surface" in one]
+    assert bool(found) == said
+    assert not said or found[0].startswith("Velocities fall from the bed to the surface in 4 of 4 verticals outside ")

@@ -1,0 +1,30 @@
+"""Do velocities of verticals grow from the bed to the surface, as heights counted upward make them?"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vegglue.measurements.observations import Observations
+
+# Verticals that make a rule, and the share of them that run the other way round [-]. A single one may lie in a wake.
+FEWEST, MOST_OF_ALL = 3, 0.8
+
+
+def remarks_on_heights(observations: Observations) -> Iterator[str]:
+    """Verticals outside plants whose velocities fall towards the surface, nearly all: heights may count downward."""
+    points = observations.points
+    if points.empty:
+        return
+    open_ones = points[points["used"].astype(bool) & ~points["plants"].astype(bool)]
+    falling = [
+        (x, y, float(np.polyfit(some["height"], some["u"], 1)[0]) < 0.0)
+        for (_, _, x, y), some in open_ones.groupby(["experiment", "section", "x", "y"], sort=False)
+        if some["height"].nunique() > 1
+    ]
+    down = [(x, y) for x, y, falls in falling if falls]
+    if len(falling) >= FEWEST and len(down) >= MOST_OF_ALL * len(falling):
+        yield (
+            f"Velocities fall from the bed to the surface in {len(down)} of {len(falling)} verticals outside plants, "
+            f"the first at x = {down[0][0]:g}, y = {down[0][1]:g} m, as if their heights counted from the surface: z "
+            "and `height` count upward."
+        )
