@@ -1,98 +1,90 @@
-"""Rivals of an earlier step, compared again with what came later."""
+"""Effects accepted earlier, compared again with everything else once something later is in the model."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from coarse_twin import coarse_twin
 from diagnoses import a_suspect
-from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
-from vegglue.calibration.baseline import Baseline, SearchModel, baseline, search_model
-from vegglue.calibration.noise import with_unknown_errors
+from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.case.parameter_space import theta_at, z_at
+from vegglue.diagnosis import rivals_again
 from vegglue.diagnosis.child_config import candidate_named, with_additions
-from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of
-from vegglue.diagnosis.rivals_again import settings_charge, with_rivals_again
-from vegglue.effects.library import library
+from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.rivals_again import Again, with_rivals_again
+from vegglue.diagnosis.suspects import suspects_of
+from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
-from vegglue.screening.candidates import Candidate
+from vegglue.screening.residual_screening import screen
 
-EARLIER, LATER = "viscosity", "floor_level_error"
+# What is hidden, what was taken for the first of both, and amplitudes that are clearly seen.
+TRUE, LATER, TAKEN = "viscosity", "discharge_error[high]", "edge_mixing"
+HIDDEN = {TRUE: 0.02, LATER: 0.1}
 
 
-def a_step(*rivals: str, **others: float) -> Step:
-    """Rivals that are as likely; others: chances of what else it may be."""
-    groups, left = tuple((name,) for name in rivals), 1.0 - sum(others.values())
-    return Step(rivals[0], rivals, tuple(left / len(rivals) for _ in rivals), groups, 200.0, 100.0, 1e-4, others)
+def a_step(name: str) -> Step:
+    return Step(name, (name,), (1.0,), ((name,),), 200.0, 100.0, 1e-4)
+
+
+def with_effects(model: Model, *names: str) -> Model:
+    return replace(
+        model, case=with_additions(model.case, [(candidate_named(model.case, model.station, one), {}) for one in names])
+    )
 
 
 @pytest.fixture(scope="module")
-def base() -> Baseline:
-    """A model that two effects act in."""
+def measured() -> Model:
+    """The coarse twin at measurements of what is hidden, with errors of what is stated."""
     model, _ = coarse_twin()
-    added = [(candidate_named(model.case, model.station, name), {}) for name in (EARLIER, LATER)]
-    return baseline(replace(model, case=with_additions(model.case, added)))
+    true = with_effects(model, *HIDDEN)
+    theta = theta_at(model.case, np.zeros((1, len(model.names))))
+    for name, size in HIDDEN.items():
+        theta[candidate_named(model.case, model.station, name).parameter] = np.array([size])
+    point = linearise(true, z_at(true.case, theta)[0])
+    assert point is not None
+    error = model.station["standard_error"].to_numpy(float)
+    values = point.prediction + error * np.random.default_rng(4).standard_normal(error.size)
+    return replace(model, station=model.station.assign(value=values))
 
 
-def compared_again(base: Baseline, *rivals: str, **others: float) -> Step:
-    suspects = {name: a_suspect(name) for name in (*rivals, LATER)}
-    _, (first, second) = with_rivals_again(base, (a_step(*rivals, **others), a_step(LATER)), suspects, silent)
-    assert second == a_step(LATER), "without rivals there is nothing to compare"
-    return first
-
-
-@pytest.mark.slow
-def test_what_a_later_step_accepted_is_no_rival_any_more(base: Baseline) -> None:
-    first = compared_again(base, EARLIER, "elder", LATER)
-    assert LATER not in first.rivals
-    assert sum(first.chances) > 0.9, "the others share all that is left"
-
-
-@pytest.mark.slow
-def test_a_rival_of_which_no_flow_is_found_keeps_its_chance(base: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It vanished, and what was left was told to be surely it."""
-
-    def without_elder(search: SearchModel, trials: Sequence[RefitTrial]) -> list[Refit | None]:
-        return [None if one is None or one.candidate.name == "elder" else one for one in refits_of(search, trials)]
-
-    monkeypatch.setattr("vegglue.diagnosis.rivals_again.refits_of", without_elder)
-    assert compared_again(base, EARLIER, "elder", LATER).chance == pytest.approx({EARLIER: 0.5, "elder": 0.5})
+@pytest.fixture(scope="module")
+def again(measured: Model) -> Again:
+    """What was taken for the first, with the second in the model, compared again."""
+    base = baseline(with_effects(measured, TAKEN, LATER))
+    return with_rivals_again(base, (a_step(TAKEN),), (), suspects_of(screen(baseline(measured))), silent)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("aside", "told"), [(False, {"probe": 0.4}), (True, {})])
-def test_what_else_it_may_be_keeps_its_chance_unless_it_was_accepted_since(
-    base: Baseline, aside: bool, told: dict[str, float]
-) -> None:
-    """A probe of 40 % vanished, and the effects were told as surely it."""
-    offset = np.ones((base.noise.rows.size, 1))
-    known = replace(base, noise=with_unknown_errors(base.noise, offset)) if aside else base
-    again = compared_again(known, EARLIER, "elder", probe=0.4)
-    assert again.others == pytest.approx(told)
-    assert sum(again.chances) > 0.95 - sum(told.values())
+def test_an_effect_that_explains_more_beside_the_later_one_takes_its_place(again: Again) -> None:
+    base, (step,), _ = again
+    assert step.accepted == TRUE
+    assert TRUE in base.model.case.effects
+    assert TAKEN not in base.model.case.effects
+    assert (step.chi2_before, step.chi2_after) == (200.0, 100.0), "what it explained when it was accepted"
 
 
 @pytest.mark.slow
-def test_a_step_stays_where_no_flow_is_found_with_its_effect_again(
-    base: Baseline, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vegglue.diagnosis.rivals_again.refits_of", lambda _, trials: [None] * len(trials))
-    assert compared_again(base, EARLIER, "elder") == a_step(EARLIER, "elder")
+def test_what_was_accepted_later_is_no_rival(again: Again) -> None:
+    _, (step,), _ = again
+    assert LATER not in step.rivals
 
 
-@pytest.mark.parametrize(("alike", "charge"), [(True, 0.0), (False, -np.log(3.0))])
-def test_settings_are_charged_by_how_many_say_the_same(
-    alike: bool, charge: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of three settings one explains the misfit, or all of them: as in the first competition."""
-    station = stations_of(CASE_OF_TWINS, ("A",), 8)
-    slope, values = measured_linearly(("A",), 8, 3)
-    trace = np.random.default_rng(2).standard_normal(len(station))
-    search = search_model(at_best(CASE_OF_TWINS, station, values + 0.1 * trace, slope))
-    traces = np.stack([trace, trace if alike else 0.0 * trace, trace if alike else 0.0 * trace], axis=1)
-    monkeypatch.setattr("vegglue.diagnosis.rivals_again.responses", lambda *_: 1e3 * traces)
-    assert len(Candidate(library()["canopy_bending"]).settings()) == 3
-    assert settings_charge(search, Candidate(library()["canopy_bending"])) == pytest.approx(charge, abs=1e-3)
-    assert settings_charge(search, Candidate(library()["viscosity"])) == 0.0
+@pytest.mark.slow
+def test_rivals_have_the_amplitudes_of_their_refits(again: Again) -> None:
+    _, (step,), suspects = again
+    assert all(suspects[name].amplitude.refitted for name in step.rivals)
+    assert suspects[TRUE].amplitude.value == pytest.approx(HIDDEN[TRUE], rel=0.3)
+
+
+@pytest.mark.parametrize("lost", ["no flow without it", "no flow with it"])
+def test_a_step_stays_where_no_flow_is_found(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    less = None if lost == "no flow without it" else "less"
+    monkeypatch.setattr(rivals_again, "candidate_in_case", lambda *_: None)
+    monkeypatch.setattr(rivals_again, "without_effect", lambda *_: less)
+    monkeypatch.setattr(rivals_again, "screen", lambda *_: "screening")
+    monkeypatch.setattr(rivals_again, "contenders_of", lambda *_: [Contender("probe", "probe", 1.0, 0, None)])
+    base = Baseline(*coarse_twin()[:1], None, None, None, None)
+    known = {TAKEN: a_suspect(TAKEN)}
+    assert with_rivals_again(base, (a_step(TAKEN),), (), known, silent) == (base, (a_step(TAKEN),), known)

@@ -28,7 +28,7 @@ from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as
 from vegglue.diagnosis.findings import Charge, Findings, Undecided
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
 from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found, undecided_of
-from vegglue.diagnosis.rivals_again import with_rivals_again
+from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.first_use import with_compilation
@@ -83,7 +83,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         if found.absurd or not found.alarmed:
             break
         contenders = contenders_of(screening, watch)
-        suspects |= _calibrated(contenders, tested)
+        suspects |= refitted(contenders, tested)
         following = _following(screening, contenders, found, watch)
         if isinstance(following, Undecided):
             found = replace(found, undecided=following)
@@ -92,7 +92,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         if following.what != "instrument":
             newest = 1 if following.what == "effect" else 0
             earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
-            base, again = with_rivals_again(base, earlier, suspects, watch)
+            base, again, suspects = with_rivals_again(base, earlier, found.flagged, suspects, watch)
             found = _with_steps(found, (*again, *last))
         else:  # amplitudes that were calibrated with these readings are no longer true
             suspects = {step.accepted: suspects[step.accepted] for step in found.steps}
@@ -251,15 +251,6 @@ def _without_error_of_shape(before: Baseline, further: Baseline) -> float:
 def _kept(suspects: Mapping[str, Suspect], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
     """Those of which earlier rounds say more than the last test: refitted, or accepted and so tested no more."""
     return {name: one for name, one in suspects.items() if one.amplitude.refitted or name not in tested}
-
-
-def _calibrated(contenders: Sequence[Contender], tested: Mapping[str, Suspect]) -> dict[str, Suspect]:
-    """The listed effects that were refitted, with the amplitudes of their refits."""
-    return {
-        one.name: one.what.of(tested[one.name])
-        for one in contenders
-        if one.kind == "effect" and isinstance(one.what, Refit)
-    }
 
 
 def _in_model(suspect: Suspect, base: Baseline) -> Suspect:

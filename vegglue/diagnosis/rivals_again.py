@@ -1,101 +1,70 @@
-"""Rivals of effects accepted earlier, compared again with what was accepted later in the model.
+"""Effects accepted earlier, compared again with everything else once something later is in the model.
 
-Where the data could not tell two effects apart while something else was missing too, they may now. Their evidence is
-that of `competition`, and the settings of an effect are charged as there. What is not compared keeps the chance that it
-had: a rival of which no flow is found, and what else it may be, a place or an instrument.
+Where two things are missing, what explains the first may depend on the second: an effect that seemed sure is one of
+several, or another leads. The whole competition is held again without the effect, with what was accepted since.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-import numpy as np
-from scipy.special import logsumexp
-
-from vegglue.calibration.baseline import Baseline, SearchModel, search_model
-from vegglue.calibration.model_error import unlisted_in
-from vegglue.diagnosis.refits import RefitTrial, calibrated_with, refits_of, start_with, without_effect
-from vegglue.diagnosis.rivals import shared_anew, with_chances
-from vegglue.diagnosis.tempered_chances import tempered_chances
-from vegglue.engine.interface import responses
+from vegglue.calibration.baseline import Baseline
+from vegglue.diagnosis.competition import Contender, contenders_of
+from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
+from vegglue.diagnosis.rivals import step_found
 from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, candidate_in_case, candidates_of, cause_of
-from vegglue.screening.evidence import log_factors
+from vegglue.screening.candidates import candidate_in_case
+from vegglue.screening.residual_screening import screen
+
+# The model, the steps and the suspects, as they are now.
+Again = tuple[Baseline, tuple[Step, ...], dict[str, Suspect]]
 
 
 def with_rivals_again(
-    base: Baseline, steps: Sequence[Step], suspects: Mapping[str, Suspect], watch: Watch
-) -> tuple[Baseline, tuple[Step, ...]]:
-    """The model with the best rival of every step, and the steps with the chances as they are now.
+    base: Baseline, steps: Sequence[Step], flagged: tuple[int, ...], suspects: Mapping[str, Suspect], watch: Watch
+) -> Again:
+    """The model with the best rival of every step, the steps with the chances as they are now, and the suspects with
+    the amplitudes of their refits.
 
-    steps: of effects that were accepted before what was last, be that an effect or something at a place.
+    steps: of effects that were accepted before what was last, be that an effect or something at a place; flagged:
+    readings set aside, indices among the used stations.
     """
-    kept: list[Step] = []
+    kept, known = list[Step](), dict(suspects)
     for step in steps:
-        found = _again(base, step, suspects, watch) if len(step.rivals) > 1 else None
-        base, step = found or (base, step)
+        base, step, contenders = _again(base, step, flagged, watch)
+        known |= refitted(contenders, known)
         kept.append(step)
-    return base, tuple(kept)
+    return base, tuple(kept), known
 
 
-def _again(base: Baseline, step: Step, suspects: Mapping[str, Suspect], watch: Watch) -> tuple[Baseline, Step] | None:
-    """One step; None when no flow is found without its effect, or with it again."""
-    watch(Progress(f"comparing {', '.join(step.rivals)} again"))
+def refitted(contenders: Sequence[Contender], suspects: Mapping[str, Suspect]) -> dict[str, Suspect]:
+    """The listed effects that were refitted, with the amplitudes of their refits."""
+    return {
+        one.name: one.what.of(suspects[one.name])
+        for one in contenders
+        if one.kind == "effect" and one.name in suspects and isinstance(one.what, Refit)
+    }
+
+
+def _again(
+    base: Baseline, step: Step, flagged: tuple[int, ...], watch: Watch
+) -> tuple[Baseline, Step, Sequence[Contender]]:
+    """One step and what competed; as it was where no flow is found without its effect, or with any."""
+    watch(Progress(f"comparing {step.accepted} again with all else"))
     less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
     if less is None:
-        return None
-    search, trials = search_model(less), _trials_of_rivals(less, step, suspects)
-    found = {one.candidate.name: one for one in refits_of(search, trials) if one is not None}
-    if step.accepted not in found:
-        return None
-    evidence = np.array([one.log_factor + settings_charge(search, one.candidate) for one in found.values()])
-    before = {one.candidate.name: step.chance[one.candidate.name] for one in trials} | _others_left(base, step)
-    told = shared_anew(before, [*found], tempered_chances(evidence))
-    best, whole = [*found][int(np.argmax(evidence))], sum(told.values())
-    again = with_chances(step, best, {name: p / whole for name, p in told.items()})
-    if best == step.accepted:
-        return base, again
-    further = calibrated_with(less, found[best])
-    return None if further is None else (further, again)
-
-
-def _others_left(base: Baseline, step: Step) -> dict[str, float]:
-    """The chances of what else it may be, by name: of places while nothing acts at a place by the same term, and of
-    instruments while none is set aside, which may be what was accepted since.
-    """
-    acting, aside = {one.term for one in unlisted_in(base.model.case)}, bool(base.noise.unknown.size)
-    gone = {name for name in step.others if (step.places[name].term in acting if name in step.places else aside)}
-    return {name: chance for name, chance in step.others.items() if name not in gone}
-
-
-def _trials_of_rivals(less: Baseline, step: Step, suspects: Mapping[str, Suspect]) -> list[RefitTrial]:
-    """The rivals, each from the size it had, in the model without the effect that was accepted.
-
-    A rival that a later step accepted acts already, and is none any more.
-    """
-    case, z = less.model.case, less.fitted.point.z
-    possible = {one.name: one for one in candidates_of(case, less.model.station)}
-    trials = []
-    for name in step.rivals:
-        if name not in possible:
-            continue
-        one, suspect = possible[name], suspects[name]
-        gain = one.amplitude.gain(suspect.amplitude.value)
-        trials.append(RefitTrial(one, suspect.shapes, (start_with(case, one, suspect.shapes, z, gain),)))
-    return trials
-
-
-def settings_charge(search: SearchModel, one: Candidate) -> float:
-    """ln of the mean over the settings of an effect of B, over the largest [-]: what their choice costs, to first order
-    as in `competition`; at least -ln of their number.
-    """
-    settings = one.settings()
-    if len(settings) == 1:
-        return 0.0
-    model, noise, point = search.model, search.noise, search.point
-    traces = responses(model, point, [cause_of(model.case, one, shapes) for shapes in settings])
-    slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
-    projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(traces)))
-    score = score_test.scores(projected, np.full(len(settings), one.amplitude.only_sign))
-    factors = log_factors(score, one.amplitude.plausible_gain * projected.length)
-    return float(logsumexp(factors) - factors.max() - np.log(len(settings)))
+        return base, step, ()
+    screening = screen(less, flagged)
+    contenders = contenders_of(screening, watch)
+    listed = [j for j, one in enumerate(contenders) if one.kind == "effect"]
+    if step.accepted not in [contenders[j].name for j in listed]:
+        return base, step, ()
+    best = contenders[listed[0]]
+    if best.name != step.accepted:
+        assert isinstance(best.what, Refit)
+        further = calibrated_with(less, best.what)
+        if further is None:
+            return base, step, ()
+        base = further
+    again = step_found(screening, contenders, listed[0], base, step.p_family)
+    return base, replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after), contenders

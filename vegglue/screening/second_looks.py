@@ -24,7 +24,7 @@ from vegglue.screening.residual_screening import Screening
 
 # Standard deviations of its prior from which a parameter is off, and looks at most, of those furthest off: each costs
 # 1.5 s of a core on 9,600 cells. Chosen, not measured.
-OFF, MOST_LOOKS = 0.5, 2
+OFF, MOST_LOOKS = 0.25, 2
 
 
 @dataclass(frozen=True)
