@@ -186,6 +186,13 @@ def test_a_flume_has_walls_and_no_banks(tmp_path: Path) -> None:
     assert "n_w" not in remarks, "it acts on the walls"
 
 
+def test_walls_may_be_their_coefficient_alone(tmp_path: Path) -> None:
+    channel = "channel: {length_m: 8, bottom_width_m: 0.8, bed_slope: 0.001}\nwalls: 0.013\n"
+    folder = folder_of(tmp_path / "flume", channel + JUNE, a__csv="x,y,u\n4,0,0.4\n")
+    n_w = vegglue.import_folder(folder, tmp_path / "flume.yaml").parameters["n_w"]
+    assert getattr(n_w, "median", None) == 0.013
+
+
 def test_walls_leave_no_room_for_banks(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "flume", CHANNEL + JUNE + "walls: true\n", a__csv="x,y,u\n4,0,0.4\n")
     assert vegglue.import_folder(folder, tmp_path / "flume.yaml").grid.y == (-1.5, 1.5)
@@ -231,6 +238,8 @@ def test_the_unit_of_a_heading_counts_whatever_its_name_is(tmp_path: Path, headi
         ("", "y,u\n1,2\n", "expected a column of x, got none"),
         ("", "x,y,u\n1,2,3\n1,2,fast\n4,5,6\n", "row 3: expected a number in column u, got 'fast'"),
         ("files: {a.csv: {missing: none}}", "x,y,u\n1,2,3\n", "`files.a.csv`.missing expected a number"),
+        ("files: {a.csv: {standard_error: -0.01}}", "x,y,u\n1,2,3\n", "standard_error expected a number of 0 or above"),
+        ("", "x,y,u,u_se\n1,2,3,0.1\n1,3,3,-1\n", "row 3: expected 0 or above in column u_se, got -1; correct it, or"),
         ("files: {a.csv: {flip: z}}", "x,y,u\n1,2,3\n", "flip expected one of x, y, got 'z'"),
         ("files: {a.csv: {line: 3}}", "x,y,u\n1,2,3\n", "line expected two points"),
         (

@@ -109,6 +109,19 @@ def test_whatever_stands_of_a_bend_is_read_or_refused(tmp_path: Path, place: tup
             json.dumps(put(SITE, ("experiments", "low"), {"discarge": 2, "level": 1})),
             "`experiments.low.discarge` is not a known key: did you mean `discharge`?",
         ),
+        (json.dumps(SITE | {"walls": "glass"}), "`walls` expected keys and values, got 'glass'; correct it."),
+        (
+            json.dumps(SITE | {"experiments": ["low"]}),
+            "`experiments` expected keys and values, got ['low']; correct it.",
+        ),
+        (
+            json.dumps({key: SITE[key] for key in ("channel", "experiments")} | {"plants": []}),
+            "`plants` is not a known key: did you mean `patches`?",
+        ),
+        (
+            json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5], "density": 7})),
+            "`patches[0].density` is not a known key: did you mean `stems_per_m2`?",
+        ),
         (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "a name without the sign '\\x00'"),
     ],
     ids=lambda text: text[:20],

@@ -33,6 +33,7 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    expected = re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
     for said, meant in (
         ("greater", "a number greater"),
         ("less", "a number less"),

@@ -79,8 +79,10 @@ class FlumeWalls(_Said):
 
 
 def _walled(given: Any) -> Any:
-    """`walls: true` as walls of which nothing else is known, and false as none."""
-    return ({} if given else None) if isinstance(given, bool) else given
+    """`walls: true` as walls of which nothing else is known, false as none, and a number as their coefficient."""
+    if isinstance(given, bool):
+        return {} if given else None
+    return {"n": given} if isinstance(given, int | float) else given
 
 
 class PlantedPatch(_Said):

@@ -88,6 +88,13 @@ def file_words(given: Any, where: str) -> FileWords:
 def _errors_by_unit(given: Any, where: str) -> dict[str, float]:
     """A standard error by the SI unit of the values that it is of: a bare number is of all, 1 cm/s of velocities."""
     units = {quantity: next(iter(UNITS[quantity])) for quantity in ("velocity", "length", "discharge")}
+    found = _errors_said(given, units, where)
+    if min(found.values()) < 0.0:
+        raise InputError(f"{where} expected a number of 0 or above, got {given!r}; correct it.")
+    return found
+
+
+def _errors_said(given: Any, units: Mapping[str, str], where: str) -> dict[str, float]:
     if not isinstance(given, str):
         return dict.fromkeys(units.values(), in_si(given, "velocity", where))
     for quantity, unit in units.items():

@@ -122,6 +122,8 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
         units[role] = unit_of_column(path, table, columns, role, words)
         values, absent = _numbers(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
+        if role.endswith(("_se", "_std")):
+            _refuse_negative(path, table, place, values)
         if ROLES[role].quantity == "velocity":
             said += _doubted(values, table.headings[place])
         said += [f"{many} in {table.headings[place]}" for many in absent]
@@ -246,6 +248,16 @@ def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]
     marks = int(np.isnan(values).sum()) - empty
     absent = [f"{so_many(marks, 'mark')} for no value"] if marks else []
     return values, absent + ([so_many(empty, "empty cell")] if empty else [])
+
+
+def _refuse_negative(path: Path, table: LooseTable, place: int, errors: Array) -> None:
+    """Errors: InputError for an error or a scatter below 0, which may mark that none is known."""
+    for (line, row), error in zip(table.rows, errors.tolist(), strict=True):
+        if error < 0.0:
+            raise InputError(
+                f"{shown_path(path)}, row {line}: expected 0 or above in column {table.headings[place]}, got "
+                f"{row[place]}; correct it, or where it marks no value say `missing: [{error:g}]` of this file."
+            )
 
 
 def _nines(value: float) -> bool:

@@ -1,6 +1,7 @@
 """The site file of a field team, read and checked whole."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -112,10 +113,7 @@ def _sentence(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"`{place}` is missing; add it."
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    for said, meant in (
-        ("valid number", "number"),
-        ("valid string", "text in quotes"),
-        ("valid dictionary or instance of", "keys and values of"),
-    ):
+    expected = re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
+    for said, meant in (("valid number", "number"), ("valid string", "text in quotes")):
         expected = expected.replace(said, meant)
     return f"`{place}` expected {expected}, got {repr(problem['input'])[:80]}; correct it."

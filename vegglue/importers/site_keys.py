@@ -21,6 +21,13 @@ OF_FLOW = (("discharge", "discharge_m3_s"), ("level", "downstream_level_m"))
 # How alike two words are that are one misspelt [-], and letters of a word cut short: `stems` for `stems_per_m2`.
 MISSPELT, CUT_SHORT = 0.8, 4
 
+# What others call a key, in a config of a case or elsewhere.
+OTHER_WORDS = {
+    "plants": "patches", "vegetation": "patches", "density": "stems_per_m2", "stem_density": "stems_per_m2",
+    "canopy_height": "canopy_height_guess_m", "q": "discharge", "width": "bottom_width_m", "slope": "bed_slope",
+    "viscosity": "eddy_viscosity_m2_s",
+}  # fmt: skip
+
 
 def unread_keys(given: Any) -> list[str]:
     """The keys of a site file that no reader knows, with where they stand, as in `channel.axis`."""
@@ -31,6 +38,7 @@ def misspelt_key(given: Any) -> tuple[str, str] | None:
     """The first unknown key, with its place, that is all but a known one which is not given, and that one."""
     for place, key, missing in _unread(given):
         close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
+        close = OTHER_WORDS.get(key.lower()) if close is None and OTHER_WORDS.get(key.lower()) in missing else close
         if close is None and len(key) >= CUT_SHORT:
             close = next((known for known in missing if known.startswith(key)), None)
         if close is not None:
