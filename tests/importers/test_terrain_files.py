@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from field_folders import JUNE, folder_of
 
 import vegglue
 from vegglue.arrays import Array
@@ -67,6 +68,7 @@ def write_xyz(path: Path) -> None:
         ("bed.tif", write_geotiff, FileWords()),
         ("bed.asc", write_ascii, FileWords()),
         ("bed.xyz", write_xyz, FileWords(columns={"x": "1", "y": "2", "z": "3"})),
+        ("bed.xyz", write_xyz, FileWords()),
     ],
 )
 def test_a_bed_on_the_map_is_read_along_the_channel(tmp_path: Path, name: str, write, words: FileWords) -> None:
@@ -349,3 +351,17 @@ def test_steep_cells_without_a_class_are_told_by_import_and_check(
     assert told in vegglue.check(case, runs=tmp_path).remarks
     import_command(tmp_path / "mill", tmp_path / "other.yaml")
     assert told in capsys.readouterr().out
+
+
+def test_depths_are_no_levels_of_a_bed(tmp_path: Path) -> None:
+    """What to do with them was not said, and named as z they made a ridge, of which `check` was silent."""
+    rows = [f"{x},{y},{depth}" for x in (0, 20, 40) for y, depth in ((-3, -0.2), (-1, 0.9), (1, 0.9), (3, -0.2))]
+    (tmp_path / "bed.csv").write_text("\n".join(["x,y,depth", *rows]), encoding="utf-8")
+    with pytest.raises(InputError, match="take depths off the level of the water above them, and call that z"):
+        read_terrain(tmp_path / "bed.csv", Placement(), FileWords(), sections=False)
+    site = "bed: {file: bed.csv, columns: {z: depth}}\n" + JUNE
+    folder = folder_of(tmp_path / "brook", site, a__csv="x,y,u\n8,2,0.4\n")
+    (tmp_path / "bed.csv").rename(folder / "bed.csv")
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    remarks = vegglue.check(case, runs=tmp_path / "runs").remarks
+    assert [one for one in remarks if one.startswith("The bed is higher along its middle than at both sides, by ")]

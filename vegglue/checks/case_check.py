@@ -10,6 +10,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_canopies,
     remarks_on_friction_classes,
     remarks_on_patches,
+    remarks_on_ridge,
     remarks_on_rising_floor,
     remarks_on_unnamed_banks,
 )
@@ -63,6 +64,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
         remarks_on_rising_floor(case),
+        remarks_on_ridge(case, site),
         remarks_on_patches(case, site),
         remarks_on_friction_classes(site),
         remarks_on_unnamed_banks(case, site),

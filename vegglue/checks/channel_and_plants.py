@@ -25,6 +25,10 @@ DRAG_OF_EMERGENT = {
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
 MANY_STEEP = 0.1
 
+# Share of the height of a cross-section by which its middle stands above both sides in a ridge [-], at least so much
+# [m], and share of the sections that are one [-]. Chosen, not measured.
+OF_A_RIDGE, LEAST_RIDGE, MOST_RIDGE = 0.5, 0.02, 0.8
+
 
 def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
     """Patches that the grid holds poorly: area of their cells against their own [m2], overlaps, unused stands."""
@@ -64,6 +68,21 @@ def remarks_on_rising_floor(case: Case) -> Iterator[str]:
                 f"The floor rises by {-fall * (east - west):.2g} m downstream (`bed_slope` {fall:g}): "
                 "the slope of a floor that falls downstream is above 0."
             )
+
+
+def remarks_on_ridge(case: Case, site: Site) -> Iterator[str]:
+    """A surveyed bed that stands highest along its middle, as depths do that were taken for levels."""
+    if all(layer.trapezoid is not None for layer in case.bed):
+        return
+    quarter = site.bed.shape[1] // 4
+    middle = site.bed[:, quarter : site.bed.shape[1] - quarter].mean(axis=1)
+    sides = np.maximum(site.bed[:, 0], site.bed[:, -1])
+    ridge = middle - sides > np.maximum(OF_A_RIDGE * np.ptp(site.bed, axis=1), LEAST_RIDGE)
+    if ridge.mean() > MOST_RIDGE:
+        yield (
+            f"The bed is higher along its middle than at both sides, by {np.median(middle - sides):.2g} m, as if z "
+            "held depths: z is a level, and counts upward."
+        )
 
 
 def remarks_on_friction_classes(site: Site) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Beds from files, brought onto the channel: GeoTIFF and ESRI ASCII grids, scattered points, and cross-sections."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
+from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.importers.stations import ONE_PLACE
@@ -129,11 +130,17 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     Three columns without a heading are x, y and z.
     """
     bare = {"x": "1", "y": "2", "z": "3"}
-    taken = read_rows(path, words)
+    unnamed = not words.columns and read_loosely(path, words.sheet).headings == tuple(bare.values())
+    taken = read_rows(path, replace(words, columns=bare) if unnamed else words)
     if not {"x", "y", "z"} <= taken.numbers.keys():
+        depths = {"depth", "below"} & taken.numbers.keys() and "z" not in taken.numbers
+        advice = (
+            "take depths off the level of the water above them, and call that z"
+            if depths
+            else f"name them by `columns`, or by place where there is no heading: {bare}"
+        )
         raise InputError(
-            f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(taken.columns.values())}; name them "
-            f"by `columns`, or by place where there is no heading: {bare}."
+            f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(taken.columns.values())}; {advice}."
         )
     taken = in_the_channel(taken, place, words)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
