@@ -217,3 +217,11 @@ def test_columns_that_are_not_read_are_said(tmp_path: Path) -> None:
     case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv=table), tmp_path / "brook.yaml")
     assert case.imported is not None
     assert case.imported[0].taken.endswith("2 rows; not read: no, sd and Remark")
+
+
+def test_names_of_sections_that_are_not_used_are_told(tmp_path: Path) -> None:
+    """Below a merged cell rows have none, and then all sections were called by their x, unsaid."""
+    table = "section;x;y;u\nA;8;0;0.4\n;8;1;0.5\nB;20;0;0.5\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert "sections told by x, as 1 row lacks its name" in case.imported[0].taken

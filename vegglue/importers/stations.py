@@ -67,7 +67,7 @@ def station_tables(
 ) -> StationTables:
     """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
     at = [role for role in ("x", "y") if role in taken.numbers]
-    no_place = _lacking(taken, at, np.all)
+    no_place = (*_lacking(taken, at, np.all), *_without_section(taken, words))
     taken, shares = whole_discharges(_named(taken, words, known.names, f"{file}:"))
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
@@ -97,6 +97,14 @@ def _lacking(taken: Taken, roles: Sequence[str], needed: Callable[..., Mask]) ->
         return ()
     lacking = int((~needed([np.isfinite(taken.numbers[role]) for role in roles], axis=0)).sum())
     return (f"{so_many(lacking, 'row')} left out for want of {' or '.join(roles)}",) if lacking else ()
+
+
+def _without_section(taken: Taken, words: FileWords) -> tuple[str, ...]:
+    """That names of sections are not used, where some rows have none: below a merged cell, say."""
+    names = taken.words.get("section", ()) if words.section is None else ()
+    unnamed = sum(not name for name in names)
+    lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
+    return (f"sections told by x, as {lacking}",) if 0 < unnamed < len(names) else ()
 
 
 def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> Taken:
