@@ -11,6 +11,7 @@ from reach import here, said_to
 from vegglue.case.config import load_case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
+from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.import_folder import import_folder
 
@@ -69,3 +70,18 @@ def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:
     high = {"high": {"discharge_m3_s": 6.0, "downstream_level_m": 1.6}}
     case = import_folder(field_folder(tmp_path / "site", holdout=high), tmp_path / "site.yaml")
     assert case.grid.y[1] > 1.5 + 1.6 / 0.6667
+
+
+@pytest.mark.parametrize("name", ["._velocities.csv", ".velocities.csv", "~$velocities.xlsx"])
+def test_what_programs_leave_beside_a_table_is_no_measurement(tmp_path: Path, name: str) -> None:
+    """An open workbook, or a folder that was zipped on a Mac, could not be imported."""
+    folder = field_folder(tmp_path / "site")
+    (folder / name).write_bytes(b"\x00\x05\x16\x07 velocity,1\n")
+    assert len(import_folder(folder, tmp_path / "site.yaml").observations) == 2
+
+
+def test_a_file_of_notes_may_be_moved_away(tmp_path: Path) -> None:
+    folder = field_folder(tmp_path / "site")
+    (folder / "notes.txt").write_text("We came on 3 June, 2024.\nIt rained.\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"notes\.txt: .* move .* out of the folder"):
+        import_folder(folder, tmp_path / "site.yaml")

@@ -47,7 +47,7 @@ ROLES = {
         Role("direction", "angle", ("direction", "dir", "flow direction", "velocity direction", "azimuth")),
         Role("level", "length", ("level", "water level", "wse", "wsel", "water surface", "water surface elevation",
                                  "stage", "ws", "wl", "wasserstand", "wasserspiegel", "pegel", "z ws", "waterlevel",
-                                 "gauge height")),
+                                 "gauge height", "gage height")),
         Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q")),
         Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
                                   "standard error", "se", "verr")),

@@ -19,6 +19,7 @@ from vegglue.importers.unit_words import is_unit
 from vegglue.in_short import listed, so_many
 
 COMMENTS = ("#", "%", "//", "!", "$")
+CHECK_OR_MOVE = "check the file, or move it out of the folder where it holds no measurements"
 # In the order of trust: a comma may also be decimal, and a space stand in a name.
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 # Lines from the end of a file by which its separator is told: titles stand at its head.
@@ -116,7 +117,7 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
     lines = [(number, _filled(fields)) for number, fields in whole]
     numeric = [sum(map(is_number, fields)) * 2 >= len(fields) > 1 for _, fields in lines]
     if not any(numeric):
-        raise InputError(f"{shown_path(path)}: expected a table of numbers, got none; check the file.")
+        raise InputError(f"{shown_path(path)}: expected a table of numbers, got none; {CHECK_OR_MOVE}.")
     first, begin, width = _begin(lines, numeric)
     head, of_units = first - 1, False
     if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):

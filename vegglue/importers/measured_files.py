@@ -33,6 +33,8 @@ TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".dis")
 ENDINGS = (*TEXT_ENDINGS, ".xlsx", ".xlsm", *BINARY_ENDINGS)
 # Files of a folder that are none of its measurements.
 OTHERS = ("answer.json", "readme.txt")
+# How names of files begin that programs leave beside a table: locks of workbooks, and what a Mac keeps of every file.
+OF_PROGRAMS = (".", "~$")
 # What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
 KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": kind_of(STREAMWISE)}
 
@@ -164,7 +166,11 @@ def _candidates(folder: Path, said: Mapping[Path, FileWords], used: Sequence[str
     Of folders within the folder only those files that have words of their own.
     """
     order = {kind.file: place for place, kind in enumerate(KINDS.values())}
-    free = [path for path in folder.iterdir() if path.is_file() and path.name not in used]
+    free = [
+        path
+        for path in folder.iterdir()
+        if path.is_file() and path.name not in used and (path in said or not path.name.startswith(OF_PROGRAMS))
+    ]
     texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
     paths = [
         path

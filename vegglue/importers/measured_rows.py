@@ -131,7 +131,8 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
         known = ", ".join(sorted(ROLES))
         raise InputError(
             f"{shown_path(path)}: expected columns that can be told by their names, got {', '.join(table.headings)}; "
-            f"name them by `columns` of this file, by what they hold: {known}."
+            f"name them by `columns` of this file, by what they hold: {known}; or move a file without measurements out "
+            "of the folder."
         )
     named = {role: table.headings[place] for role, place in columns.items()}
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
