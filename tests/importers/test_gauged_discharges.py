@@ -38,3 +38,22 @@ def test_a_discharge_that_every_row_repeats_counts_once(tmp_path: Path) -> None:
     assert found == [("discharge", "x12.00", 1.8), *(("velocity", "x12.00", value) for value in (0.3, 0.3, 0.5, 0.5))]
     assert "1 of discharge" in said
     assert "left out" not in said
+
+
+@pytest.mark.parametrize(
+    ("levels", "kept"),
+    [
+        (["0.97", "0.97", "0.97"], [0.97]),
+        (["0.97", "0.98", "0.97"], [0.97, 0.98, 0.97]),
+        (["0.97", "", "0.97"], [0.97, 0.97]),
+    ],
+)
+def test_a_level_that_every_vertical_repeats_counts_once(tmp_path: Path, levels: list[str], kept: list[float]) -> None:
+    """One reading of a gauge weighed as many as there were verticals."""
+    rows = (f"8,{y},0.4,{level}" for y, level in zip((-1, 0, 1), levels, strict=True))
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="\n".join(["x,y,u,WSE (m)", *rows]))
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    found = read_observations(case).table
+    assert found[found["kind"] == "level"]["value"].tolist() == kept
+    assert case.imported is not None
+    assert ("levels of 1 section once" in case.imported[0].taken) == (len(kept) == 1)

@@ -1,7 +1,11 @@
-"""Discharges beside the verticals of a gauging: each row repeats that of its section, or holds the share of its own."""
+"""Discharges and levels beside the verticals of a gauging, where each row repeats that of its section.
+
+A discharge may also be the share of each vertical, which is none of the section.
+"""
 
 import numpy as np
 
+from vegglue.importers.lost_places import VELOCITIES
 from vegglue.importers.measured_rows import Taken
 from vegglue.in_short import so_many
 
@@ -18,7 +22,7 @@ def whole_discharges(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
         return taken, ()
     found = taken.numbers["discharge"].copy()
     shares = 0
-    for rows in _rows_of_sections(taken):
+    for rows in _rows_of_sections(taken, "discharge"):
         if np.ptp(taken.numbers["y"][rows]) == 0.0:
             continue
         values = found[rows]
@@ -29,9 +33,26 @@ def whole_discharges(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
     return taken.having({"discharge": found}), (said,) if shares else ()
 
 
-def _rows_of_sections(taken: Taken) -> list[list[int]]:
-    """The rows with a discharge of each section of each experiment."""
+def levels_once(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
+    """The rows with a level that all verticals of a section repeat once, and what is said of it.
+
+    taken: rows with an experiment and a section. Gauges on both banks are two readings, even where they agree.
+    """
+    if not {"y", "level"} <= taken.numbers.keys() or not taken.numbers.keys() & set(VELOCITIES):
+        return taken, ()
+    found = taken.numbers["level"].copy()
+    across = taken.numbers["y"]
+    sections = [rows for rows in _rows_of_sections(taken, "level") if len(set(across[rows])) > 2]
+    repeated = [rows for rows in sections if np.ptp(found[rows]) == 0.0]
+    for rows in repeated:
+        found[rows[1:]] = np.nan
+    said = f"levels of {so_many(len(repeated), 'section')} once, as all rows repeat them"
+    return taken.having({"level": found}), (said,) if repeated else ()
+
+
+def _rows_of_sections(taken: Taken, role: str) -> list[list[int]]:
+    """The rows with a number of that role of each section of each experiment."""
     rows: dict[tuple[str, str], list[int]] = {}
-    for row in np.flatnonzero(np.isfinite(taken.numbers["discharge"])).tolist():
+    for row in np.flatnonzero(np.isfinite(taken.numbers[role])).tolist():
         rows.setdefault((taken.words["experiment"][row], taken.words["section"][row]), []).append(row)
     return list(rows.values())

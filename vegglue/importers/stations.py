@@ -13,7 +13,7 @@ from vegglue.importers.column_names import is_in_degrees
 from vegglue.importers.columns_of_table import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.gauged_discharges import whole_discharges
+from vegglue.importers.gauged_discharges import levels_once, whole_discharges
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.lost_places import refuse_lost_places
 from vegglue.importers.measured_rows import Taken
@@ -69,6 +69,7 @@ def station_tables(
     at = [role for role in ("x", "y") if role in taken.numbers]
     no_place = (*_lacking(taken, at, np.all), *_without_section(taken, words))
     taken, shares = whole_discharges(_named(taken, words, known.names, f"{file}:"))
+    taken, once = levels_once(taken)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
@@ -79,7 +80,7 @@ def station_tables(
     refuse_lost_heights(taken, _places(taken), file)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares))
+    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares, *once))
 
 
 def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str) -> None:
