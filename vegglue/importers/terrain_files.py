@@ -12,6 +12,7 @@ from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import role_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.loose_table import read_loosely
@@ -133,10 +134,10 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     unnamed = not words.columns and read_loosely(path, words.sheet).headings == tuple(bare.values())
     taken = read_rows(path, replace(words, columns=bare) if unnamed else words)
     if not {"x", "y", "z"} <= taken.numbers.keys():
-        depths = {"depth", "below"} & taken.numbers.keys() and "z" not in taken.numbers
+        roles = {*taken.numbers, *(known[0] for heading in taken.others if (known := role_of(heading)) is not None)}
         advice = (
             "take depths off the level of the water above them, and call that z"
-            if depths
+            if {"depth", "below"} & roles and "z" not in roles
             else f"name them by `columns`, or by place where there is no heading: {bare}"
         )
         raise InputError(
