@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
@@ -17,23 +16,18 @@ from vegglue.importers.gauged_discharges import levels_once, whole_discharges
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.lost_places import refuse_lost_places
 from vegglue.importers.measured_rows import Taken
+from vegglue.importers.nameless_sections import ONE_PLACE, section_at, sections_by_place
 from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
 from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 
-# Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
-ONE_PLACE = 0.001
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
 VERTICALS = 0.2
 # By how much verticals are moved to the line of their section before it is said [m].
 NEAR_LINE = 0.01
-# Number of x over that of places, up to which places stand on lines across the channel [-]. Chosen, not measured.
-ON_LINES = 2.0 / 3.0
-# Stations of one section lie within so much of one another along the channel [m], where no section is named.
-SECTION_GAP = 0.25
 Row = list[str]
 
 
@@ -125,7 +119,7 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     if sections is None or "" in sections:
         x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
         of_one_tape = "tape" in taken.columns and "tape" not in taken.numbers
-        sections = [_section_at(x)] * taken.size if of_one_tape else _sections(x, y)
+        sections = [section_at(x)] * taken.size if of_one_tape else sections_by_place(x, y)
     named = replace(taken, words={**taken.words, "experiment": names, "section": sections})
     refuse_lost_places(named, where.removesuffix(":"))
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
@@ -144,34 +138,6 @@ def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], whe
         f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none; add one, or "
         f"say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
     )
-
-
-def _sections(x: Array, y: Array) -> list[str]:
-    """x12.5 for what stands together there: sections begin where stations are further apart than SECTION_GAP; what
-    reaches further along the channel than across it is no section, and stands as it is.
-    """
-    places = np.unique(np.round(np.column_stack([x, y]), 3), axis=0)
-    # Equal x of many places are sections as they are, however near; scattered ones are joined.
-    scattered = np.unique(places[:, 0]).size > ON_LINES * len(places)
-    apart, group = _groups_along(x, ONE_PLACE), _groups_along(x, SECTION_GAP if scattered else ONE_PLACE)
-    for one in np.unique(group):
-        here = group == one
-        if np.ptp(x[here]) > np.ptp(y[here]):
-            group[here] = x.size + apart[here]
-    names = {number: _section_at(x[group == number]) for number in np.unique(group)}
-    return [names[number] for number in group]
-
-
-def _section_at(x: Array) -> str:
-    return f"x{np.median(x):.2f}"
-
-
-def _groups_along(x: Array, gap: float) -> NDArray[np.int_]:
-    """A number for each station (n,), the same where no gap along the channel is wider [m]."""
-    order = np.argsort(x, kind="stable")
-    group = np.zeros(x.size, dtype=int)
-    group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > gap)])
-    return group
 
 
 def _in_verticals(taken: Taken) -> bool:

@@ -17,8 +17,8 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
+from vegglue.importers.nameless_sections import ONE_PLACE
 from vegglue.importers.placement import Placement
-from vegglue.importers.stations import ONE_PLACE
 from vegglue.site.terrain import Raster, read_raster
 
 # Endings of files of levels on a grid.
