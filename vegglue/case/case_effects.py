@@ -26,6 +26,11 @@ def effect_of(case: Case, name: str) -> Effect:
     return library(case.effect_file)[case.effects[name].effect or name]
 
 
+def parameters_of_effects(case: Case) -> set[str]:
+    """Names of the parameters that stand in `effects`: amplitudes and shapes."""
+    return {value for entry in case.effects.values() for value in entry.values.values() if isinstance(value, str)}
+
+
 def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> tuple[ActiveEffect, ...]:
     """Effects that act in one experiment, in the order of the library, with values (members,) of their parameters."""
     order = list(library(case.effect_file))

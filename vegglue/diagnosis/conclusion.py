@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
+from vegglue.case.case_effects import parameters_of_effects
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
@@ -203,8 +204,8 @@ def _strained(screening: Screening) -> tuple[str, float]:
     and how far [standard deviations].
     """
     model, z = screening.base.model, screening.base.fitted.point.z
-    amplitudes = {value for entry in model.case.effects.values() for value in entry.values.values()}
-    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in amplitudes]
+    of_effects = parameters_of_effects(model.case)
+    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
     far, name = max(own, default=(0.0, ""))
     return name, far
 

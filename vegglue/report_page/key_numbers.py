@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.special
 
+from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.inference.likelihood import root_mean_square
@@ -87,7 +88,7 @@ def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
 
 def _first_read(case: Case, posterior: Posterior) -> list[str]:
     """The parameters, those of effects first: they are what was found."""
-    added = {value for effect in case.effects.values() for value in effect.values.values() if isinstance(value, str)}
+    added = parameters_of_effects(case)
     return sorted(posterior.parameters, key=lambda name: name not in added)
 
 
