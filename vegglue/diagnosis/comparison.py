@@ -8,7 +8,7 @@ Held out: each section, or each experiment, is left out in turn and the model ca
 C_o between those kept and those left out: what the model errs by in both is calibrated away with the parameters.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import asdict
 from typing import Any, Literal
 
@@ -71,13 +71,13 @@ def rung_in_short(rung: Rung) -> str:
 
 
 def rung_json(rung: Rung) -> dict[str, Any]:
-    """One object with every number of a model that is printed; what is not a number is null."""
-    tree = {
+    """One object with every number of a model that is printed."""
+    return {
         "name": rung.name,
         "title": rung.title,
         "effects": rung.effects,
         "parameters": len(rung.values),
-        **asdict(rung.in_sample) | {"rmse": _known_numbers(rung.in_sample.rmse)},
+        **asdict(rung.in_sample),
         **asdict(rung.predictive),
         "values": rung.values,
         "homogeneity": rung.homogeneity,
@@ -85,7 +85,6 @@ def rung_json(rung: Rung) -> dict[str, Any]:
         "held_out_sections": held_out_rmse(rung),
         "held_out_experiments": held_out_rmse(rung, "experiments"),
     }
-    return _known_numbers(tree)
 
 
 def improvement(before: Rung, after: Rung, by: By = "sections", untold: Collection[str] = ()) -> tuple[float, float]:
@@ -130,13 +129,6 @@ def homogeneity(base: Baseline) -> dict[str, float]:
         name: equal_values_test(value[:, j], error[:, j], alike[j])[2] for j, name in enumerate(base.model.names)
     }
     return {name: p for name, p in chances.items() if np.isfinite(p)}
-
-
-def _known_numbers(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """null instead of NaN, which JSON does not know."""
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in tree.items()
-    }
 
 
 def _of_velocities(rung: Rung, by: By, untold: Collection[str]) -> Array:

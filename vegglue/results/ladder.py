@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 # Errors of a step, which may be unknown.
@@ -41,16 +41,11 @@ class Ladder:
     verdict: str = ""
 
 
-def ladder_json(ladder: Ladder) -> dict[str, Any]:
-    """The ladder as one object; what is not a number is null."""
-    tree = asdict(ladder)
-    for step in tree["steps"]:
-        step.update({name: None if math.isnan(step[name]) else step[name] for name in ERRORS})
-    return tree
-
-
 def ladder_from(tree: Mapping[str, Any]) -> Ladder:
-    """The ladder of such an object. Errors: KeyError, TypeError or ValueError where it is none."""
+    """The ladder of an object of JSON, which has null for no number.
+
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
     steps = tuple(_step_from(step) for step in tree["steps"])
     return Ladder(steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]))
 

@@ -1,7 +1,7 @@
 """What is still to be told apart, and the measurements that could: as `vegglue next` tells it, and keeps it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 # Below this D^2 a measurement does not separate anything.
@@ -68,16 +68,20 @@ class Question:
         return f"{many} would by itself, where {enough} ({most})"
 
 
-def questions_json(questions: Sequence[Question]) -> list[dict[str, Any]]:
-    """The questions as a list of objects."""
-    return [asdict(one) for one in questions]
-
-
 def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
-    """The questions of such a list. Errors: KeyError or TypeError where it is none."""
-    return tuple(
-        Question(str(one["tells_apart"]), tuple(ProposedMeasurement(**each) for each in one["measurements"]))
-        for one in tree
+    """The questions of a list of JSON. Errors: KeyError, TypeError or ValueError where it is none."""
+    return tuple(Question(str(one["tells_apart"]), tuple(map(_proposed_from, one["measurements"]))) for one in tree)
+
+
+def _proposed_from(tree: Mapping[str, Any]) -> ProposedMeasurement:
+    return ProposedMeasurement(
+        name=str(tree["name"]),
+        experiment=str(tree["experiment"]),
+        x=float(tree["x"]),
+        stations=int(tree["stations"]),
+        hours=float(tree["hours"]),
+        now=float(tree["now"]),
+        then=float(tree["then"]),
     )
 
 

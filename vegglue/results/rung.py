@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -71,13 +71,11 @@ class Rung:
     validation: float
 
 
-def rung_tree(rung: Rung) -> dict[str, Any]:
-    """The rung as one object of JSON; what is not a number is null."""
-    return _plain(asdict(rung))
-
-
 def rung_from(tree: Mapping[str, Any]) -> Rung:
-    """The rung of such an object. Errors: KeyError, TypeError or ValueError where it is none."""
+    """The rung of an object of JSON, which has null for no number.
+
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
     seen, held_out = tree["in_sample"], tree["held_out"]
     return Rung(
         name=str(tree["name"]),
@@ -85,7 +83,7 @@ def rung_from(tree: Mapping[str, Any]) -> Rung:
         effects=tuple(tree["effects"]),
         values={name: _interval(*value) for name, value in tree["values"].items()},
         in_sample=InSample(
-            rmse={kind: _number(value) for kind, value in seen["rmse"].items()},
+            rmse={kind: _number(seen["rmse"][kind]) for kind in KINDS},
             chi2=_number(seen["chi2"]),
             stations=int(seen["stations"]),
             noise_floor=_number(seen["noise_floor"]),
@@ -100,17 +98,6 @@ def rung_from(tree: Mapping[str, Any]) -> Rung:
         homogeneity={name: _number(p) for name, p in tree["homogeneity"].items()},
         validation=_number(tree["validation"]),
     )
-
-
-def _plain(value: Any) -> Any:
-    """Of dicts, lists, words and numbers only, null instead of NaN, which JSON does not know."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def _number(value: float | None) -> float:

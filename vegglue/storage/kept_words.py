@@ -6,13 +6,15 @@ What belongs to another state of the case, or cannot be read, counts as not ther
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.results.ladder import Ladder, ladder_from, ladder_json
-from vegglue.results.open_questions import Question, questions_from, questions_json
-from vegglue.results.rung import Rung, rung_from, rung_tree
+from vegglue.plain_json import plain
+from vegglue.results.ladder import Ladder, ladder_from
+from vegglue.results.open_questions import Question, questions_from
+from vegglue.results.rung import Rung, rung_from
 from vegglue.whole_files import MAKE_ROOM
 
 RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 2", "vegglue questions 2"
@@ -24,7 +26,7 @@ MeasurementRow = Sequence[str | float]
 
 def write_rung(folder: Path, rung: Rung, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
     """Keep what a model misses, calibrated without some measurements. Errors: StorageError."""
-    told = {"left_out": [*map(list, left_out)], "rung": rung_tree(rung)}
+    told = {"left_out": [*map(list, left_out)], "rung": asdict(rung)}
     _write(folder / RUNG_FILE, RUNG_FORMAT, config_hash, told)
 
 
@@ -39,7 +41,7 @@ def rung_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash
 
 def write_ladder(folder: Path, ladder: Ladder, config_hash: str) -> None:
     """Keep a comparison in the folder of one of its models, whose config hash is given. Errors: StorageError."""
-    _write(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, ladder_json(ladder))
+    _write(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, asdict(ladder))
 
 
 def ladder_that_fits(folder: Path, config_hash: str) -> Ladder | None:
@@ -49,7 +51,7 @@ def ladder_that_fits(folder: Path, config_hash: str) -> Ladder | None:
 
 def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:
     """Keep what to measure next, which may be nothing. Errors: StorageError."""
-    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_json(questions))
+    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, [*map(asdict, questions)])
 
 
 def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:
@@ -59,7 +61,7 @@ def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] |
 
 def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
     tree = {"format": file_format, "config_hash": config_hash, "told": told}
-    write_text(path, json.dumps(tree, ensure_ascii=False, indent=1) + "\n", MAKE_ROOM)
+    write_text(path, json.dumps(plain(tree), ensure_ascii=False, indent=1, allow_nan=False) + "\n", MAKE_ROOM)
 
 
 def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:

@@ -37,12 +37,13 @@ def kept_extension(case: Case, found: Diagnosis, runs: Path | str) -> StepwiseEx
 
     Never that of a case with code or a command of the user's, as a child could name another.
     """
-    kept = ladder_that_fits(folder_of(runs, case), case_hash(case))
+    wanted = case_hash(case)
+    kept = ladder_that_fits(folder_of(runs, case), wanted)
     if kept is None or case.effect_file is not None or case.engine is not None:
         return None
     first, *others = kept.steps
     sentence, aside = found.verdict.sentence, excluded_by(found)
-    if (first.config_hash, kept.verdict) != (case_hash(case), sentence):
+    if (first.config_hash, kept.verdict) != (wanted, sentence):
         return None
     children = [child for step in others if (child := _child_of(case, step)) is not None]
     cases = (case, *children)
