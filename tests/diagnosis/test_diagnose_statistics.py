@@ -20,8 +20,6 @@ from vegglue.screening.candidates import candidates_of
 from vegglue.twins.hidden_effect import TwinBase, VisibilityError
 from vegglue.twins.twin import measured_twin, true_place, twin_base
 
-# The size of this one is counted in cells: on the truth's grid the same number is another effect.
-OF_THE_GRID = "smagorinsky"
 pytestmark = pytest.mark.slow
 
 
@@ -44,7 +42,7 @@ def diagnosed(ground: TwinBase, station: pd.DataFrame) -> Diagnosis:
 def drawn_sets(grounds: list[TwinBase], snr: float, seed: int) -> Iterator[tuple[str, Diagnosis]]:
     """Effects in an order drawn by a seed, those left out that cannot be made as visible, and what is said of each."""
     model = grounds[0].model
-    names = [one.name for one in candidates_of(model.case, model.station) if one.name != OF_THE_GRID]
+    names = [one.name for one in candidates_of(model.case, model.station)]
     number = 0
     for name in np.random.default_rng(seed).permutation(names):
         ground = grounds[number % 2]

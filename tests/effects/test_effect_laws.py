@@ -15,13 +15,19 @@ LINE = np.arange(-2.0, 3.0)
 
 def filled(kind, given, shape):
     """A noun with some fields given, 0 in all others, of one shape; numbers and parts of it as they are."""
-    kept = {name: given[name] for name in ("dx", "dy", "geometry", "viscosity", "shear_depth") if name in given}
+    kept = {
+        name: given[name]
+        for name in ("dx", "dy", "filter_width", "geometry", "viscosity", "shear_depth")
+        if name in given
+    }
     names = [item.name for item in fields(kind) if item.name not in kept]
     return kept | {name: np.broadcast_to(np.asarray(given.get(name, 0.0), float), shape) for name in names}
 
 
 def geometry(**given):
-    return ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25, "stretch": 1.0} | given, (5, 5, 1)))
+    return ChannelGeometry(
+        **filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25, "filter_width": 0.3, "stretch": 1.0} | given, (5, 5, 1))
+    )
 
 
 def cells(u=0.0, v=0.0, on=None, **given):
@@ -129,7 +135,7 @@ ROWS = {
     "smagorinsky": (
         cells(u=lambda x, y: 0.3 * x + 0.2 * y, v=lambda x, y: 0.1 * x - 0.4 * y),
         {"coefficient": 0.2},
-        {"viscosity": 0.04 * 0.125 * sqrt(2 * 0.09 + 2 * 0.16 + 0.09)},
+        {"viscosity": 0.04 * 0.09 * sqrt(2 * 0.09 + 2 * 0.16 + 0.09)},
     ),
     "mixing_length": (cells(u=shear), {"length": 0.5}, {"viscosity": 0.25 * 0.2}),
     "edge_mixing": (
@@ -234,7 +240,9 @@ def test_less_than_nothing_pushes_at_a_place_but_mixes_no_less():
 def test_water_that_enters_at_a_place_is_all_the_water():
     """Over a grid that holds the spot, q dx dy sums up to Q."""
     line = 0.05 * np.arange(-100, 101)
-    wide = ChannelGeometry(**filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05, "stretch": 1.0}, (201, 201, 1)))
+    wide = ChannelGeometry(
+        **filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05, "filter_width": 0.05, "stretch": 1.0}, (201, 201, 1))
+    )
     wide = replace(wide, x=line[:, None, None], y=line[None, :, None])
     spot = {"x": np.array([0.3]), "y": np.array([-0.2]), "length": np.array([1.1]), "width": np.array([0.4])}
     entering = library()["unlisted_inflow"].act(wide, discharge=np.array([0.7]), **spot)["inflow"]

@@ -64,6 +64,10 @@ class GridExtent(Part):
     x: Interval = Field(description="from upstream to downstream [m]")
     y: Interval = Field(description="across [m]")
     cell: tuple[Positive, Positive] = Field(description="size of a cell along x and y [m]")
+    filter_width: Positive | None = Field(
+        default=None,
+        description="[m] below which eddies are not resolved, of `smagorinsky`; else the root of the area of a cell",
+    )
     centreline: CentrelineShape | None = Field(default=None, description="line that x runs along and y across")
 
     @model_validator(mode="after")

@@ -31,10 +31,13 @@ def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
 
 
 def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
-    """nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)."""
+    """nu -> nu + (C_s Delta)^2 (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2), Delta the width of the filter [m].
+
+    Delta is that of the case's own cells, on the coarser and finer grids of a diagnosis, too.
+    """
     strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
     seen = cells.geometry
-    return {"viscosity": coefficient**2 * seen.dx * seen.dy * seen.stretch * np.sqrt(strain)}
+    return {"viscosity": (coefficient * seen.filter_width) ** 2 * seen.stretch * np.sqrt(strain)}
 
 
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
@@ -123,7 +126,7 @@ EFFECTS = (
         name="smagorinsky",
         stage="exchange",
         title="Eddies smaller than a cell, made by any shear",
-        equation="nu -> nu + C_s^2 dx dy (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2)",
+        equation="nu -> nu + (C_s D)^2 (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2), D = (dx dy)^(1/2)",
         act=smagorinsky,
         amplitude=Amplitude("coefficient", "-", "coefficient C_s, some 0.1 to 0.2", 0.3, 0.0, 3.0, power=2),
         source="Smagorinsky (1963)",

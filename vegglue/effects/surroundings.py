@@ -26,6 +26,7 @@ class ChannelGeometry:
     share_along: Array
     dx: float
     dy: float
+    filter_width: float  # below which eddies are not resolved, the same on every grid of a case
     bed: Array
     offset: Array
     half_width: Array

@@ -6,6 +6,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
 from vegglue.measurements.observations import Observations
+from vegglue.site.grid import filter_width_of
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.site.zones import ranges_without_cells
 
@@ -35,10 +36,16 @@ def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
     along = 1 if grid.dx > LONG_CELL * grid.dy else 2
     if grid.x.size % along or grid.y.size % 2 or min(grid.x.size / along, grid.y.size / 2) < FEWEST_CELLS:
         return None
-    cell = (along * case.grid.cell[0], 2.0 * case.grid.cell[1])
-    coarse: Case = case.model_copy(update={"grid": case.grid.model_copy(update={"cell": cell})})
+    coarse = on_cells(case, (along * case.grid.cell[0], 2.0 * case.grid.cell[1]))
     on_coarse = build_site(coarse)
     return None if any(ranges_without_cells(coarse, on_coarse.grid)) else (coarse, on_coarse)
+
+
+def on_cells(case: Case, cell: tuple[float, float]) -> Case:
+    """The case on cells of another size [m]; eddies are unresolved below the same width as on its own."""
+    grid = case.grid.model_copy(update={"cell": cell, "filter_width": filter_width_of(case)})
+    other: Case = case.model_copy(update={"grid": grid})
+    return other
 
 
 def ever_coarser(case: Case, site: Site) -> list[tuple[Case, Site]]:

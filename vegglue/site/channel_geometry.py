@@ -9,7 +9,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
 from vegglue.effects.surroundings import ChannelGeometry
-from vegglue.site.grid import Grid, cell_stretch, curvature_of
+from vegglue.site.grid import Grid, cell_stretch, curvature_of, filter_width_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import BANK_SLOPE, beyond
 
@@ -21,7 +21,9 @@ def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry
     """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
     stems = np.array([patch.stems for patch in case.plants.patches])
     relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
-    return _geometry(in_experiment(site, experiment), patches_present(case, experiment), relative)
+    return _geometry(
+        in_experiment(site, experiment), filter_width_of(case), patches_present(case, experiment), relative
+    )
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
@@ -49,7 +51,7 @@ def entered_above(case: Case, experiment: Experiment, x: float) -> list[float | 
 
 def half_width(site: Site) -> float:
     """Half width of the floor [m], the median of its cross-sections."""
-    return float(np.median(_geometry(site, (), ()).half_width))
+    return float(np.median(_section(site)[1]))
 
 
 def cells_across(site: Site) -> float:
@@ -58,11 +60,11 @@ def cells_across(site: Site) -> float:
 
 
 @lru_cache(GEOMETRIES_KEPT)  # every problem of every member asks for the same
-def _geometry(site: Site, present: tuple[int, ...], relative_stems: tuple[float, ...]) -> ChannelGeometry:
+def _geometry(
+    site: Site, filter_width: float, present: tuple[int, ...], relative_stems: tuple[float, ...]
+) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
-    side_slope = np.abs(np.gradient(bed, grid.dy, axis=1))
-    floor = ~beyond(side_slope > BANK_SLOPE, bed)
-    axis, half_width = _extent(floor, grid.y, grid.dy)
+    axis, half_width, floor = _section(site)
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
     front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
     bent = {} if grid.centreline is None else _bent(grid)
@@ -72,10 +74,11 @@ def _geometry(site: Site, present: tuple[int, ...], relative_stems: tuple[float,
         share_along=((np.arange(grid.x.size) + 0.5) / grid.x.size - 0.5)[:, None, None],
         dx=grid.dx,
         dy=grid.dy,
+        filter_width=filter_width,
         bed=bed[..., None],
         offset=((grid.y[None] - axis[:, None]) / half_width[:, None])[..., None],
         half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
-        side_slope=side_slope[..., None],
+        side_slope=_side_slope(site)[..., None],
         bank=(~floor).astype(float)[..., None],
         planted=(patch >= 0).astype(float)[..., None],
         front=front[..., None],
@@ -85,6 +88,17 @@ def _geometry(site: Site, present: tuple[int, ...], relative_stems: tuple[float,
         relative_stems=np.array([*relative_stems, 1.0])[patch][..., None],  # the last one where none stands, at -1
         **bent,
     )
+
+
+def _section(site: Site) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Axis and half width of the floor (nx,) [m], and the cells that are floor (nx, ny)."""
+    floor = ~beyond(_side_slope(site) > BANK_SLOPE, site.bed)
+    return *_extent(floor, site.grid.y, site.grid.dy), floor
+
+
+def _side_slope(site: Site) -> Array:
+    """|dz/dy| (nx, ny) [-]."""
+    return np.abs(np.gradient(site.bed, site.grid.dy, axis=1))
 
 
 def _bent(grid: Grid) -> dict[str, Array]:
@@ -119,7 +133,8 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
     if geometry.turning.size:
         cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
     along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
-    return ChannelGeometry(y=geometry.y[:, rows], dx=geometry.dx, dy=geometry.dy, **along, **cut)
+    whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width")}
+    return ChannelGeometry(y=geometry.y[:, rows], **whole, **along, **cut)
 
 
 def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:

@@ -48,6 +48,15 @@ def build_grid(case: Case) -> Grid:
     return grid
 
 
+def filter_width_of(case: Case) -> float:
+    """Delta = (dx dy)^(1/2) of the cells of a case, where it names no other [m]: below it eddies are not resolved.
+
+    Source: Deardorff (1970), doi:10.1017/S0022112070000691, in two dimensions; not checked against it.
+    """
+    dx, dy = case.grid.cell
+    return float(case.grid.filter_width or np.sqrt(dx * dy))
+
+
 def centreline_in(case: Case) -> Centreline | None:
     """The centreline the grid of a case follows; None of a straight one."""
     return None if case.grid.centreline is None else centreline_of(case.grid.centreline)

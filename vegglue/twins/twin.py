@@ -15,9 +15,8 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.noise import noise_of, with_correlation, with_grid_error
 from vegglue.case.parameter_space import theta_at
-from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, linearise
-from vegglue.engine.model import coarser
+from vegglue.engine.model import coarser, on_cells
 from vegglue.errors import InputError
 from vegglue.site.gridded_site import build_site
 from vegglue.twins.hidden_effect import TwinBase, bad_probe, case_hiding, chosen_effect, size_given
@@ -67,8 +66,8 @@ def finer(model: Model) -> Model:
     """The model on cells two thirds as long and wide, of which every third edge is an edge of the model's as well."""
     grid = model.case.grid
     lengths = (grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
-    cell = tuple(length / round(FINER * round(length / size)) for length, size in zip(lengths, grid.cell, strict=True))
-    case: Case = model.case.model_copy(update={"grid": grid.model_copy(update={"cell": cell})})
+    dx, dy = (length / round(FINER * round(length / size)) for length, size in zip(lengths, grid.cell, strict=True))
+    case = on_cells(model.case, (dx, dy))
     return replace(model, case=case, site=build_site(case))
 
 
