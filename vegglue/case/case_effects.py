@@ -8,7 +8,7 @@ from vegglue.arrays import Array
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case
 from vegglue.effects.active_effect import ActiveEffect
-from vegglue.effects.definition import Effect
+from vegglue.effects.definition import Effect, Stage
 from vegglue.effects.library import library
 
 Theta = Mapping[str, Array]
@@ -29,6 +29,11 @@ def effect_of(case: Case, name: str) -> Effect:
 def parameters_of_effects(case: Case) -> set[str]:
     """Names of the parameters that stand in `effects`: amplitudes and shapes."""
     return {value for entry in case.effects.values() for value in entry.values.values() if isinstance(value, str)}
+
+
+def stages_of(case: Case, parameter: str) -> set[Stage]:
+    """Stages of the effects that a parameter stands in."""
+    return {effect_of(case, name).stage for name, entry in case.effects.items() if parameter in entry.values.values()}
 
 
 def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> tuple[ActiveEffect, ...]:

@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.case_effects import stages_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.engine.newton_fields import responses_by_adjoints
 from vegglue.engine.newton_runs import predict_members
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import EMPTY, Problem, crop
-from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.problem_setup import build_problem, with_effects_of
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.jacobian import Factors, factors
@@ -109,18 +110,21 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     """Responses in one experiment, (stations of it, causes), to causes that act in it."""
     flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
     found = np.zeros((rows.size, len(causes)))
-    base = crop(problem_at(model, experiment, point.z), *flow.band)
+    whole = problem_at(model, experiment, point.z)
+    base = crop(whole, *flow.band)
     without_cause = residual(base, flow.state)
-    built, changes = [], np.empty((*flow.state.shape[:3], len(causes)))
+    built, changes = [], np.zeros((*flow.state.shape[:3], len(causes)))
+    moving = [lane for lane, cause in enumerate(causes) if stages_of(cause.case, cause.parameter) != {"sensor"}]
     for lane, cause in enumerate(causes):
         amplitude = cause.amplitude
         gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
-        problem = build_problem(cause.case, model.site, experiment, theta | {cause.parameter: value})
-        changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
+        problem = with_effects_of(cause.case, model.site, experiment, theta | {cause.parameter: value}, whole)
+        if lane in moving:
+            changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
         built.append((problem, gain))
-    moved = tangents(base, flow.state, flow.factors, changes, TANGENT_TOLERANCE)
+    changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
     for lane, (problem, gain) in enumerate(built):
-        state = flow.state + gain * moved[..., lane : lane + 1]
+        state = flow.state + gain * changes[..., lane : lane + 1]
         now = _read(model, experiment, problem, state, flow.band)[0]
         found[:, lane] = (now - point.prediction[rows]) / gain
     return found

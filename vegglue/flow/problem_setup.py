@@ -1,7 +1,9 @@
 """From a case to what the solver needs: values of parameters put in place, one problem for each experiment."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +45,30 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     Errors: InputError when an inflow or the outlet holds no cell centre.
     """
     refuse_ranges_without_cells(case, site.grid)
-    site = in_experiment(site, experiment)
-    members = len(next(iter(theta.values()))) if theta else 1
-    setting = case.experiments[experiment]
+    site, members = in_experiment(site, experiment), _members(theta)
+    return Problem(
+        dx=site.grid.dx,
+        dy=site.grid.dy,
+        bed=site.bed,
+        friction=_bed_friction(case, site, theta, members),
+        plants=_plants(case, site, experiment, theta, members),
+        viscosity=value_of(case.eddy_viscosity, theta, members),
+        film=case.numerics.film_depth,
+        smallest_shear_depth=case.numerics.shear_depth == "smallest",
+        walls=_walls(case, site, theta, members),
+        bend=bend_of(site.grid),
+        **_under_effects(case, site, experiment, theta),
+    )
+
+
+def with_effects_of(case: Case, site: Site, experiment: str, theta: Theta, like: Problem) -> Problem:
+    """The problem of a case that differs from that of `like` by effects alone, and the values of their parameters."""
+    return replace(like, **_under_effects(case, in_experiment(site, experiment), experiment, theta))
+
+
+def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dict[str, Any]:
+    """Effects, and what of a problem they have a hand in before anything flows, by name."""
+    members, setting = _members(theta), case.experiments[experiment]
     effects = active_effects(case, experiment, theta, members)
     geometry = channel_geometry(case, site, experiment) if effects else None
     added = _added_to_site(effects, geometry) if geometry else {}
@@ -55,22 +78,16 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         under_water = share_under_water(case, site, setting)
         both = np.maximum(entering, 0.0), np.minimum(entering, 0.0)  # what enters and what leaves may cancel
         entering = np.ascontiguousarray(sum(_into_water(part, under_water, geometry.stretch) for part in both))
-    return Problem(
-        dx=site.grid.dx,
-        dy=site.grid.dy,
-        bed=site.bed,
-        friction=_bed_friction(case, site, theta, members),
-        plants=_plants(case, site, experiment, theta, members),
-        viscosity=value_of(case.eddy_viscosity, theta, members),
-        boundaries=_boundaries(case, site, values, entering),
-        film=case.numerics.film_depth,
-        smallest_shear_depth=case.numerics.shear_depth == "smallest",
-        bed_rise=added.get("bed", EMPTY),
-        effects=effects,
-        geometry=geometry,
-        walls=_walls(case, site, theta, members),
-        bend=bend_of(site.grid),
-    )
+    return {
+        "boundaries": _boundaries(case, site, values, entering),
+        "bed_rise": added.get("bed", EMPTY),
+        "effects": effects,
+        "geometry": geometry,
+    }
+
+
+def _members(theta: Theta) -> int:
+    return len(next(iter(theta.values()))) if theta else 1
 
 
 def bend_of(grid: Grid) -> Bend | None:
