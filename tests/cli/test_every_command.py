@@ -9,6 +9,7 @@ import typer
 from reach import COARSE, write_reach
 
 from vegglue.cli.main import COMMANDS, app, main
+from vegglue.version import VERSION
 
 # The version is one word, with nothing around it.
 BARE = {"version"}
@@ -55,6 +56,17 @@ def test_every_command_can_be_quiet_and_tell_an_object(name: str) -> None:
     assert {"--quiet", "-q", "--json"} <= options
     flags = [parameter for parameter in command.params if getattr(parameter, "is_flag", False)]
     assert all(str(flag.metavar).strip() == "" for flag in flags), "none is told as if it took a value"
+
+
+@pytest.mark.parametrize("asked", ["version", "--version"])
+def test_the_version_is_one_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], asked: str
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["vegglue", asked])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert capsys.readouterr().out == f"{VERSION}\n"
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,9 @@ def imported_by(folder: Path, *arguments: object) -> tuple[int, set[str]]:
     return done.returncode, set(json.loads(done.stderr.splitlines()[-1]))
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("infer", "--help"), ("run", "--help"), ("version",)])
+@pytest.mark.parametrize(
+    "arguments", [("--help",), ("infer", "--help"), ("run", "--help"), ("version",), ("--version",)]
+)
 def test_help_and_version_import_nothing_heavy(tmp_path: Path, arguments: tuple[str, ...]) -> None:
     code, imported = imported_by(tmp_path, *arguments)
     assert code == 0

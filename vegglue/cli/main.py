@@ -1,6 +1,7 @@
 """The entry point of the shell: its list of commands, and what becomes of errors."""
 
 from collections.abc import Callable
+from typing import Annotated
 
 import typer
 
@@ -17,23 +18,35 @@ from vegglue.cli.loop_commands import (
     overview_command,
 )
 from vegglue.cli.map_commands import export_command, new_command
+from vegglue.cli.options import FLAG
 from vegglue.cli.twin_commands import reveal_command, twin_command
 from vegglue.version import VERSION
 
 app = typer.Typer(rich_markup_mode="rich", no_args_is_help=True, pretty_exceptions_enable=False)
 
 
+def version_command() -> None:
+    """Print the version."""
+    print(VERSION)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        version_command()
+        raise typer.Exit
+
+
 @app.callback()
-def about() -> None:
+def about(
+    version: Annotated[
+        bool,
+        typer.Option("--version", metavar=FLAG, callback=_print_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
     """Calibrate a model of flow through plants against measured velocities, and see where it fails.
 
     Begin with check, then run, or take its steps one by one; all work in runs/<name>.
     """
-
-
-def version_command() -> None:
-    """Print the version."""
-    print(VERSION)
 
 
 # By group, in the order in which they are used.
