@@ -12,7 +12,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 
 
-@pytest.mark.parametrize("heading", ["Dist. from left bank (m)", "Rive gauche [cm]", "Distance", "Punkt, m"])
+@pytest.mark.parametrize("heading", ["Dist. from left bank (m)", "Rive gauche [cm]", "Distance", "Punkt, m", "y/B"])
 def test_velocities_of_a_section_are_no_repeats_on_its_axis(tmp_path: Path, heading: str) -> None:
     """70 velocities of a wading survey became 7 on the axis, with their scatter across as errors."""
     table = f"Chainage (m);{heading};Velocity (m/s)\n10;0.5;0.41\n10;1.5;0.52\n18;0.5;0.40\n"

@@ -6,7 +6,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
-from vegglue.importers.column_names import unit_stated
+from vegglue.importers.column_names import unit_stated, words_of
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.number_words import is_number, number_in
 
@@ -35,9 +35,13 @@ def refuse_lost_places(taken: Taken, file: str) -> None:
 
 
 def _lengths_unread(taken: Taken) -> dict[str, Array]:
-    """By heading: readings along a tape, and columns of no role whose headings state a unit of length."""
+    """By heading: readings along a tape, and columns of no role headed by a unit of length or, as `y/B`, by y."""
     found = {taken.columns["tape"]: taken.numbers["tape"]} if "tape" in taken.numbers else {}
-    said = {heading: texts for heading, texts in taken.others.items() if unit_stated(heading, "length")}
+    said = {
+        heading: texts
+        for heading, texts in taken.others.items()
+        if unit_stated(heading, "length") or "y" in words_of(heading).split()
+    }
     return found | {heading: numbers for heading, texts in said.items() if (numbers := numbers_of(texts)) is not None}
 
 

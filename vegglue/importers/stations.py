@@ -20,6 +20,7 @@ from vegglue.importers.nameless_sections import ONE_PLACE, section_at, sections_
 from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
+from vegglue.importers.told_apart_repeats import refuse_told_apart
 from vegglue.in_short import so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 
@@ -68,10 +69,12 @@ def station_tables(
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
+        refuse_told_apart(taken, _heights(taken), file)
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
         lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(vertical_role(taken))], np.all), *beside)
         return StationTables([_points(taken, stem, words)], lacking)
     refuse_lost_heights(taken, _places(taken), file)
+    refuse_told_apart(taken, _places(taken), file)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares, *once))
@@ -160,6 +163,12 @@ def _places(taken: Taken) -> list[PlaceKey]:
     return list(zip(words["experiment"], words["section"], x.tolist(), y.tolist(), strict=True))
 
 
+def _heights(taken: Taken) -> list[tuple[object, ...]]:
+    """Each place with the height of its point."""
+    z = np.round(taken.numbers[str(vertical_role(taken))] / ONE_PLACE).tolist()
+    return [(*place, height) for place, height in zip(_places(taken), z, strict=True)]
+
+
 def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     """Points in the vertical; a section is a case of the file, at the middle of its x."""
     kept, said = _at_their_heights(taken, words)
@@ -205,9 +214,7 @@ def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
         x[here] = np.median(x[here])
     moved = float(np.abs(x - kept.numbers["x"]).max(initial=0.0))
     kept = kept.having({"x": x})
-    z = np.round(kept.numbers[upward] / ONE_PLACE).tolist()
-    heights = [(*place, height) for place, height in zip(_places(kept), z, strict=True)]
-    kept, said = without_repeats(kept, heights, errors_of_rows(kept, KINDS[STREAMWISE], words))
+    kept, said = without_repeats(kept, _heights(kept), errors_of_rows(kept, KINDS[STREAMWISE], words))
     return kept, f"{said}, moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else said
 
 
