@@ -230,6 +230,7 @@ def test_what_is_not_kept_is_told() -> None:
     [
         (("--add", "streamlning"), "did you mean `streamlining`?"),
         (("--add", "discharge_error[none]"), "acts nowhere"),
+        (("--add", "streamlining[p1]"), "acts nowhere: expected names of experiments (low, mid, high), got p1"),
         (("--add", "patch_density[p1,p2]"), "expected one patch, got 2"),
         (("--add", "unlisted_object[x1.2.3,y0]"), "expected a place such as"),
         (("--add", "streamlining", "--shape", "width=2"), "`width` is no shape"),

@@ -50,20 +50,31 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
     where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
     if where and "search" in effect.tags:
         return _named_place(effect, where)
-    places = where_it_may_act(case, station)
-    kind = next((kind for kind, names in places.items() if where and set(where) <= set(names)), None)
-    if where and (kind is None or (kind in ("section", "device") and effect.stage != "sensor")):
-        raise InputError(
-            f"--add: `{name}` acts nowhere: expected names of experiments ({', '.join(places['experiment'])})"
-            + (f" or sections ({', '.join(places['section'])})" if effect.stage == "sensor" else "")
-            + f", got {', '.join(where)}; correct them."
-        )
-    if kind == "patch" and len(where) > 1:
-        raise InputError(f"--add: `{name}`: expected one patch, got {len(where)}; add them one after the other.")
+    kind = _kind_of_place(case, station, effect, name, where) if where else None
     candidate = _acting_in(case, effect, kind, where)
     if candidate.key in case.effects:
         raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
     return candidate
+
+
+def _kind_of_place(case: Case, station: pd.DataFrame, effect: Effect, name: str, where: tuple[str, ...]) -> str:
+    """What the names in brackets are of: experiments, sections, devices or a patch.
+
+    Errors: InputError where an effect cannot act in one of them alone. On a patch that are effects that have its number
+    among their shapes: any other would act everywhere under the name of a patch.
+    """
+    places = where_it_may_act(case, station)
+    kinds = ["experiment", *(["section", "device"] if effect.stage == "sensor" else [])]
+    kinds += ["patch"] if effect.each == "patch" else []
+    kind = next((one for one in kinds if set(where) <= set(places[one])), None)
+    if kind is None:
+        known = " or ".join(f"{one}s ({', '.join(places[one]) or 'none'})" for one in kinds)
+        raise InputError(
+            f"--add: `{name}` acts nowhere: expected names of {known}, got {', '.join(where)}; correct them."
+        )
+    if kind == "patch" and len(where) > 1:
+        raise InputError(f"--add: `{name}`: expected one patch, got {len(where)}; add them one after the other.")
+    return kind
 
 
 def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, ...]) -> Candidate:
