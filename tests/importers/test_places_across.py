@@ -91,3 +91,11 @@ def test_velocities_of_other_depths_are_no_repeats_on_the_axis(tmp_path: Path) -
     folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="x;Depth (m);u\n10;0.8;0.41\n10;0.9;0.52\n")
     with pytest.raises(InputError, match=r"at x = 10 m that differ in 'Depth \(m\)'"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+def test_depths_that_read_as_names_of_experiments_are_depths(tmp_path: Path) -> None:
+    """Where depths were whole numbers, and experiments called so, each row was of the experiment that was its depth."""
+    site = CHANNEL + "experiments: {'1': {discharge: 1, level: 0.8}, '2': {discharge: 2, level: 1}}\n"
+    folder = folder_of(tmp_path / "brook", site, a__csv="x;y;depth;u\n10;-1;1;0.41\n10;0;2;0.52\n")
+    with pytest.raises(InputError, match="expected a column with the experiment of each row"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

@@ -365,3 +365,12 @@ def test_depths_are_no_levels_of_a_bed(tmp_path: Path) -> None:
     case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
     remarks = vegglue.check(case, runs=tmp_path / "runs").remarks
     assert [one for one in remarks if one.startswith("The bed is higher along its middle than at both sides, by ")]
+
+
+def test_what_a_bed_has_no_use_for_is_told_as_not_read(tmp_path: Path) -> None:
+    """Depths alone were; velocities beside the levels of a bed were told as taken."""
+    rows = [f"{x},{y},{0.1 * y * y},0.9,0.4" for x in (0, 20, 40) for y in (-3, -1, 1, 3)]
+    (tmp_path / "bed.csv").write_text("\n".join(["x,y,z,depth,u", *rows]), encoding="utf-8")
+    said = read_terrain(tmp_path / "bed.csv", Placement(), FileWords(), sections=False).said
+    assert "x from x [m], y from y [m], z from z [m];" in said
+    assert said.endswith("not read: depth and u")

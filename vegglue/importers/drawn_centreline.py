@@ -58,8 +58,9 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     points = _points(path, in_the_channel(taken, Placement(frame), words))
     refuse_degrees(path, frame, [list(zip(taken.numbers["x"].tolist(), taken.numbers["y"].tolist(), strict=True))])
     shape = CentrelineShape(points=tuple(points[::-1] if turned else points))
-    how = f"{taken_in_words(taken)}{', the last one first' if turned else ''}"
-    return _made(shape, dict(taken.columns), dict(taken.units), how)
+    told = taken.leaving(*(taken.columns.keys() - {"x", "y"}))
+    how = f"{taken_in_words(told)}{', the last one first' if turned else ''}"
+    return _made(shape, dict(told.columns), dict(told.units), how)
 
 
 def _made(shape: CentrelineShape, columns: Tree, units: Tree, how: str) -> DrawnCentreline:

@@ -35,8 +35,12 @@ def refuse_lost_places(taken: Taken, file: str) -> None:
 
 
 def _lengths_unread(taken: Taken) -> dict[str, Array]:
-    """By heading: readings along a tape, and columns of no role headed by a unit of length or, as `y/B`, by y."""
+    """By heading: readings along a tape, depths of a stated unit, and columns of no role headed by a unit of length or,
+    as `y/B`, by y.
+    """
     found = {taken.columns["tape"]: taken.numbers["tape"]} if "tape" in taken.numbers else {}
+    depth = taken.columns.get("depth", "")
+    found |= {depth: taken.numbers["depth"]} if unit_stated(depth, "length") else {}
     said = {
         heading: texts
         for heading, texts in taken.others.items()

@@ -23,6 +23,7 @@ from vegglue.importers.known_experiments import EXPERIMENTS, KnownExperiments
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
+from vegglue.importers.point_heights import without_unused_depth
 from vegglue.importers.site_file import HELD_OUT, held_out_file, site_file
 from vegglue.importers.stations import StationTable, errors_of_rows, station_tables
 from vegglue.measurements.csv_table import read_table
@@ -232,10 +233,11 @@ def _brought(
         placed = [_with_own_errors(one, own) for one, (_, own) in zip(placed, group, strict=True)]
         words = replace(words, standard_error={})
     made = station_tables(joined_rows(placed), path.stem, words, known, place, shown_path(path))
+    told = [without_unused_depth(one) for one in placed]
     said = [
-        f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(placed)
+        f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(told)
     ]
-    return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, placed, said, strict=True)]
+    return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, told, said, strict=True)]
 
 
 def _with_own_errors(taken: Taken, words: FileWords) -> Taken:

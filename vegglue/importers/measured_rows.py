@@ -75,6 +75,20 @@ class Taken:
         """The rows without some roles."""
         return replace(self, numbers={role: values for role, values in self.numbers.items() if role not in roles})
 
+    def leaving(self, *roles: str) -> "Taken":
+        """The rows, columns in some roles counted among those that are not read: who asked for them has no use for
+        them. Of their texts the numbers in SI are left.
+        """
+        columns, units = (
+            {role: one for role, one in of.items() if role not in roles} for of in (self.columns, self.units)
+        )
+        texts = {role: [f"{value:g}" for value in values] for role, values in self.numbers.items()} | dict(self.words)
+        unread = {heading: texts.get(role, []) for role, heading in self.columns.items() if role in roles}
+        words = {role: one for role, one in self.words.items() if role not in roles}
+        return replace(
+            self.without(*roles), words=words, columns=columns, units=units, others={**self.others, **unread}
+        )
+
 
 def read_rows(path: Path, words: FileWords) -> Taken:
     """What a file of columns holds, in SI. Errors: InputError, naming file, row and column, and for words of others."""
@@ -91,20 +105,7 @@ def read_rows(path: Path, words: FileWords) -> Taken:
             f"{shown_path(path)}: expected in `units` what its columns hold, {', '.join(taken.numbers)}, got "
             f"`{of_none}`; correct it, or name that column by `columns`."
         )
-    return _without_depths(taken, table)
-
-
-def _without_depths(taken: Taken, table: LooseTable) -> Taken:
-    """Depths of water count among what is not read, but beside points below the surface: water is as deep as levels and
-    the bed of the case make it.
-    """
-    heading = taken.columns.get("depth")
-    if heading is None or len(taken.numbers) == 1 or "below" in taken.numbers:
-        return taken
-    place = table.headings.index(heading)
-    columns, units = ({role: one for role, one in of.items() if role != "depth"} for of in (taken.columns, taken.units))
-    others = {**taken.others, heading: [row[place] for _, row in table.rows]}
-    return replace(taken.without("depth"), columns=columns, units=units, others=others)
+    return taken
 
 
 def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:

@@ -34,6 +34,14 @@ def with_heights(taken: Taken) -> Taken:
     return taken.having(height, "height above the bed from both depths")
 
 
+def without_unused_depth(taken: Taken) -> Taken:
+    """The rows as stations use them: a depth of the water of which no height was made counts among what is not read,
+    for water is as deep as levels and the bed of the case make it.
+    """
+    is_used = "height" in taken.numbers and "height" not in taken.columns
+    return taken if is_used else taken.leaving("depth")
+
+
 def refuse_lost_heights(taken: Taken, places: Sequence[Hashable], file: str) -> None:
     """Errors: InputError where velocities of one place differ in a depth or a height that no role tells.
 

@@ -12,7 +12,6 @@ from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import role_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.loose_table import read_loosely
@@ -32,6 +31,8 @@ SEPARATE = 2  # of a TIFF whose bands lie one behind the other, not pixel by pix
 Tags = dict[int, tuple[float, ...]]
 # Levels of a raster that are sought along a centreline to tell how far it reaches: it is told in words only.
 MOST_FOR_EXTENT = 5000
+# What is read of a file of points; columns of anything else are told as not read.
+ROLES_OF_BED = {"x", "y", "z", "section"}
 # Points of a cross-section without a name lie within so much of the next one along the channel [m], as surveyed in a
 # stream, unless most points share their x: a tape, or a flume.
 SPREAD_OF_SECTION = 1.0
@@ -134,10 +135,9 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     unnamed = not words.columns and read_loosely(path, words.sheet).headings == tuple(bare.values())
     taken = read_rows(path, replace(words, columns=bare) if unnamed else words)
     if not {"x", "y", "z"} <= taken.numbers.keys():
-        roles = {*taken.numbers, *(known[0] for heading in taken.others if (known := role_of(heading)) is not None)}
         advice = (
             "take depths off the level of the water above them, and call that z"
-            if {"depth", "below"} & roles and "z" not in roles
+            if {"depth", "below"} & taken.numbers.keys() and "z" not in taken.numbers
             else f"name them by `columns`, or by place where there is no heading: {bare}"
         )
         raise InputError(
@@ -148,7 +148,8 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     there: Mask = np.asarray(np.isfinite(points).all(axis=1))
     if not there.any():
         raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
-    return points[there], list(taken.only(there).words.get("section", [])), taken_in_words(taken)
+    said = taken_in_words(taken.leaving(*(taken.columns.keys() - ROLES_OF_BED)))
+    return points[there], list(taken.only(there).words.get("section", [])), said
 
 
 def _of_points(path: Path, points: Array, said: str) -> Terrain:
