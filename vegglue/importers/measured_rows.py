@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES
+from vegglue.importers.column_numbers import doubted_nines, numbers_of_column, refuse_negative
 from vegglue.importers.columns_of_table import columns_of_table, unit_of_column
 from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
@@ -17,12 +18,7 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.unit_words import si_factor
 from vegglue.in_short import listed, so_many
 
-# Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
-# 99 m may be a level. Others are named by `missing` in the site file.
-MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
-FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 MOST_UNREAD = 12  # columns that are named of those that were not read: more are a list that nobody reads
-LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
 # What an entry of `files` may say of other files, and does nothing to a table.
 OF_RECORDS = {
     "start": "transects of a boat",
@@ -121,12 +117,12 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
             texts[role] = fields
             continue
         units[role] = unit_of_column(path, table, columns, role, words)
-        values, absent = _numbers(path, table, place, words.missing)
+        values, absent = numbers_of_column(path, table, place, words.missing)
         numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
         if role.endswith(("_se", "_std")):
-            _refuse_negative(path, table, place, values)
+            refuse_negative(path, table, place, values)
         if ROLES[role].quantity == "velocity":
-            said += _doubted(values, table.headings[place])
+            said += doubted_nines(values, table.headings[place])
         said += [f"{many} in {table.headings[place]}" for many in absent]
     if not numbers:
         known = ", ".join(sorted(ROLES))
@@ -226,55 +222,6 @@ def taken_in_words(taken: Taken) -> str:
 def _without(heading: str, unit: str | None) -> str:
     """`U` for `U [cm/s]` and `U (cm/s)`."""
     return heading.removesuffix(f"[{unit}]").removesuffix(f"({unit})").rstrip()
-
-
-def _numbers(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, list[str]]:
-    """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty."""
-    values = np.full(len(table.rows), np.nan)
-    for i, (line, row) in enumerate(table.rows):
-        try:
-            number = table.number(row[place])
-        except ValueError as error:
-            raise InputError(
-                f"{shown_path(path)}, row {line}: expected a number in column {table.headings[place]}, got "
-                f"{row[place]!r}; {error}."
-            ) from None
-        values[i] = np.nan if number is None else number
-    marked = (
-        np.isin(values, [*MARKS_OF_LOGGERS, *missing])
-        | (np.abs(values) > LARGEST_OF_ALL)
-        | np.array([_nines(one) for one in values], dtype=bool)
-    )
-    empty = sum(not row[place].strip() for _, row in table.rows)
-    values = np.where(marked, np.nan, values)
-    marks = int(np.isnan(values).sum()) - empty
-    absent = [f"{so_many(marks, 'mark')} for no value"] if marks else []
-    return values, absent + ([so_many(empty, "empty cell")] if empty else [])
-
-
-def _refuse_negative(path: Path, table: LooseTable, place: int, errors: Array) -> None:
-    """Errors: InputError for an error or a scatter below 0, which may mark that none is known."""
-    for (line, row), error in zip(table.rows, errors.tolist(), strict=True):
-        if error < 0.0:
-            raise InputError(
-                f"{shown_path(path)}, row {line}: expected 0 or above in column {table.headings[place]}, got "
-                f"{row[place]}; correct it, or where it marks no value say `missing: [{error:g}]` of this file."
-            )
-
-
-def _nines(value: float) -> bool:
-    """-99, -999.9 and the like: no level, and no velocity in any unit that comes near to it."""
-    return bool(value <= -99.0) and set(f"{-value:g}") <= set("9.")
-
-
-def _doubted(values: Array, heading: str) -> list[str]:
-    """That velocities of nines only, 99.99, may be marks; they may be velocities, too, and are kept."""
-    nines = {f"{value:g}" for value in values if value > 0.0 and set(f"{value:g}") <= set("9.")}
-    return [
-        f"kept {nine} in {heading} (if it marks no value, say `missing: [{nine}]`)"
-        for nine in sorted(nines)
-        if nine.count("9") >= FEWEST_NINES
-    ]
 
 
 def _components(taken: Taken) -> Taken:

@@ -1,0 +1,66 @@
+"""A column of a table as numbers: what marks no value, and numbers that no reading can be."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.loose_table import LooseTable
+from vegglue.in_short import so_many
+
+# Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
+# 99 m may be a level. Others are named by `missing` in the site file.
+MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
+FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
+LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
+
+
+def numbers_of_column(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, list[str]]:
+    """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty."""
+    values = np.full(len(table.rows), np.nan)
+    for i, (line, row) in enumerate(table.rows):
+        try:
+            number = table.number(row[place])
+        except ValueError as error:
+            raise InputError(
+                f"{shown_path(path)}, row {line}: expected a number in column {table.headings[place]}, got "
+                f"{row[place]!r}; {error}."
+            ) from None
+        values[i] = np.nan if number is None else number
+    marked = (
+        np.isin(values, [*MARKS_OF_LOGGERS, *missing])
+        | (np.abs(values) > LARGEST_OF_ALL)
+        | np.array([_nines(one) for one in values], dtype=bool)
+    )
+    empty = sum(not row[place].strip() for _, row in table.rows)
+    values = np.where(marked, np.nan, values)
+    marks = int(np.isnan(values).sum()) - empty
+    absent = [f"{so_many(marks, 'mark')} for no value"] if marks else []
+    return values, absent + ([so_many(empty, "empty cell")] if empty else [])
+
+
+def refuse_negative(path: Path, table: LooseTable, place: int, errors: Array) -> None:
+    """Errors: InputError for an error or a scatter below 0, which may mark that none is known."""
+    for (line, row), error in zip(table.rows, errors.tolist(), strict=True):
+        if error < 0.0:
+            raise InputError(
+                f"{shown_path(path)}, row {line}: expected 0 or above in column {table.headings[place]}, got "
+                f"{row[place]}; correct it, or where it marks no value say `missing: [{error:g}]` of this file."
+            )
+
+
+def _nines(value: float) -> bool:
+    """-99, -999.9 and the like: no level, and no velocity in any unit that comes near to it."""
+    return bool(value <= -99.0) and set(f"{-value:g}") <= set("9.")
+
+
+def doubted_nines(values: Array, heading: str) -> list[str]:
+    """That velocities of nines only, 99.99, may be marks; they may be velocities, too, and are kept."""
+    nines = {f"{value:g}" for value in values if value > 0.0 and set(f"{value:g}") <= set("9.")}
+    return [
+        f"kept {nine} in {heading} (if it marks no value, say `missing: [{nine}]`)"
+        for nine in sorted(nines)
+        if nine.count("9") >= FEWEST_NINES
+    ]
