@@ -196,6 +196,11 @@ REFUSED = [
     ("name: small", "name: small\nsimulate: {members: 1.5}", "expected a valid integer, got 1.5"),
     ("name: small", "name: small\ninfer: {behavioural: 0.3}", "`infer.behavioural` goes with an informal likelihood"),
     ("name: small", "name: small\nsurvey: {file: no.csv}", "expected an existing file, got no.csv: put it there"),
+    (
+        "level: 0.9}",
+        "level: 0.9, bed: [{points: no.csv}]}",
+        "`experiments.low.bed[0].points` expected an existing file, got no.csv",
+    ),
     ("name: small", "name: small\ntitle: 5", "expected a text, got 5; write it in quotes"),
     ("stand: reed", "stand: true", "expected a text, got True; write it in quotes"),
     ("name: small", "name: small\nname: smaller", "the key `name` stands twice"),

@@ -9,7 +9,7 @@ from vegglue.case.messages import KeyPath, Refusal, dotted, nearest
 from vegglue.case.parts import Interval, Value
 from vegglue.case.prior_tails import share_below
 from vegglue.case.schema import Case, Experiment, Observation
-from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Inflow, Stand, StandOverride
+from vegglue.case.site_schema import COEFFICIENT_OF, BedLayer, FrictionClass, Inflow, Stand, StandOverride
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import shown_path
 
@@ -191,9 +191,8 @@ def _inside(place: KeyPath, part: Interval | None, whole: Interval) -> Iterator[
 
 
 def _files(case: Case) -> Iterator[Refusal]:
-    named: list[tuple[KeyPath, Path | None]] = []
-    for i, layer in enumerate(case.bed):
-        named += [(("bed", i, "raster"), layer.raster), (("bed", i, "points"), layer.points)]
+    named: list[tuple[KeyPath, Path | None]] = [*_files_of_bed((), case.bed)]
+    named += [one for at, experiment in _experiments(case) for one in _files_of_bed(at, experiment.bed or ())]
     named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
     named += [((*at, "file"), observation.file) for at, observation, _ in _observations(case)]
     named += [(("survey", "file"), case.survey.file)] if case.survey else []
@@ -205,6 +204,13 @@ def _files(case: Case) -> Iterator[Refusal]:
             yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
         elif os.path.getsize(file) > LARGEST_DATA:
             yield Refusal(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
+
+
+def _files_of_bed(at: KeyPath, layers: Iterable[BedLayer]) -> Iterator[tuple[KeyPath, Path | None]]:
+    """Files of the layers of a bed, that of the case or of an experiment, and where each is named."""
+    for i, layer in enumerate(layers):
+        yield (*at, "bed", i, "raster"), layer.raster
+        yield (*at, "bed", i, "points"), layer.points
 
 
 def _engine(case: Case) -> Iterator[Refusal]:
