@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from diagnoses import a_field, a_location, a_suspect, an_instrument
 from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
@@ -11,7 +12,7 @@ from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.rivals import undecided_of
-from vegglue.results.diagnosis import EstimatedErrors, ModelErrorUsed, Step
+from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step
 from vegglue.screening.instruments import Instrument
 
 
@@ -290,7 +291,19 @@ def test_the_model_error_that_is_allowed_is_remarked() -> None:
         "by 5% of its friction and 1 cm of its bed everywhere, and its site as the config says; the misfit asks for 50%"
         in said(grounds(model_error=used))[2]
     )
-    assert "the misfit asks for none of that" in said(grounds(model_error=replace(used, needed=0.0)))[2]
+    assert "the misfit asks for none of that." in said(grounds(model_error=replace(used, needed=0.0)))[2]
+
+
+def test_more_model_error_than_is_allowed_is_told_with_its_doubt() -> None:
+    """Two gauges asked for 900% of it."""
+    used = ModelErrorUsed(0.05, 0.01, needed=9.0, log_ratio=0.6)
+    remark = said(grounds(model_error=used))[2]
+    assert "the misfit asks for 900% of that, though what is allowed explains it nearly as well." in remark
+    assert "the misfit asks for 900% of that." in said(grounds(model_error=replace(used, log_ratio=5.0)))[2]
+
+
+def test_one_degree_of_freedom_is_one() -> None:
+    assert Misfit(2.0, 2.0, 1, 0.2, pd.DataFrame()).of_freedom == "for 1 degree of freedom"
 
 
 def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:

@@ -10,6 +10,7 @@ from vegglue.case.schema import Case
 from vegglue.cli.output import command_line
 from vegglue.errors import shown_path
 from vegglue.figures.typography import PLAIN_TEXT
+from vegglue.in_short import so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.homogeneity_words import homogeneity_rejected, moving_parameters
 from vegglue.report_page.posterior_words import DOUBTED, UNBELIEVED, correlated_pairs, errors_by_kind, fit_in_words
@@ -105,7 +106,7 @@ def _fit(posterior: Posterior) -> list[str]:
 def _chi2(misfit: MisfitTest) -> str:
     if misfit.freedom < 1:
         return f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."
-    result = f"chi2 = {misfit.chi2:.4g} with {misfit.freedom} degrees of freedom (p = {misfit.p_misfit:.2g})"
+    result = f"chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = {misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
         return f"{result}: something is missing in the model or its data; `vegglue diagnose` asks what."
     return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."

@@ -180,7 +180,11 @@ def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
 
 
 def model_error_in_words(used: ModelErrorUsed) -> str:
-    """The model may be wrong by 5 % of its friction everywhere; the misfit asks for 60 % of that."""
+    """The model may be wrong by 5 % of its friction everywhere; the misfit asks for 60 % of that. Where it asks for
+    more than all of that, and not beyond doubt, the doubt is told.
+    """
     allowed = f"by {used.friction:.0%} of its friction and {100 * used.bed:.2g} cm of its bed everywhere"
-    needs = "none" if used.needed == 0.0 else f"{used.needed:.0%}"
-    return f"The model may be wrong {allowed}, and its site as the config says; the misfit asks for {needs} of that."
+    asked = f"{'none' if used.needed == 0.0 else f'{used.needed:.0%}'} of that"
+    if used.needed > 1.0 and not used.asks_for_more:
+        asked += ", though what is allowed explains it nearly as well"
+    return f"The model may be wrong {allowed}, and its site as the config says; the misfit asks for {asked}."

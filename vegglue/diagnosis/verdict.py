@@ -51,9 +51,8 @@ NAMES_SHOWN = 8
 # said to be missing or not. Stated errors are good to a quarter; probes side by side that err alike by more than 0.8
 # are a model that errs. Chosen, not measured.
 LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
-# ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
-# degree of freedom; and errors at what was not seen, over those expected, above which it disagrees.
-NEEDS_MORE, UNSEEN_RATIO = 3.3, 1.3
+# Errors at what was not seen, over those expected, above which the model disagrees. Chosen, not measured.
+UNSEEN_RATIO = 1.3
 # Standard errors that an instrument is to be off before it is a verdict. Chosen after seven false alarms of 3.1 to 3.6,
 # one of them on a perfect site: what two codes differ by looks like a probe or a gauge that is a little off.
 CLEARLY_OFF = 4.5
@@ -269,7 +268,7 @@ def _unearned(grounds: Grounds) -> str:
         )
     if grounds.neighbours:
         return NEIGHBOURS_ASIDE
-    if used is not None and used.needed > 1.0 and used.log_ratio > NEEDS_MORE:
+    if used is not None and used.asks_for_more:
         of_friction = f": {used.needed * used.friction:.0%} in friction where {used.friction:.0%} is allowed"
         return (
             f"the model needs {used.needed:.1f} times the errors of its own, and of its site, that are allowed"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vegglue.in_short import telling_digits
+from vegglue.in_short import so_many, telling_digits
 from vegglue.results.posterior import Posterior, Transfer
 
 # p-value [-], over all parameters compared (Bonferroni), below which a parameter is said to differ between experiments.
@@ -67,12 +67,8 @@ def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, ot
     reference = f"; the source has {other:g}" if isinstance(other, int | float) else ""
     return (
         f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {transfer.chi2[j]:.3g} with "
-        f"{_degrees(int(transfer.freedom[j]))} of freedom (p = {transfer.p[j]:.2g}{reference}), {verdict}."
+        f"{so_many(int(transfer.freedom[j]), 'degree')} of freedom (p = {transfer.p[j]:.2g}{reference}), {verdict}."
     )
-
-
-def _degrees(count: int) -> str:
-    return "1 degree" if count == 1 else f"{count} degrees"
 
 
 def _misfits(transfer: Transfer) -> str:

@@ -242,7 +242,7 @@ def validation_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
 def _misfit_under_errors(misfit: MisfitTest) -> list[str]:
     if misfit.freedom < 1:
         return [f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."]
-    result = f"Under these errors chi2 = {misfit.chi2:.4g} with {misfit.freedom} degrees of freedom (p = "
+    result = f"Under these errors chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = "
     result += f"{misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
         return [f"{result}: the errors do not explain what is left, something is missing in the model or in its data."]

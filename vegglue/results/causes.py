@@ -11,6 +11,9 @@ FAULT_WORDS = {
     "probe": "a probe that is off in all sections",
     "gauge": "a gauge that is off",
 }
+# ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
+# degree of freedom.
+NEEDS_MORE = 3.3
 
 
 @dataclass(frozen=True)
@@ -162,3 +165,8 @@ class ModelErrorUsed:
     bed: float
     needed: float
     log_ratio: float
+
+    @property
+    def asks_for_more(self) -> bool:
+        """Whether more than is allowed is asked for, beyond doubt: two readings may ask for nine times as much."""
+        return self.needed > 1.0 and self.log_ratio > NEEDS_MORE

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.in_short import in_short, interval_in_short
+from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import stations_in_short
 from vegglue.results.causes import (
     FaultyInstrument,
@@ -159,7 +159,8 @@ class Misfit:
     @property
     def of_freedom(self) -> str:
         """Its degrees of freedom, in words."""
-        return f"for {self.freedom} degrees of freedom" if self.freedom > 0 else "with no more readings than parameters"
+        degrees = f"for {so_many(self.freedom, 'degree')} of freedom"
+        return degrees if self.freedom > 0 else "with no more readings than parameters"
 
 
 @dataclass(frozen=True)
