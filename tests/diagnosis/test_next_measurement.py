@@ -42,8 +42,8 @@ def test_small_discharges_have_names_of_their_own(model: Model) -> None:
         name: one.model_copy(update={"discharge": dict.fromkeys(one.discharge, 0.004)})
         for name, one in list(model.case.experiments.items())[:1]
     }
-    case = model.case.model_copy(update={"experiments": small})
-    further = [name for name in _with_other_discharges(case, (0.25, 0.5)).experiments if name not in small]
+    shallow = replace(model, case=model.case.model_copy(update={"experiments": small}))
+    further = [name for name in _with_other_discharges(shallow, (0.25, 0.5)).experiments if name not in small]
     assert [name.split(" (")[0] for name in further] == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
     assert re.fullmatch(r"at 0.001 m3/s \(level at the outlet about 0\.\d\d m\)", further[0]), further[0]
 
@@ -60,6 +60,25 @@ def test_a_section_that_a_boat_measured_beside_itself_is_thought_of_once(model: 
     assert len(experiment) > 1
     assert [plan.hours for plan in by_boat] == [plan.hours for plan in at_line]
     assert [plan.x for plan in by_boat] == pytest.approx([plan.x for plan in at_line], abs=0.03)
+
+
+def test_what_could_be_measured_hangs_on_no_order_of_rows(model: Model) -> None:
+    """Which experiment a section is planned after, of two that measured as many verticals, the table's order said."""
+    experiment = {name: 0.02 * number for number, name in enumerate(model.case.experiments)}
+    boat = model.station.assign(x=model.station["x"] + model.station["experiment"].map(experiment))
+    turned = boat.iloc[::-1].reset_index(drop=True)
+    before, after = (planned(replace(model, station=one), model.case)[1] for one in (boat, turned))
+    assert [(plan.name, plan.x, plan.hours) for plan in after] == [(plan.name, plan.x, plan.hours) for plan in before]
+
+
+def test_other_discharges_are_thought_of_on_the_site_at_hand(model: Model) -> None:
+    """The bed was read from its files again."""
+    deeper = replace(model, site=replace(model.site, bed=model.site.bed - 0.5))
+    levels = [
+        [float(one.level) for name, one in found.experiments.items() if name not in model.case.experiments]
+        for found in (_with_other_discharges(one, (0.5,)) for one in (model, deeper))
+    ]
+    assert levels[1][0] < levels[0][0]
 
 
 def test_sections_of_one_experiment_are_two_however_near(model: Model) -> None:

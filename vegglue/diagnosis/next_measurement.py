@@ -25,7 +25,6 @@ from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
-from vegglue.site.gridded_site import build_site
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
@@ -77,7 +76,7 @@ def worth_of_measurements(
     """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
     be told from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
     """
-    for case in (_with_other_discharges(model.case, LOWER), _with_other_discharges(model.case, ()), model.case):
+    for case in (*(_with_other_discharges(model, lower) for lower in (LOWER, ())), model.case):
         wide, plans = planned(model, case)
         point = linearise_from(wide, here.z, here)
         if point is not None:
@@ -136,7 +135,7 @@ def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, 
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(places[1] - places[0])
-    taken = _measured_sections(velocity, near)
+    taken = _measured_sections(velocity, list(model.case.experiments), near)
     new = [float(x) for x in places if taken and min(abs(x - there) for there, _ in taken) > near]
     ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, _hours(y)) for x in new]
     middle = np.array([_middle(y if y.size else np.array(model.case.grid.y))])
@@ -153,13 +152,16 @@ def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, 
     return ideas
 
 
-def _measured_sections(velocity: pd.DataFrame, near: float) -> list[tuple[float, Array]]:
+def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near: float) -> list[tuple[float, Array]]:
     """x and verticals y [m] of each section, as in the experiment with most of them: in others a boat lay beside it, by
     `near` at most [m].
     """
     verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
     found: list[tuple[list[str], float, Array]] = []
-    for (experiment, x), y in sorted(verticals.items(), key=lambda one: -one[1].size):
+    # Where as many, in the order of the case: that of the rows of a table tells nothing.
+    for (experiment, x), y in sorted(
+        verticals.items(), key=lambda one: (-one[1].size, experiments.index(one[0][0]), one[0][1])
+    ):
         same = [of for of, there, _ in found if abs(there - x) <= near and experiment not in of]
         if same:
             same[0].append(experiment)
@@ -192,17 +194,17 @@ def _stations(experiment: str, section: str, x: float, y: Array, kind: str) -> p
     )  # fmt: skip
 
 
-def _with_other_discharges(case: Case, lower: Sequence[float]) -> Case:
+def _with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
     """The case with experiments at discharges it has not seen, `lower` ones and HIGHER, where those at hand are
     numbers.
     """
-    known = list(case.experiments.items())
-    numbers = [(name, one) for name, one in known if _plain(one)]
+    case = model.case
+    numbers = [(name, one) for name, one in case.experiments.items() if _plain(one)]
     if not numbers:
         return case
     totals = {name: sum(float(q) for q in one.discharge.values()) for name, one in numbers}
     lowest, highest = min(totals, key=lambda name: totals[name]), max(totals, key=lambda name: totals[name])
-    floor = float(build_site(case).bed[-1].min())
+    floor = float(model.site.bed[-1].min())
     more = {}
     for name, factor in [(lowest, factor) for factor in lower] + [(highest, factor) for factor in HIGHER]:
         one = case.experiments[name]
