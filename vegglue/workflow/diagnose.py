@@ -8,7 +8,6 @@ from vegglue.arrays import Array
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.effects.definition import Effect
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import responses
@@ -19,6 +18,7 @@ from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.command_model import with_command, with_words_on_command
 from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remember_place, validation_of
+from vegglue.workflow.set_aside import set_aside_of
 
 
 @one_thread()
@@ -49,12 +49,13 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
 @one_thread()
 def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
     """Draw what an effect of plausible size would change at the stations of the calibrated case, before calibration
-    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned.
+    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned. What its diagnosis has set aside does
+    not count.
     """
     folder = folder_of(runs, case)
     path = folder / f"fingerprint_{effect.name}.png"
     watch(Progress(with_compilation(f"calibrating {case.name}")))
-    trace, station = fingerprint_of(case, folder, effect, watch)
+    trace, station = _fingerprint_of(case, folder, set_aside_of(case, runs), effect, watch)
     amplitude = effect.amplitude
     plausible = amplitude.off + amplitude.scale
     size = f"{effect.name}, {amplitude.name} {plausible:g}{'' if amplitude.unit == '-' else f' {amplitude.unit}'}"
@@ -64,11 +65,13 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     return path
 
 
-def fingerprint_of(case: Case, folder: Path, effect: Effect, watch: Watch = silent) -> tuple[Array, pd.DataFrame]:
-    """What one effect, everywhere and at its default shapes, would change at the stations of the calibrated case, per
-    unit of (amplitude - off)^power: (station,) and the stations.
+def _fingerprint_of(
+    case: Case, folder: Path, aside: pd.DataFrame, effect: Effect, watch: Watch
+) -> tuple[Array, pd.DataFrame]:
+    """What one effect, everywhere and at its default shapes, would change at the stations of the case, calibrated
+    without what was set aside, per unit of (amplitude - off)^power: (station,) and the stations.
     """
-    base, one = calibrated(case, folder, excluded_by(), watch), Candidate(effect)
+    base, one = calibrated(case, folder, aside, watch), Candidate(effect)
     shapes = {shape.name: shape.default for shape in effect.shapes}
     changed = cause_of(base.model.case, one, shapes)
     return responses(base.model, base.fitted.point, [changed])[:, 0], base.model.station
