@@ -245,6 +245,12 @@ def test_threshold_out_of_reach_is_told() -> None:
         infer(stations(measured()), likelihood="nse", behavioural=1.5)
 
 
+def test_where_no_member_beats_the_mean_nse_says_so() -> None:
+    """The sentence told of a threshold of -inf, to be lowered."""
+    with pytest.raises(InputError, match=r"nse expected a member with an efficiency above 0, the best has -\d"):
+        infer(stations(measured() + 100.0), likelihood="nse")
+
+
 def test_missing_standard_errors_are_told() -> None:
     table = stations(measured(), SIGMA)
     table.loc[2, "standard_error"] = math.nan

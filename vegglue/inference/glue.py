@@ -97,8 +97,18 @@ def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:
     else:
         weights[kept] = 1 / np.maximum(1 - fit.efficiency[kept], np.finfo(float).tiny)
     if not weights.sum() > 0:
-        raise InputError(
-            f"infer.behavioural: expected a member with an efficiency of at least {threshold:g} (and above 0 for nse), "
-            f"the best has {np.nanmax(fit.efficiency):.3g}; lower the threshold or widen the priors."
-        )
+        raise _no_weight(threshold, float(np.nanmax(fit.efficiency)))
     return weights / weights.sum()
+
+
+def _no_weight(threshold: float, best: float) -> InputError:
+    """Why no member has weight; best: the largest efficiency of any [-]."""
+    if threshold > best:
+        return InputError(
+            f"infer.behavioural: expected a member with an efficiency of at least {threshold:g}, the best has "
+            f"{best:.3g}; lower the threshold or widen the priors."
+        )
+    return InputError(
+        f"infer.likelihood: nse expected a member with an efficiency above 0, the best has {best:.3g}: it predicts no "
+        "better than the mean of what was measured; widen the priors or use gaussian."
+    )
