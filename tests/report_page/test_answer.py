@@ -11,7 +11,7 @@ from posteriors import changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
-from vegglue.report_page.answer_words import headline, of_which_model, why_not_to_rely
+from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
@@ -234,3 +234,10 @@ def test_words_of_users_close_no_script() -> None:
     text = safe_json([{"section": "</script><script>alert('weeds')</script> & \u2028"}])
     assert not set("<>&\u2028") & set(text)
     assert json.loads(text)[0]["section"].startswith("</script><script>")
+
+
+def test_gauges_that_are_missed_most_are_no_section() -> None:
+    zones = a_diagnosis().misfit.zones
+    assert "misses most at section D3, floor, in experiment low" in where_it_fails(a_diagnosis())
+    of_gauges = where_it_fails(a_diagnosis(misfit={"zones": zones[zones["section"] == "gauges"]}))
+    assert "misses most at gauges, level, in experiment low: by 0.5 standard errors" in of_gauges

@@ -6,7 +6,7 @@ import numpy as np
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
-from vegglue.results.causes import FAULT_WORDS, LawsSuspected
+from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
     FieldFound,
@@ -68,7 +68,7 @@ def _odds(odds: float) -> str:
 def field_sentence(field: FieldFound) -> str:
     """What varies, over which distance, and where most surely."""
     what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
-    value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNIT_OF_TERM[field.term]}"
+    value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNIT_OF_FIELD[field.term]}"
     return (
         f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
         f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
@@ -90,10 +90,6 @@ def law_in_words(laws: LawsSuspected) -> str:
         "all that was compared to first order; errors alone make laws stand out as much in "
         f"{100 * laws.p:.1g}% of cases"
     )
-
-
-# Units of fields by their terms.
-UNIT_OF_TERM = {"bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
 
 def instruments_in_words(instruments: Sequence[FaultyInstrument]) -> str:

@@ -43,8 +43,6 @@ POOR = 1e-3
 TESTABLE_SHARE = 0.25
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
 IMPLAUSIBLE = 3.0
-# |cosine| with a parameter above which that is told as the reason why an effect is untestable.
-CONFOUNDED = 0.8
 # Names that a remark holds at most.
 NAMES_SHOWN = 8
 # Scale and correlation of the errors above which they, and not the model, would explain the misfit: nothing is then
@@ -324,6 +322,5 @@ def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str
 
 
 def _untestable(suspect: Suspect) -> str:
-    if abs(suspect.detectability.cosine) > CONFOUNDED:
-        return f"{suspect.name} (looks like a change of {suspect.detectability.confounder})"
-    return suspect.name
+    alike = suspect.detectability.looks_like
+    return f"{suspect.name} (looks like a change of {alike})" if alike else suspect.name

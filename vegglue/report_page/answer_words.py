@@ -3,12 +3,10 @@
 import html
 from collections.abc import Iterator
 
-import numpy as np
-import pandas as pd
-
 from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, unit_html
 from vegglue.in_short import listed
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.kinds import KINDS
 from vegglue.report_page.cause_words import (
     OF_KIND,
     accepted_causes,
@@ -179,14 +177,13 @@ def _of_ensemble(ensemble: Ensemble | None) -> Iterator[str]:
 
 def where_it_fails(found: Diagnosis | None) -> str:
     """The zone that the first model misses most (text); '' where none is known."""
-    zones = found.misfit.zones if found else pd.DataFrame()
-    if found is None or zones.empty:
+    if found is None or found.misfit.worst is None:
         return ""
-    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
-    worst = zones.iloc[int(np.argmax(size))]
-    section = f"section {worst['section']}, " if str(worst["section"]) else ""
+    worst, size = found.misfit.worst
+    named = str(worst["section"])
+    section = f"{named if worst['zone'] in KINDS else f'section {named}'}, " if named else ""
     model = "Before, the model" if accepted_causes(found) else "The model"
     return (
         f"{model} misses most at {section}{worst['zone']}, in experiment {worst['experiment']}: by "
-        f"{fixed(float(size.max()), 1)} standard errors. Errors of measuring alone would make 1."
+        f"{fixed(size, 1)} standard errors. Errors of measuring alone would make 1."
     )

@@ -7,15 +7,18 @@ import numpy as np
 
 from vegglue.figures.places import TERM_SIGNS
 from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
-from vegglue.results.causes import FAULT_WORDS
+from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 
-# Quantity and unit of a field, as they are told.
+# Quantity and unit of a field, as they are told: what has none in %.
 FIELDS: Mapping[str, tuple[str, str]] = {
-    "friction": ("friction", "%"),
-    "bed": ("bed level", "m"),
-    "viscosity": ("eddy viscosity", "m2/s"),
-    "inflow": ("water that enters", "m/s"),
+    term: (words, UNIT_OF_FIELD[term].replace("-", "%"))
+    for term, words in (
+        ("friction", "friction"),
+        ("bed", "bed level"),
+        ("viscosity", "eddy viscosity"),
+        ("inflow", "water that enters"),
+    )
 }
 OF_KIND = {
     "reading": "one reading",

@@ -17,6 +17,7 @@ from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
 from vegglue.figures.typography import count, fixed, short
+from vegglue.in_short import listed
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report_page.cause_pictures import field_picture, outlines, place_picture, plan_marks
 from vegglue.report_page.cause_words import accepted_causes
@@ -136,18 +137,13 @@ def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     yield published_picture(run, draw_gauges(stations, names), "missing-gauges", caption, f"Gauges: {finding}.")
 
 
-def _in_a_row(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
 def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    zones = diagnosis.misfit.zones
-    if zones.empty:
+    zones, most = diagnosis.misfit.zones, diagnosis.misfit.worst
+    if most is None:
         return
-    size = np.sqrt(np.nan_to_num(zones["chi2"] / zones["stations"]))
-    worst = zones.iloc[int(np.argmax(size))]
+    worst, size = most
     finding = (
-        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(float(size.max()), 1)} standard "
+        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(size, 1)} standard "
         "errors, where errors alone make 1"
     )
     caption = (
@@ -164,7 +160,7 @@ def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     families = [group for group in alike_groups(names, cosine) if len(group) > 1]
     finding = "No two of the strongest suspects leave the same trace"
     if families:
-        finding = f"To first order these leave the same trace: {'; '.join(_in_a_row(group) for group in families)}"
+        finding = f"To first order these leave the same trace: {'; '.join(listed(group) for group in families)}"
     caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(finding)}."
     yield published_picture(
         run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {finding}."

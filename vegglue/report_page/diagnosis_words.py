@@ -15,9 +15,6 @@ from vegglue.results.diagnosis import Diagnosis, Suspect
 
 # Effects in the open table, a screen of a laptop; the others stand below it, folded.
 SUSPECTS_LISTED = 8
-# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
-# its trace (cos² = 0.64).
-LOOKS_LIKE_FROM = 0.8
 
 
 @dataclass(frozen=True)
@@ -124,8 +121,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
     unit = unit_html(estimate.unit)
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
     scores = diagnosis.first_score(suspect), diagnosis.last_score(suspect)
-    parameter = detectability.confounder
-    alike = abs(detectability.cosine) > LOOKS_LIKE_FROM and parameter in diagnosis.parameters.first
+    alike = detectability.looks_like
     return SuspectRow(
         name=html.escape(suspect.name),
         title=html.escape(suspect.title),
@@ -137,7 +133,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(detectability.visibility, 2),
         detectable=short(detectability.smallest, 2) + unit,
-        looks_like=html.escape(parameter) if alike else "",
+        looks_like=html.escape(alike) if alike in diagnosis.parameters.first else "",
     )
 
 

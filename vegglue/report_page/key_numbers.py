@@ -8,6 +8,7 @@ import scipy.special
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
+from vegglue.in_short import listed
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.posterior_words import DOUBTED, UNBELIEVED, identification
@@ -107,8 +108,7 @@ def identified_width(posterior: Posterior, name: str) -> str:
 
 
 def _in_a_list(case: Case, names: list[str]) -> str:
-    symbols = [symbol(case, name) for name in names]
-    return symbols[0] if len(symbols) == 1 else f"{', '.join(symbols[:-1])} and {symbols[-1]}"
+    return listed([symbol(case, name) for name in names])
 
 
 def _are(names: list[str]) -> str:

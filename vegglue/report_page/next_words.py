@@ -10,10 +10,8 @@ from vegglue.report_page.cause_words import OF_KIND, where
 from vegglue.report_page.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ladder import LadderStep
-from vegglue.results.open_questions import Question
+from vegglue.results.open_questions import HIDDEN_BEHIND, Question
 
-# How a question names an effect that calibration hides.
-HIDDEN_BEHIND = " from a change of "
 # Measurements named beside the answer: more are a list that nobody acts on.
 QUESTIONS_SHOWN = 3
 

@@ -11,6 +11,8 @@ FAULT_WORDS = {
     "probe": "a probe that is off in all sections",
     "gauge": "a gauge that is off",
 }
+# Units of smooth fields, by their term.
+UNIT_OF_FIELD = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 # ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
 # degree of freedom.
 NEEDS_MORE = 3.3

@@ -25,6 +25,9 @@ from vegglue.results.causes import (
 
 # How the sentence of an instrument goes on where the rest of the model is cleared.
 NOTHING_ELSE = "Nothing else is missing"
+# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
+# its trace (cos^2 = 0.64).
+LOOKS_LIKE_FROM = 0.8
 # instrument: some readings are off. Whether more is missing the sentence says, see `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
 
@@ -79,6 +82,11 @@ class Detectability:
     testable: bool
     confounder: str
     cosine: float
+
+    @property
+    def looks_like(self) -> str:
+        """The parameter that a trace looks like a change of; '' where none is so like it."""
+        return self.confounder if abs(self.cosine) > LOOKS_LIKE_FROM else ""
 
 
 @dataclass(frozen=True)
@@ -155,6 +163,14 @@ class Misfit:
     freedom: int
     p: float
     zones: pd.DataFrame
+
+    @property
+    def worst(self) -> tuple[pd.Series, float] | None:
+        """The zone that is missed most, and by how many standard errors in the root mean square; None without any."""
+        if self.zones.empty:
+            return None
+        size = np.sqrt(np.nan_to_num(self.zones["chi2"] / self.zones["stations"]))
+        return self.zones.iloc[int(np.argmax(size))], float(size.max())
 
     @property
     def of_freedom(self) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter
 
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     AmplitudeEstimate,
     Detectability,
@@ -59,8 +59,6 @@ ZONE_COLUMNS = {
     **dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=IN_WORDS)),
     **dict.fromkeys(("stations", "mean", "standard_error", "chi2"), Stored(("zone_number",))),
 }
-# Units of smooth fields, by their term.
-FIELD_UNITS = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
@@ -95,7 +93,7 @@ def _field_group(diagnosis: Diagnosis) -> dict[str, Group]:
     mapped, found = diagnosis.field_map, diagnosis.field
     if mapped is None or found is None:
         return {}
-    unit = FIELD_UNITS[found.term]
+    unit = UNIT_OF_FIELD[found.term]
     values = {name: Variable(("x", "y"), getattr(mapped, name), unit) for name in ("value", "error")}
     return {"field": Group({"x": mapped.x, "y": mapped.y}, values, {"x": "m", "y": "m"})}
 

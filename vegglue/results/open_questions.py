@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+# What stands in a question between an effect that calibration hides and the parameter that hides it.
+HIDDEN_BEHIND = " from a change of "
 # Below this D^2 a measurement does not separate anything.
 SEPARATES = 4.0
 # Measurements shown of each question: more than these nobody plans in one season.

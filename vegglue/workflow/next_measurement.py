@@ -21,7 +21,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
-from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
 from vegglue.screening.candidates import Candidate
 from vegglue.storage.kept_words import questions_that_fit, write_questions
 from vegglue.workflow.diagnose import diagnose
@@ -137,7 +137,7 @@ def _laws_by_name(found: Diagnosis) -> dict[str, LawSuspected]:
 
 
 def _what_hides(suspect: Suspect) -> str:
-    return f"{suspect.name} from a change of {suspect.detectability.confounder}"
+    return f"{suspect.name}{HIDDEN_BEHIND}{suspect.detectability.confounder}"
 
 
 def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
