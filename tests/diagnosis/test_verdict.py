@@ -58,7 +58,10 @@ def test_silence_has_to_be_earned(why: str) -> None:
 @pytest.mark.parametrize("why", UNEARNED)
 def test_an_instrument_alone_is_named_only_where_silence_is_earned(why: str) -> None:
     too_much, within, _ = UNEARNED[why]
-    assert said(grounds(instruments=(an_instrument(),), **too_much))[0] == "cannot-tell"
+    kind, sentence, _ = said(grounds(instruments=(an_instrument(),), **too_much))
+    assert kind == "cannot-tell"
+    assert sentence.startswith("Nothing" if why == "neighbours" else "One reading at x = 36, y = 1 m is off by 0.1 m/s")
+    assert "Nothing is missing" not in sentence
     kind, sentence, _ = said(grounds(instruments=(an_instrument(),), **within))
     assert kind == "instrument"
     assert "One reading at x = 36, y = 1 m is off by 0.1 m/s (0.08 to 0.12); it was set aside." in sentence
@@ -78,7 +81,8 @@ def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_unsure() -> None:
     clear, faint = an_instrument(), an_instrument(interval95=(0.05, 0.15))
     kind, sentence, _ = said(grounds(instruments=(clear,), between=1.5))
     assert kind == "instrument"
-    assert "it was set aside. Nothing else stands out, but where nobody measured" in sentence
+    assert "it was set aside. Nothing else stands out (chi2 is " in sentence
+    assert "freedom), but where nobody measured" in sentence
     kind, sentence, remarks = said(grounds(instruments=(faint,), between=1.5))
     assert kind == "cannot-tell"
     assert "it was set aside" not in sentence
