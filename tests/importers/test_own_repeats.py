@@ -8,6 +8,7 @@ import pytest
 from field_folders import CHANNEL, JUNE, folder_of
 
 import vegglue
+from vegglue.arrays import Array
 from vegglue.measurements.observations import read_observations
 
 
@@ -72,3 +73,35 @@ def test_small_errors_are_kept(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "flume", CHANNEL + JUNE + files, q__csv="x,Q\n8,250.4\n")
     found = read_observations(vegglue.import_folder(folder, tmp_path / "flume.yaml")).table
     assert found[["value", "standard_error"]].to_numpy()[0] == pytest.approx([250.4e-6, 0.4e-6], rel=1e-6)
+
+
+def logged(persistence: float, places: int, samples: int) -> Array:
+    """u' at each place (places, samples): u'_i = a u'_(i-1) + sqrt(1 - a^2) e_i, of standard deviation 5 cm/s [m/s]."""
+    chance = np.random.default_rng(3).normal(0.0, 0.05, (places, samples))
+    for i in range(1, samples):
+        chance[:, i] = persistence * chance[:, i - 1] + np.sqrt(1.0 - persistence**2) * chance[:, i]
+    return chance
+
+
+def test_the_mean_of_a_logged_record_has_the_error_of_its_eddies(tmp_path: Path) -> None:
+    """400 samples at 25 Hz were as good as 400 measurements: errors were five times too small, and so is chi2 then."""
+    record = logged(0.9, places=40, samples=400)
+    rows = "".join(f"A,{9 + n // 20},{n % 20 / 20},{0.4 + u:.5f}\n" for n, one in enumerate(record) for u in one)
+    table, said = brook_of_repeats(tmp_path, rows)
+    assert " in a row as one" in said
+    truth = 0.05 * np.sqrt((1.9 / 0.1) / 400)  # tau = (1 + a) / (1 - a)
+    assert table["standard_error"].to_numpy() == pytest.approx(np.full(40, truth), rel=0.3)
+    assert np.std(table["value"] - 0.4) == pytest.approx(table["standard_error"].mean(), rel=0.3)
+
+
+def test_a_gauge_through_a_flood_is_known_by_its_range(tmp_path: Path) -> None:
+    rows = "".join(f"A,9,0,{0.9 + 0.1 * np.sin(hour / 6):.4f}\n" for hour in range(48))
+    table, _ = brook_of_repeats(tmp_path, rows)
+    assert 0.02 < table["standard_error"].item() < 0.08
+
+
+def test_repeats_by_chance_count_each(tmp_path: Path) -> None:
+    rows = "".join(f"A,9,{n / 40},{0.4 + u:.5f}\n" for n, one in enumerate(logged(0.0, 40, 40)) for u in one)
+    table, said = brook_of_repeats(tmp_path, rows)
+    assert "in a row" not in said
+    assert table["standard_error"].to_numpy() == pytest.approx(np.full(40, 0.05 / 40**0.5), rel=0.5)

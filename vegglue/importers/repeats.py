@@ -12,6 +12,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.importers.measured_rows import Taken
+from vegglue.importers.serial_scatter import values_that_are_one
 
 # Experiment, section, x, y of a place [m]; and a value with its stated standard error, NaN where there is none.
 PlaceKey = tuple[str, str, float, float]
@@ -27,14 +28,17 @@ Scatter = Mapping[tuple[object, ...], tuple[float, int]]
 
 
 def means_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
-    """Mean of each place and its standard error: from those stated, else s / sqrt(n); 0 for unknown.
+    """Mean of each place and its standard error: from those stated, else s sqrt(tau / n), s at most; 0 for unknown.
 
-    s: root of sum (u - mean u)^2 / sum (n - 1), of the values without stated errors of the narrowest of place, section
-    and experiment that has ENOUGH degrees of freedom, else of all. One kind and one file.
+    tau: how many values in a row count as one, see `values_that_are_one`; s: root of sum (u - mean u)^2 / sum (n - 1),
+    of the values without stated errors of the narrowest of place, section and experiment that has ENOUGH degrees of
+    freedom, else of all. One kind and one file.
     """
-    scatter = _scatter({place: values for place, values in gathered.items() if not _stated(values)})
+    unstated = {place: values for place, values in gathered.items() if not _stated(values)}
+    scatter, tau = _scatter(unstated), _in_a_row(unstated)
     return [
-        (float(np.mean([one for one, _ in some])), _error(place, some, scatter)) for place, some in gathered.items()
+        (float(np.mean([one for one, _ in some])), _error(place, some, scatter, tau))
+        for place, some in gathered.items()
     ]
 
 
@@ -44,7 +48,9 @@ def said_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> st
     repeats = sum(len(values) - 1 for values in gathered.values())
     freedom = sum(len(values) - 1 for values in unstated.values())
     too_few = f", too few for a standard error: {LEAST_OF_FILE} are needed" if 0 < freedom < LEAST_OF_FILE else ""
-    return (f", {repeats} repeats averaged" if repeats else "") + too_few
+    tau = _in_a_row(unstated)
+    alike = f", {tau:.2g} in a row as one, as neighbours are alike" if tau > 1.0 else ""
+    return (f", {repeats} repeats averaged{alike}" if repeats else "") + too_few
 
 
 def without_repeats(points: Taken, keys: Sequence[tuple[object, ...]], errors: Array) -> tuple[Taken, str]:
@@ -88,10 +94,14 @@ def _stated(values: Sequence[RepeatedValue]) -> bool:
     return all(np.isfinite(error) for _, error in values)
 
 
-def _error(place: RepeatKey, values: Sequence[RepeatedValue], scatter: Scatter) -> float:
+def _in_a_row(unstated: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> float:
+    return values_that_are_one([one for one, _ in values] for values in unstated.values())
+
+
+def _error(place: RepeatKey, values: Sequence[RepeatedValue], scatter: Scatter, tau: float) -> float:
     if _stated(values):
         return sqrt(sum(error**2 for _, error in values)) / len(values)
-    return sqrt(_variance(place, scatter) / len(values))
+    return sqrt(_variance(place, scatter) * min(tau / len(values), 1.0))
 
 
 def _variance(place: RepeatKey, scatter: Scatter) -> float:
