@@ -34,7 +34,7 @@ from vegglue.importers.drawn_centreline import drawn_centreline
 from vegglue.importers.field_site import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid
 from vegglue.importers.measured_files import held_out_files, measured_files, record, texts_of_tables
 from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import planted_polygons
+from vegglue.importers.polygon_files import planted_in_words, planted_polygons
 from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.standing_water import refuse_standing_water
 from vegglue.importers.surveyed_bed import Ground, surveyed_bed
@@ -72,12 +72,12 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     given = site.grid.centreline if site.grid is not None else None
     drawn = drawn_centreline(folder, given, frame) if given is not None else None
     place = Placement(frame, drawn.line if drawn is not None else None)
-    patches = _patches(folder, site.patches, frame)
+    patches, drawn_patches = _patches(folder, site.patches, frame)
     measured = measured_files(folder, target, site, place, _used_elsewhere(site))
     held_out = held_out_files(folder, target, site, place)
     unknown = _viscosity(site)
     ground = _ground(folder, target, site, place)
-    measured.imported.extend(ground.imported)
+    measured.imported.extend([*ground.imported, *drawn_patches])
     tree: Tree = {
         "name": case_name(folder.resolve().name),
         "title": f"Measurements of {folder.resolve().name}",
@@ -135,20 +135,23 @@ def _as_flume(tree: Tree, wall: float) -> Tree:
     }
 
 
-def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -> list[PlantedPatch]:
-    """The patches of a site file, and those of the files of polygons that it names."""
+def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -> tuple[list[PlantedPatch], list[Tree]]:
+    """The patches of a site file, and those of the files of polygons that it names, with what was taken from these."""
     found: list[PlantedPatch] = []
+    imported: list[Tree] = []
     for one in given:
         if one.file is None:
             found.append(one)
             continue
         if not (folder / one.file).is_file():
             raise InputError(f"{shown_path(folder)}: `patches` names {one.file}, which is not there; correct it.")
-        for polygon in planted_polygons(folder / one.file, frame):
+        polygons = planted_polygons(folder / one.file, frame)
+        imported.append(record(folder / one.file, None, planted_in_words(polygons)))
+        for polygon in polygons:
             density = polygon.density if polygon.density is not None else one.stems_per_m2
             corners = tuple(polygon.corners)
             found.append(PlantedPatch(name=polygon.name, polygon=corners, stems_per_m2=density))
-    return found
+    return found, imported
 
 
 PARAMETERS: Tree = {"n_b": bed_prior(0.01, 0.2)}

@@ -23,7 +23,9 @@ def geojson_features(path: Path, what: str) -> Iterator[list[Any]]:
     except InputError:  # a ValueError that says what it is
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise InputError(f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}).") from None
+        raise InputError(
+            f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}); save it as GeoJSON."
+        ) from None
 
 
 @contextmanager

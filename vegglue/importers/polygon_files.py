@@ -1,4 +1,4 @@
-"""Polygons of patches and friction classes from GeoJSON files and shapefiles, brought into the channel."""
+"""Polygons of patches and friction classes from GeoJSON, shapefiles and tables, brought into the channel."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,45 +10,69 @@ import numpy as np
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
+from vegglue.importers.polygon_properties import CLASSES, NAMES, density_factor, density_heading, first_heading
+from vegglue.importers.polygon_tables import polygons_of_table
+from vegglue.in_short import listed, so_many
 
-# What properties of a polygon are called that say its density [1/m2], its class and its name; lower case.
-DENSITIES = ("stems_per_m2", "stems", "density", "stem_density", "stems_m2")
-CLASSES = ("class", "friction_class", "friction", "roughness", "type", "landuse")
-NAMES = ("name", "id", "patch", "fid")
 AREAS = ("Polygon", "MultiPolygon")  # geometries of GeoJSON
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm")
 MOST_STEMS = 1e7  # 1/m2, as in the site file
 Ring = list[tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class NamedPolygon:
-    """Corners in the channel [m]; density [1/m2] and class where the file says them."""
+    """Corners in the channel [m]; density [1/m2] and class where the file says them; density_from: its heading;
+    unread: headings of what else the file says of it.
+    """
 
     name: str
     corners: Ring
     density: float | None
     friction_class: str | None
+    density_from: str | None = None
+    unread: tuple[str, ...] = ()
 
 
 def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
     """All polygons of a file, each part of one for itself. Errors: InputError for another file, and for degrees."""
-    features = list(_of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path))
+    features = list(_features(path))
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     refuse_degrees(path, frame, [ring for ring, _ in features])
-    found = []
-    for number, (ring, properties) in enumerate(features, 1):
-        density = _first(properties, DENSITIES)
-        of_class = _first(properties, CLASSES)
-        found.append(
-            NamedPolygon(
-                name=str(_first(properties, NAMES) or f"p{number}"),
-                corners=[rounded_place(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
-                density=_density(path, density) if density is not None else None,
-                friction_class=str(of_class) if of_class is not None else None,
-            )
-        )
-    return found
+    return [_named_polygon(path, frame, f"p{number}", *one) for number, one in enumerate(features, 1)]
+
+
+def _features(path: Path) -> Iterable[tuple[Ring, Mapping[str, Any]]]:
+    ending = path.suffix.lower()
+    if ending == ".shp":
+        return _of_shapefile(path)
+    return polygons_of_table(path) if ending in TABLES else _of_geojson(path)
+
+
+def _named_polygon(
+    path: Path, frame: Frame | None, number: str, ring: Ring, properties: Mapping[str, Any]
+) -> NamedPolygon:
+    of_density = density_heading(properties)
+    of_class, of_name = first_heading(properties, CLASSES), first_heading(properties, NAMES)
+    return NamedPolygon(
+        name=str(properties[of_name]) if of_name is not None else number,
+        corners=[rounded_place(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
+        density=_density(path, of_density, properties[of_density]) if of_density is not None else None,
+        friction_class=str(properties[of_class]) if of_class is not None else None,
+        density_from=of_density,
+        unread=tuple(str(one) for one in properties if one not in (of_density, of_class, of_name)),
+    )
+
+
+def planted_in_words(found: Sequence[NamedPolygon]) -> str:
+    """`2 patches: stems from Density; not read: d_mm`."""
+    known = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
+    unread = dict.fromkeys(heading for one in found for heading in one.unread)
+    said = f"stems from {listed(list(known))}" if known else "no stems, and so equally dense"
+    return f"{so_many(len(found), 'patch', 'patches')}: {said}" + (
+        f"; not read: {listed(list(unread))}" if unread else ""
+    )
 
 
 def planted_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
@@ -112,9 +136,9 @@ def _area(ring: Ring) -> float:
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def _density(path: Path, value: Any) -> float:
+def _density(path: Path, heading: str, value: Any) -> float:
     try:
-        return float(value)
+        return float(value) * density_factor(heading)
     except (ValueError, TypeError, OverflowError):
         complaint = f"expected a number of stems in 1/m2, got {str(value)[:40]!r}; correct it"
         raise InputError(f"{shown_path(path)}: {complaint}.") from None
@@ -122,11 +146,6 @@ def _density(path: Path, value: Any) -> float:
 
 def _open(ring: Ring) -> Ring:
     return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
-
-
-def _first(properties: Mapping[str, Any], names: Iterable[str]) -> Any:
-    lower = {str(key).lower(): value for key, value in properties.items()}
-    return next((lower[name] for name in names if lower.get(name) not in (None, "")), None)
 
 
 def refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Ring]) -> None:

@@ -77,7 +77,8 @@ def left_open(folder: Path) -> list[str]:
         assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}{within}")
     if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
         assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
-    if site.patches and not any("stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None):
+    here = [one for one in site.patches if one.file is None]
+    if here and not any("stems_per_m2" in one.model_fields_set for one in here):
         assumed.append("plants equally dense in all patches that have no file")
     if not site.patches:
         assumed.append("no plants")

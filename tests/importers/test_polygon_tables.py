@@ -1,0 +1,67 @@
+"""Patches of plants in tables, and what of the words beside a polygon is its density."""
+
+import json
+from pathlib import Path
+
+import pytest
+from field_folders import CHANNEL, JUNE, folder_of
+
+import vegglue
+from vegglue.errors import InputError
+from vegglue.importers.polygon_files import planted_in_words, planted_polygons
+from vegglue.workflow.import_folder import assumptions_of
+
+SQUARE = [[10, 0], [14, 0], [14, 1], [10, 1], [10, 0]]
+CORNERS = "".join(f"reed;{x};{y};20;8\n" for x, y in SQUARE[:-1]) + "sedge;20;-1;40;8\nsedge;22;-1;;\nsedge;22;0;;\n"
+
+
+def drawn(path: Path, **properties: object) -> Path:
+    shape = {"type": "Polygon", "coordinates": [SQUARE]}
+    feature = {"type": "Feature", "properties": properties, "geometry": shape}
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}), encoding="utf-8")
+    return path
+
+
+def test_a_table_of_corners_is_read_as_patches(tmp_path: Path) -> None:
+    """It was refused as no GeoJSON."""
+    site = CHANNEL + JUNE + "patches: {file: plants.csv}\n"
+    files = {"plants__csv": "name;x;y;Stems/m2;d (mm)\n" + CORNERS, "a__csv": "x;y;u\n8;0;0.4\n"}
+    folder = folder_of(tmp_path / "brook", site, **files)
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert [(one.name, one.stems) for one in case.plants.patches] == [("reed", 20.0), ("sedge", 40.0)]
+    assert [len(one.polygon or ()) for one in case.plants.patches] == [4, 3]
+    assert case.imported is not None
+    assert case.imported[-1].taken == "2 patches: stems from Stems/m2; not read: d (mm)"
+    assert not any("equally dense" in one for one in assumptions_of(folder))
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (
+            "name,x1,x2,y1,y2\np1,10,14,0,1\n",
+            r"expected columns of x and y, with a row for each corner .* `patches: \[",
+        ),
+        ("name,x,y\np1,10,0\np1,14,1\n", "expected three corners or more of patch 'p1', got 2"),
+        ("name,x,y\np1,10,0\np1,14,1\np1,,1\n", "row 4: expected x and y of a corner"),
+    ],
+)
+def test_a_table_that_draws_no_patch_is_refused(tmp_path: Path, table: str, words: str) -> None:
+    (tmp_path / "plants.csv").write_text(table, encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        planted_polygons(tmp_path / "plants.csv", None)
+
+
+@pytest.mark.parametrize(
+    ("heading", "density"),
+    [("stems", 2.0), ("Stems/m²", 2.0), ("stem_density", 2.0), ("stems_per_ft2", 2.0 / 0.3048**2), ("a_per_m", None)],
+)
+def test_a_density_is_told_by_its_heading_and_its_unit(tmp_path: Path, heading: str, density: float | None) -> None:
+    """Densities under another heading, or per square foot, were left out without a word: all patches were alike."""
+    (found,) = planted_polygons(drawn(tmp_path / "a.geojson", **{heading: 2}), None)
+    assert found.density == (density if density is None else pytest.approx(density))
+    said = planted_in_words([found])
+    if density is None:
+        assert said == "1 patch: no stems, and so equally dense; not read: a_per_m"
+    else:
+        assert said == f"1 patch: stems from {heading}"
