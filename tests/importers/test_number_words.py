@@ -12,6 +12,8 @@ from vegglue.importers.number_words import has_decimal_comma, is_number, number_
         ("1.236,00", True, 1236.0), ("1,236.50", False, 1236.5), ("1'236.5", False, 1236.5),
         ("12 001 236,5", True, 12001236.5),
         ("1d3", False, 1000.0), ("n/a", True, None), ("", False, None), ("k.A.", True, None), ("n.d.", False, None),
+        ("#DIV/0!", False, None), ("#N/A", True, None), ("#WERT!", True, None), ("#NAME?", False, None),
+        ("+inf", False, None),
         ("\u22120,5", True, -0.5), ("\u20131", False, -1.0), ("\u2014", True, None), ("1e\u22123", False, 0.001),
     ],
 )  # fmt: skip

@@ -10,8 +10,10 @@ GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(
 DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d", "-"))
 MISSING_WORDS = (
     "", "-", "--", "---", "nan", "na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "null", "none", "nodata", "no data",
-    "missing", "#n/a", "#nv", "inf", "-inf",
+    "missing", "inf", "-inf", "+inf", "nd", "s/d",
 )  # fmt: skip
+# What a workbook shows where a formula has no value, in any language: #DIV/0!, #N/A, #WERT!, #NOMBRE?
+OF_FORMULA = re.compile(r"#[^\W_]+(/[^\W_]+)?[!?]?")
 
 
 def is_number(text: str) -> bool:
@@ -29,7 +31,7 @@ def has_decimal_comma(fields: Iterable[str]) -> bool:
 def number_in(text: str, decimal_comma: bool) -> float | None:
     """A field as a number; None where it says that there is none. Errors: ValueError, which says what to do."""
     plain = _plain(text)
-    if plain.lower() in MISSING_WORDS:
+    if plain.lower() in MISSING_WORDS or OF_FORMULA.fullmatch(plain):
         return None
     sign = "," if decimal_comma else "."
     if (written := _decimal_sign(plain)) and written != sign:
