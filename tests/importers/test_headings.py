@@ -34,6 +34,16 @@ def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str)
         ("U_Mean", "u"),
         ("Vel.", "u"),
         ("Fließgeschwindigkeit", "u"),
+        ("Vitesse moyenne", "u"),
+        ("Velocità media", "u"),
+        ("Snelheid", "u"),
+        ("Velocidad", "u"),
+        ("Hauteur d’eau", "depth"),
+        ("Niveau d'eau", "level"),
+        ("Waterstand", "level"),
+        ("Profundidad", "depth"),
+        ("Caudal", "discharge"),
+        ("Sección", "section"),
     ],
 )
 def test_accents_and_quotes_change_no_name(heading: str, role: str) -> None:

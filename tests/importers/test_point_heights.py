@@ -37,6 +37,8 @@ def verticals(heading: str, *columns: str) -> str:
         ("depth", ["below"]),
         ("Depth below surface (m)", ["below"]),
         ("Messtiefe", ["below"]),
+        ("Profundidad [m]", ["below"]),
+        ("hoogte", ["share"]),
         ("rel. depth", ["share"]),
         ("z/h", ["share"]),
         ("Tiefe [m];Wassertiefe [m]", ["below", "water"]),

@@ -29,7 +29,7 @@ def survey(heading: str, factors: dict[str, float], places: str = "x;y", z: str 
     [
         ("reach", {"A": 1.0, "B": 0.5}),
         ("date", {"3/6/2024": 1.0, "9/7/2024": 1.3}),
-        ("Profundidad", {"0.1": 1.2, "0.3": 1.0, "0.6": 0.7}),
+        ("Syvyys", {"0.1": 1.2, "0.3": 1.0, "0.6": 0.7}),
         ("position", {"20 %": 1.15, "80 %": 0.85}),
     ],
 )

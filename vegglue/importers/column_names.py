@@ -22,9 +22,12 @@ ROLES = {
     role.name: role
     for role in (
         Role("x", "length", ("x", "easting", "east", "e", "x coordinate", "x coord", "rechtswert", "utm x", "utm e",
-                             "chainage", "distance downstream", "distance along", "streamwise distance")),
+                             "chainage", "distance downstream", "distance along", "streamwise distance",
+                             "distance aval", "distancia aguas abajo")),
         Role("y", "length", ("y", "northing", "north", "n", "y coordinate", "y coord", "hochwert", "utm y", "utm n",
-                             "offset", "distance across", "lateral distance", "cross stream distance")),
+                             "offset", "distance across", "lateral distance", "cross stream distance",
+                             "distance laterale", "distance transversale", "distancia lateral",
+                             "distancia transversal", "distanza laterale")),
         Role("z", "length", ("z", "elevation", "elev", "altitude", "hohe", "bed level", "z bed", "zb", "bed elevation",
                              "alt", "rl")),
         Role("height", "length", ("height above bed", "height above the bed", "distance from bed", "distance above bed",
@@ -33,7 +36,10 @@ ROLES = {
                                "mean vel", "meanv", "velocity x", "vel x", "x velocity", "streamwise velocity",
                                "u velocity", "geschwindigkeit", "fliessgeschwindigkeit", "vitesse", "u depthavg",
                                "u avg", "depth averaged u", "average velocity", "avg velocity", "velocity mean",
-                               "velocity avg", "depth averaged velocity", "depth average velocity")),
+                               "velocity avg", "depth averaged velocity", "depth average velocity",
+                               "vitesse moyenne", "velocidad", "velocidad media", "snelheid",
+                               "gemiddelde snelheid", "stroomsnelheid", "velocita", "velocita media",
+                               "velocidade", "velocidade media")),
         Role("v", "velocity", ("v", "vy", "uy", "v mean", "mean v", "vmean", "velocity y", "vel y", "y velocity",
                                "transverse velocity", "lateral velocity", "v velocity", "v depthavg", "v avg",
                                "depth averaged v", "cross stream velocity")),
@@ -47,8 +53,11 @@ ROLES = {
         Role("direction", "angle", ("direction", "dir", "flow direction", "velocity direction", "azimuth")),
         Role("level", "length", ("level", "water level", "wse", "wsel", "water surface", "water surface elevation",
                                  "stage", "ws", "wl", "wasserstand", "wasserspiegel", "pegel", "z ws", "waterlevel",
-                                 "gauge height", "gage height")),
-        Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q")),
+                                 "gauge height", "gage height",
+                                 "niveau d' eau", "niveau de l' eau", "waterstand", "waterpeil", "nivel",
+                                 "nivel del agua", "nivel de agua", "livello", "livello idrico")),
+        Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q",
+                                        "caudal", "afvoer", "portata", "vazao")),
         Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
                                   "standard error", "se", "verr")),
         Role("v_se", "velocity", ("v se", "se v", "v error", "v uncertainty")),
@@ -60,13 +69,21 @@ ROLES = {
         Role("tape", "length", ("loc", "location", "tape", "distance from bank", "distance", "dist",
                                 "distance from left bank", "distance from right bank", "dist from left bank",
                                 "dist from right bank", "dist from bank", "distance from lb", "distance from rb", "dmg",
-                                "abstand vom ufer", "abstand vom linken ufer", "abstand vom rechten ufer")),
-        Role("depth", "length", ("depth", "h", "water depth", "tiefe", "wassertiefe")),
+                                "abstand vom ufer", "abstand vom linken ufer", "abstand vom rechten ufer",
+                                "distance a la rive", "distancia desde la orilla", "afstand", "distancia",
+                                "distanza")),
+        Role("depth", "length", ("depth", "h", "water depth", "tiefe", "wassertiefe",
+                                 "profondeur", "profundidad", "calado", "diepte",
+                                 "waterdiepte", "profondita", "profundidade", "hauteur d' eau")),
         Role("below", "length", ("below surface", "depth below surface", "depth below the surface", "measurement depth",
                                  "measuring depth", "meas depth", "depth of measurement", "point depth", "probe depth",
-                                 "depth of point", "sampling depth", "distance from surface", "messtiefe")),
-        Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil", "profil")),
-        Role("experiment", "", ("experiment", "run", "test", "campaign", "versuch", "event")),
+                                 "depth of point", "sampling depth", "distance from surface", "messtiefe",
+                                 "profondeur de mesure", "meetdiepte", "profundidad de medicion",
+                                 "profondita di misura")),
+        Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil", "profil",
+                             "seccion", "sezione", "secao", "raai", "dwarsprofiel", "perfil", "profilo")),
+        Role("experiment", "", ("experiment", "run", "test", "campaign", "versuch", "event",
+                                "essai", "ensayo", "ensaio", "proef", "prova", "campagne", "campana")),
         Role("device", "", ("device", "instrument", "probe", "sensor")),
     )
 }  # fmt: skip
@@ -135,6 +152,6 @@ def words_of(name: str) -> str:
 
     Signs that make another quantity of a letter stay with it: `u*`, `u'`, `Δx`. Quotes around a name go.
     """
-    bare = re.sub(r"^(['’])(.*)\1$", r"\2", name.strip())
+    bare = re.sub(r"^(['’])(.*)\1$", r"\2", name.strip()).replace("’", "'")
     plain = "".join(sign for sign in unicodedata.normalize("NFKD", bare).casefold() if not unicodedata.combining(sign))
     return " ".join(re.findall(r"[∆∂±]*[^\W_]+[*'’′+]*", plain))

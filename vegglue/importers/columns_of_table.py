@@ -17,9 +17,10 @@ NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
 # magnitude of the velocity, and beside the depth of the water that of a point.
 LESS_SAID = {
     "z": NAMES_OF_BED,
-    "depth": {"depth", "tiefe"},
+    "depth": {"depth", "tiefe", "profondeur", "profundidad", "diepte", "profondita", "profundidade"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
-    | {"fliessgeschwindigkeit", "average velocity", "avg velocity", "velocity mean", "velocity avg"},
+    | {"fliessgeschwindigkeit", "average velocity", "avg velocity", "velocity mean", "velocity avg", "velocidad"}
+    | {"vitesse moyenne", "velocidad media", "snelheid", "gemiddelde snelheid", "velocita", "velocita media"},
 }
 # What errors and scatters are of, and so in the unit of where they state none.
 VALUES_OF = {

@@ -12,7 +12,15 @@ from vegglue.importers.lost_places import numbers_of
 from vegglue.importers.measured_rows import Taken
 
 # Words of headings that say how high or deep: `rel. depth`, `z/h`, `Messtiefe`.
-HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "tiefe", "profondeur", "hauteur"}
+HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "tiefe", "profondeur", "hauteur"} | {
+    "profundidad",
+    "diepte",
+    "profondita",
+    "profundidade",
+    "altura",
+    "hoogte",
+    "altezza",
+}
 # Heights at one place differ by such a factor [-]; depths of the water that were read again do not.
 APART = 1.5
 
