@@ -205,5 +205,8 @@ def _starts(model: Model, noise: Noise) -> list[Point]:
     tried = [first, *in_threads(linearise_from, [(model, z, first) for z in others])]
     found = [point for point in tried if point is not None]
     if not found:
-        raise InputError(f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior.")
+        raise InputError(
+            f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior; see what "
+            "`vegglue check` says of outlet, inflow and bed, and correct the levels, discharges or priors."
+        )
     return sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]

@@ -23,6 +23,7 @@ from vegglue.checks.ensemble_and_priors import (
 )
 from vegglue.checks.stations import (
     remarks_on_absurd_values,
+    remarks_on_dry_velocities,
     remarks_on_exchanged_axes,
     remarks_on_map_places,
     remarks_on_patch_edges,
@@ -47,6 +48,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_exchanged_axes(case, observations),
         *remarks_on_map_places(case, observations),
         *remarks_on_units_of_places(case, observations),
+        *remarks_on_dry_velocities(case, site, observations),
         *remarks_on_directions(case, observations),
     ]
 

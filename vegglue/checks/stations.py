@@ -25,7 +25,18 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
     outside = (table["reason"] == OUTSIDE).to_numpy(bool)
     for experiment, rows in table[outside].groupby("experiment", sort=False):
         yield f"{_places_in_words(rows, str(experiment))} outside the grid, and not used."
-    inside = table[~outside & np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)]
+    yield from (_land_in_words(*one) for one in _on_land(case, site, table))
+
+
+def remarks_on_dry_velocities(case: Case, site: Site, observations: Observations) -> Iterator[str]:
+    """Velocities of an experiment of which most stand on land: the model has no flow to hold against them."""
+    yield from (_land_in_words(*one) for one in _on_land(case, site, observations.table) if one[-1])
+
+
+def _on_land(case: Case, site: Site, table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame, bool]]:
+    """Of each experiment the stations above the expected water, `above` [m] by how much; whether most velocities do."""
+    at_point = np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)
+    inside = table[(table["reason"] != OUTSIDE).to_numpy(bool) & at_point]
     for experiment, rows in inside.groupby("experiment", sort=False):
         now = in_experiment(site, str(experiment))
         depth = expected_depth(case, now, case.experiments[str(experiment)])
@@ -33,10 +44,14 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
                 for name, at in (("x", site.grid.x), ("y", site.grid.y)))  # fmt: skip
         dry = rows.assign(above=-depth[i, j])[(depth[i, j] <= 0) & ~(rows["depth"].to_numpy(float) > 0)]
         if len(dry):
-            yield (
-                f"{_places_in_words(dry, str(experiment))} outside the wet channel, about {dry['above'].iloc[0]:.2g} m "
-                "above the water."
-            )
+            velocities = [int(velocity_rows(one).sum()) for one in (dry, rows)]
+            yield str(experiment), dry, 2 * velocities[0] > velocities[1]
+
+
+def _land_in_words(experiment: str, dry: pd.DataFrame, most: bool) -> str:
+    above = f"outside the wet channel, about {dry['above'].iloc[0]:.2g} m above the water"
+    advice = ": most of its velocities; check their y, the bed and the outlet level" if most else ""
+    return f"{_places_in_words(dry, experiment)} {above}{advice}."
 
 
 def remarks_on_exchanged_axes(case: Case, observations: Observations) -> Iterator[str]:
