@@ -8,8 +8,6 @@ import pandas as pd
 
 from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import (
-    AmplitudeEstimate,
-    Detectability,
     Diagnosis,
     EstimatedErrors,
     FaultyInstrument,
@@ -21,11 +19,11 @@ from vegglue.results.diagnosis import (
     ParameterEstimates,
     PlaceMap,
     Predictions,
-    ScoreTest,
     Step,
     Suspect,
     Verdict,
 )
+from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest
 
 STATIONS = 6
 PARTS = ("verdict", "misfit", "errors", "first_screening", "parameters", "predictions", "place_map")

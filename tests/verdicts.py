@@ -9,7 +9,8 @@ from diagnoses import a_suspect
 
 from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.verdict import Grounds, judged
+from vegglue.diagnosis.grounds import Grounds
+from vegglue.diagnosis.verdict import judged
 from vegglue.results.diagnosis import EstimatedErrors, Misfit, Step, Suspect
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())

@@ -6,7 +6,7 @@ from verdicts import MISSES, grounds, said, step
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Undecided
-from vegglue.diagnosis.verdict import TOO_SHALLOW
+from vegglue.diagnosis.remarks import TOO_SHALLOW
 
 
 def test_a_place_wins_over_steps_and_all_are_told() -> None:

@@ -82,6 +82,9 @@ def _percent(chance: float) -> str:
     return "over 99%" if chance > 0.99 else f"{chance:.0%}"
 
 
+TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
+
+
 def law_in_words(laws: LawsSuspected) -> str:
     """Which quantity in which term, and how likely."""
     best, chance = laws.laws[0], sum(one.chance for one in laws.alike)

@@ -11,13 +11,14 @@ from vegglue.case.case_effects import parameters_of_effects
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.grounds import POOR, Grounds
 from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded, suspects_of
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
 from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
-from vegglue.diagnosis.verdict import POOR, Grounds, judged
+from vegglue.diagnosis.verdict import judged
 from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import velocity_rows

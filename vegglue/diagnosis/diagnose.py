@@ -222,7 +222,7 @@ def _with_accepted(
     step = step_found(screening, contenders, j, further, found.p)
     if found.accepted and len(step.groups) > MOST_GROUPS:
         return None
-    further, unneeded = pruned(further, [one.accepted for one in found.steps], watch)
+    further, unneeded = pruned(further, found.effects, watch)
     return Following("effect", _with_step(found, step, unneeded, before - further.fitted.chi2, log_prior), further)
 
 

@@ -61,6 +61,11 @@ class Findings:
         return after - before + self.log_prior + self.of_shape
 
     @property
+    def effects(self) -> list[str]:
+        """Names of the effects that were accepted."""
+        return [step.accepted for step in self.steps]
+
+    @property
     def accepted(self) -> int:
-        """Effects and places."""
+        """How many effects and places."""
         return len(self.steps) + len(self.places)

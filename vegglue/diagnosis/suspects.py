@@ -4,7 +4,7 @@ import numpy as np
 
 from vegglue.calibration.fit import objective
 from vegglue.normal_range import NORMAL95
-from vegglue.results.diagnosis import AmplitudeEstimate, Detectability, ScoreTest, Suspect
+from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 from vegglue.screening import score_test
 from vegglue.screening.evidence import prior_shrinkage
 from vegglue.screening.residual_screening import Screening

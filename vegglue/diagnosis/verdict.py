@@ -1,59 +1,38 @@
-"""What was found, in words: one verdict in one sentence, remarks, and where the model misses.
+"""What was found: one verdict in one sentence.
 
 Silence has to be earned, and so has a name: see DECISIONS.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vegglue.case.parameter_space import FURTHEST
 from vegglue.diagnosis.causes_in_words import (
+    TO_DISCOVER,
     causes_in_words,
     field_sentence,
     instruments_in_words,
     law_in_words,
-    model_error_in_words,
     undecided_in_words,
     with_their_chances,
 )
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.grounds import POOR, Grounds, is_clear
+from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
-from vegglue.normal_range import NORMAL95
-from vegglue.results.causes import FaultyInstrument, LawsSuspected
-from vegglue.results.diagnosis import (
-    NOTHING_ELSE,
-    EstimatedErrors,
-    FieldFound,
-    Misfit,
-    ModelErrorUsed,
-    Step,
-    Suspect,
-    Verdict,
-    VerdictKind,
-)
-from vegglue.screening.places import LEAST_DEPTH
+from vegglue.results.causes import LawsSuspected
+from vegglue.results.diagnosis import NOTHING_ELSE, Suspect, Verdict, VerdictKind
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
-# Chance of the last misfit under errors alone, below which something is still missing.
-POOR = 1e-3
 # Share of the effects that must be testable before it is said that nothing is missing.
 TESTABLE_SHARE = 0.25
-# Amplitude over a plausible one, above which it is said to be too large to be believed.
-IMPLAUSIBLE = 3.0
-# Names that a remark holds at most.
-NAMES_SHOWN = 8
 # Scale and correlation of the errors above which they, and not the model, would explain the misfit: nothing is then
 # said to be missing or not. Stated errors are good to a quarter; probes side by side that err alike by more than 0.8
 # are a model that errs. Chosen, not measured.
 LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
 # Errors at what was not seen, over those expected, above which the model disagrees. Chosen, not measured.
 UNSEEN_RATIO = 1.3
-# Standard errors that an instrument is to be off before it is a verdict. Chosen after seven false alarms of 3.1 to 3.6,
-# one of them on a perfect site: what two codes differ by looks like a probe or a gauge that is a little off.
-CLEARLY_OFF = 4.5
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
 ABSURD = 4.0
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
@@ -62,56 +41,14 @@ FAR_OFF = 4.0
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = 0.01
 NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad probe does not explain"
-TOO_SHALLOW = (
-    "Nothing was looked for at a place, and no law was tried: nowhere is the water deeper than "
-    f"{100 * LEAST_DEPTH:g} cm."
-)
-TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
-
-
-@dataclass(frozen=True)
-class Grounds:
-    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; by_chance:
-    what of that errors alone exceed in 5 % of cases; neighbours: whether readings side by side were set aside;
-    strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
-    measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
-    channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
-    something at a place.
-    """
-
-    errors: EstimatedErrors
-    misfit: Misfit
-    findings: Findings
-    field: FieldFound | None
-    model_error: ModelErrorUsed | None
-    not_excluded: tuple[tuple[str, ...], ...]
-    unseen: float
-    neighbours: bool
-    strained: tuple[str, float]
-    between: float = 1.0
-    by_chance: float = 1.0
-    laws: LawsSuspected | None = None
-    stretch: str = ""
-    places_searched: bool = True
 
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     """The verdict, its sentence, and what else should be known."""
-    found, misfit = grounds.findings, grounds.misfit
-    open_still = _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     kind, sentence = _sentence(grounds, suspects)
-    law = grounds.laws is not None and law_in_words(grounds.laws) in sentence
-    remarks = [*_implausible(found.steps, suspects), *open_still, *_remarks(grounds, suspects, sentence)]
-    if grounds.stretch:
-        remarks.append(grounds.stretch)
-    if not grounds.places_searched:
-        remarks.append(TOO_SHALLOW)
-    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
-        remarks.append(
-            f"The misfit that is left is still larger than the errors allow ({_told(misfit)}, p = {misfit.p:.1g})."
-        )
-    location = found.places[0] if found.places else None
-    return Verdict(kind, sentence, tuple(remarks), location, grounds.not_excluded)
+    places = grounds.findings.places
+    remarks = remarks_of(grounds, suspects, kind, sentence)
+    return Verdict(kind, sentence, tuple(remarks), places[0] if places else None, grounds.not_excluded)
 
 
 def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
@@ -125,12 +62,12 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         return _with_a_law(grounds.laws, grounds, doubt)
     if grounds.field is not None:
         words = field_sentence(grounds.field) + (f", rather than {named}" if named else "")
-        return "none-of-these", f"None of the known effects: {words} ({_told(misfit)} without it)."
+        return "none-of-these", f"None of the known effects: {words} ({misfit.told} without it)."
     if found.places or found.steps:
         if doubt:
             return "cannot-tell", f"These data cannot tell: {doubt}. What explains most of the misfit: {named}."
         if found.places:
-            return "none-of-these", f"None of the known effects: {named}; {_told(misfit)} with it."
+            return "none-of-these", f"None of the known effects: {named}; {misfit.told} with it."
         if len(found.steps[0].groups) > MOST_GROUPS:
             names = ", ".join(with_their_chances(found.steps[0], found.steps[0].rivals))
             which = f"which of {names} it is (chances among those calibrated)"
@@ -138,10 +75,13 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
         also = f" {instruments_in_words(found.instruments)}" if found.instruments else ""
         which = found.steps[-1].accepted if any(step.likelier_place for step in found.steps) else "it"
-        return ("identified" if single else "one-of"), f"Missing: {named}; {_told(misfit)} with {which}.{also}"
+        return ("identified" if single else "one-of"), f"Missing: {named}; {misfit.told} with {which}.{also}"
     if found.undecided:
         names = undecided_in_words(found.undecided)
-        return "cannot-tell", f"These data cannot tell: it may be {names}, but none of them surely ({_told(misfit)})."
+        return (
+            "cannot-tell",
+            f"These data cannot tell: it may be {names}, but none of them surely ({misfit.told}).",
+        )
     return _without_findings(grounds, suspects)
 
 
@@ -149,7 +89,7 @@ def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[Verd
     """A law where no known effect explains the misfit; an instrument that is clearly off goes before one that is not
     likelier than all else, but for readings side by side.
     """
-    law = f"{law_in_words(laws)} ({_told(grounds.misfit)} without it)"
+    law = f"{law_in_words(laws)} ({grounds.misfit.told} without it)"
     if grounds.neighbours and not is_likelier(laws):
         doubt = doubt or NEIGHBOURS_ASIDE
     if doubt:
@@ -157,7 +97,7 @@ def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[Verd
     if is_likelier(laws):
         return "none-of-these", f"None of the known effects: {law}. {TO_DISCOVER}"
     instruments = grounds.findings.instruments
-    if instruments and all(_is_clear(one) for one in instruments):
+    if instruments and all(is_clear(one) for one in instruments):
         off = instruments_in_words(instruments)
         return "instrument", f"{off} These data cannot tell whether anything else is missing: {law}. {TO_DISCOVER}"
     return "cannot-tell", f"These data cannot tell whether anything is missing: {law}. {TO_DISCOVER}"
@@ -170,18 +110,14 @@ def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
     if ratio > ABSURD:
         return (
             f"with all that was found the model still misses by {np.sqrt(ratio):.1f} times the errors that are allowed "
-            f"for ({_told(misfit)}); check units, datum, bed and boundaries first"
+            f"for ({misfit.told}); check units, datum, bed and boundaries first"
         )
     if far > FAR_OFF:
         return f"{parameter} would have to lie {far:.1f} standard deviations from the middle of its prior"
-    at_bound = [one.name for one in suspects if one.name in _accepted(grounds.findings) and _is_at_bound(one)]
+    at_bound = [one.name for one in suspects if one.name in grounds.findings.effects and _is_at_bound(one)]
     if at_bound:
         return f"{' and '.join(at_bound)} would have to be as large as can be, and stands in for something else"
     return ""
-
-
-def _accepted(found: Findings) -> list[str]:
-    return [step.accepted for step in found.steps]
 
 
 def _is_at_bound(suspect: Suspect) -> bool:
@@ -194,35 +130,30 @@ def _is_at_bound(suspect: Suspect) -> bool:
     return amplitude.relative_size > FURTHEST - AT_BOUND or any(abs(amplitude.value - end) < margin for end in ends)
 
 
-def _told(misfit: Misfit) -> str:
-    return f"chi2 is {misfit.chi2:.0f} {misfit.of_freedom}"
-
-
 def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
     misfit = grounds.misfit
     testable = [suspect for suspect in suspects if suspect.detectability.testable]
     if misfit.p < POOR:
         return (
             "cannot-tell",
-            f"The misfit is larger than the errors allow ({_told(misfit)}), but no known effect and no place stands "
-            "out.",
+            f"The misfit is larger than the errors allow ({misfit.told}), but no known effect and no place stands out.",
         )
     unearned = _unearned(grounds)
     if unearned:
-        return "cannot-tell", _nothing_further(grounds, unearned)
+        return "cannot-tell", f"Nothing stands out ({misfit.told}), but {unearned}."
     if grounds.between > UNSEEN_RATIO:
         return _unsure_between(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
         return (
             "cannot-tell",
-            f"Nothing stands out ({_told(misfit)}), but only {len(testable)} of {len(suspects)} effects would be seen "
+            f"Nothing stands out ({misfit.told}), but only {len(testable)} of {len(suspects)} effects would be seen "
             "in these data if they were there at twice a plausible size.",
         )
     nothing = (
-        f"{_told(misfit)}, and none of {len(suspects)} effects stands out ({len(testable)} of them would be seen at "
+        f"{misfit.told}, and none of {len(suspects)} effects stands out ({len(testable)} of them would be seen at "
         "twice a plausible size)."
     )
-    clear = [one for one in grounds.findings.instruments if _is_clear(one)]
+    clear = [one for one in grounds.findings.instruments if is_clear(one)]
     if clear:
         return "instrument", f"{instruments_in_words(clear)} {NOTHING_ELSE}: {nothing}"
     return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
@@ -230,39 +161,15 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
 
 def _unsure_between(grounds: Grounds) -> tuple[VerdictKind, str]:
     """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
+    instruments = grounds.findings.instruments
     unsure = (
         "where nobody measured, halfway between the sections, the model may miss by as much as "
         f"{grounds.between:.1f} times the errors of the data, by its own errors, those of its site and its parameters, "
         "as far as these data know them: a missing effect may hide in that"
     )
-    return ("instrument" if _all_clear(grounds) else "cannot-tell"), _nothing_further(grounds, unsure)
-
-
-def _nothing_further(grounds: Grounds, doubt: str) -> str:
-    """Instruments that are clearly off, or nothing, and why it cannot be said that nothing else is missing."""
-    if not _all_clear(grounds):
-        return f"Nothing stands out ({_told(grounds.misfit)}), but {doubt}."
-    off = instruments_in_words(grounds.findings.instruments)
-    return f"{off} Nothing else stands out ({_told(grounds.misfit)}), but {doubt}."
-
-
-def _all_clear(grounds: Grounds) -> bool:
-    """Whether there are instruments that are off, and all of them clearly; readings side by side are none."""
-    instruments = grounds.findings.instruments
-    return bool(instruments) and not grounds.neighbours and all(_is_clear(one) for one in instruments)
-
-
-def _is_clear(instrument: FaultyInstrument) -> bool:
-    """Whether an instrument is off by CLEARLY_OFF of its standard errors."""
-    low, high = instrument.interval95
-    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / (2.0 * NORMAL95)
-
-
-def _told_of(instrument: FaultyInstrument) -> str:
-    """What a remark says of an instrument that was set aside."""
-    words = instruments_in_words((instrument,))
-    faint = f" It is off by less than {CLEARLY_OFF} standard errors, which chance or the model may make."
-    return words if _is_clear(instrument) else f"{words}{faint}"
+    if instruments and all(is_clear(one) for one in instruments):
+        return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {unsure}."
+    return "cannot-tell", f"Nothing stands out ({grounds.misfit.told}), but {unsure}."
 
 
 def _unearned(grounds: Grounds) -> str:
@@ -288,50 +195,3 @@ def _unearned(grounds: Grounds) -> str:
     if grounds.unseen > max(UNSEEN_RATIO, grounds.by_chance):
         return f"measurements that were not calibrated to are missed by {grounds.unseen:.1f} times what is expected"
     return ""
-
-
-def _remarks(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> list[str]:
-    errors, remarks = grounds.errors, []
-    if grounds.model_error is not None:
-        remarks.append(model_error_in_words(grounds.model_error))
-    if grounds.laws is not None and (law := law_in_words(grounds.laws)) not in sentence:
-        rather = f", rather than {' and '.join(_accepted(grounds.findings))}" if grounds.findings.steps else ""
-        remarks.append(f"To first order {law}{rather}. {TO_DISCOVER}")
-    if errors.correlation > 0:
-        remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
-    if errors.scale > 1:
-        remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
-    remarks += [words for one in grounds.findings.instruments if (words := _told_of(one)) not in sentence]
-    told = {name for group in grounds.not_excluded for name in group} | {*_accepted(grounds.findings)}
-    hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
-    if hidden:
-        names = ", ".join(_untestable(suspect) for suspect in hidden)
-        also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
-        remarks.append(f"Untestable with these data{also}, neither present nor absent: {names}.")
-    return remarks
-
-
-def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
-    names = [name for group in groups for name in group]
-    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    one = "one more effect hide beside it" if something_named else "exactly one effect hide here"
-    said = (
-        f"Should {one}, of two to four standard errors, it is most likely one of these, "
-        f"the likeliest first: {', '.join(names[:NAMES_SHOWN])}{more}; what is smaller may be any."
-    )
-    return [said] if names else []
-
-
-def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str]:
-    by_name = {suspect.name: suspect for suspect in suspects}
-    far = [one for step in steps if (one := by_name[step.accepted]).amplitude.relative_size > IMPLAUSIBLE]
-    return [
-        f"{one.name} is {one.amplitude.relative_size:.1f} times what is plausible for it: it may stand in for "
-        "something that is not in the library."
-        for one in far
-    ]
-
-
-def _untestable(suspect: Suspect) -> str:
-    alike = suspect.detectability.looks_like
-    return f"{suspect.name} (looks like a change of {alike})" if alike else suspect.name

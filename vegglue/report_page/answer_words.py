@@ -20,9 +20,10 @@ from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verd
 from vegglue.report_page.page_file import set_as_code
 from vegglue.report_page.posterior_words import UNBELIEVED
 from vegglue.report_page.run import Run
-from vegglue.results.diagnosis import AmplitudeEstimate, Diagnosis, Step
+from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.results.suspect import AmplitudeEstimate
 from vegglue.solver.status import FAILED, members_with
 
 # Rivals that the headline names, the likeliest: more are in the table.

@@ -1,6 +1,6 @@
 """What a diagnosis says, as values: the verdict, the effects that explain the misfit, where it lies, and all numbers.
 
-What is no effect of the library stands in causes.py.
+What is no effect of the library stands in causes.py, one effect of it in suspect.py.
 How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
 """
 
@@ -22,83 +22,12 @@ from vegglue.results.causes import (
     ModelErrorUsed,
     PlaceMap,
 )
+from vegglue.results.suspect import Suspect
 
 # How the sentence of an instrument goes on where the rest of the model is cleared.
 NOTHING_ELSE = "Nothing else is missing"
-# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
-# its trace (cos^2 = 0.64).
-LOOKS_LIKE_FROM = 0.8
 # instrument: some readings are off. Whether more is missing the sentence says, see `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
-
-
-@dataclass(frozen=True)
-class AmplitudeEstimate:
-    """How large an effect is, in the unit of its amplitude.
-
-    value, interval95: from its own refit when there was one (refitted), else to first order, its prior taken into
-    account in both. off, scale: where the amplitude does nothing, and how far from there is plausible; support: within
-    which it must lie. objective: the least sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where
-    it was not refitted.
-    """
-
-    value: float
-    interval95: tuple[float, float]
-    unit: str
-    off: float
-    scale: float
-    refitted: bool
-    objective: float
-    support: tuple[float, float] = (-np.inf, np.inf)
-
-    @property
-    def relative_size(self) -> float:
-        """|value - off| / scale [-]."""
-        return abs(self.value - self.off) / self.scale
-
-
-@dataclass(frozen=True)
-class ScoreTest:
-    """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
-
-    p_family: counted among bootstrap draws, never below one over their number; see `screening/family_wise_p`.
-    """
-
-    score: float
-    p_family: float
-
-
-@dataclass(frozen=True)
-class Detectability:
-    """Whether these data could show an effect.
-
-    visibility: share of its fingerprint that calibration cannot mimic [-]. smallest: distance of the amplitude from off
-    that is detected 19 times of 20; testable: that is less than twice a plausible one, and within its support.
-    confounder: the parameter whose slope is most like the fingerprint; cosine: between both [-].
-    """
-
-    visibility: float
-    smallest: float
-    testable: bool
-    confounder: str
-    cosine: float
-
-    @property
-    def looks_like(self) -> str:
-        """The parameter that a trace looks like a change of; '' where none is so like it."""
-        return self.confounder if abs(self.cosine) > LOOKS_LIKE_FROM else ""
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """One effect as the data see it, in the last model in which it was tested; shapes: at which it scores best."""
-
-    name: str
-    title: str
-    shapes: dict[str, float]
-    amplitude: AmplitudeEstimate
-    test: ScoreTest
-    detectability: Detectability
 
 
 @dataclass(frozen=True)
@@ -177,6 +106,11 @@ class Misfit:
         """Its degrees of freedom, in words."""
         degrees = f"for {so_many(self.freedom, 'degree')} of freedom"
         return degrees if self.freedom > 0 else "with no more readings than parameters"
+
+    @property
+    def told(self) -> str:
+        """`chi2 is 234 for 244 degrees of freedom`."""
+        return f"chi2 is {self.chi2:.0f} {self.of_freedom}"
 
 
 @dataclass(frozen=True)

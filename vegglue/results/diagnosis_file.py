@@ -14,8 +14,6 @@ from pydantic import TypeAdapter
 
 from vegglue.results.causes import UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
-    AmplitudeEstimate,
-    Detectability,
     Diagnosis,
     EstimatedErrors,
     FaultyInstrument,
@@ -28,9 +26,7 @@ from vegglue.results.diagnosis import (
     ParameterEstimates,
     PlaceMap,
     Predictions,
-    ScoreTest,
     Step,
-    Suspect,
     Verdict,
     VerdictKind,
 )
@@ -38,6 +34,7 @@ from vegglue.results.diagnosis_json import flat_suspect
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, table_group
+from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")

@@ -1,0 +1,46 @@
+"""What a verdict rests on, and what is asked of it by its sentence and by its remarks."""
+
+from dataclasses import dataclass
+
+from vegglue.diagnosis.findings import Findings
+from vegglue.normal_range import NORMAL95
+from vegglue.results.causes import FaultyInstrument, LawsSuspected
+from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed
+
+# Chance of the last misfit under errors alone, below which something is still missing.
+POOR = 1e-3
+# Standard errors that an instrument is to be off before it is a verdict. Chosen after seven false alarms of 3.1 to 3.6,
+# one of them on a perfect site: what two codes differ by looks like a probe or a gauge that is a little off.
+CLEARLY_OFF = 4.5
+
+
+@dataclass(frozen=True)
+class Grounds:
+    """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; by_chance:
+    what of that errors alone exceed in 5 % of cases; neighbours: whether readings side by side were set aside;
+    strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
+    measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
+    channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
+    something at a place.
+    """
+
+    errors: EstimatedErrors
+    misfit: Misfit
+    findings: Findings
+    field: FieldFound | None
+    model_error: ModelErrorUsed | None
+    not_excluded: tuple[tuple[str, ...], ...]
+    unseen: float
+    neighbours: bool
+    strained: tuple[str, float]
+    between: float = 1.0
+    by_chance: float = 1.0
+    laws: LawsSuspected | None = None
+    stretch: str = ""
+    places_searched: bool = True
+
+
+def is_clear(instrument: FaultyInstrument) -> bool:
+    """Whether an instrument is off by CLEARLY_OFF of its standard errors."""
+    low, high = instrument.interval95
+    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / (2.0 * NORMAL95)

@@ -1,0 +1,89 @@
+"""What else should be known beside the sentence of a verdict."""
+
+from collections.abc import Sequence
+
+from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
+from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, is_clear
+from vegglue.results.causes import FaultyInstrument
+from vegglue.results.diagnosis import Step, Suspect, VerdictKind
+from vegglue.screening.places import LEAST_DEPTH
+
+# Amplitude over a plausible one, above which it is said to be too large to be believed.
+IMPLAUSIBLE = 3.0
+# Names that a remark holds at most.
+NAMES_SHOWN = 8
+TOO_SHALLOW = (
+    "Nothing was looked for at a place, and no law was tried: nowhere is the water deeper than "
+    f"{100 * LEAST_DEPTH:g} cm."
+)
+
+
+def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], kind: VerdictKind, sentence: str) -> list[str]:
+    """All of them, those on what is named first; kind, sentence: of the verdict."""
+    found, misfit = grounds.findings, grounds.misfit
+    remarks = _implausible(found.steps, suspects)
+    remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
+    remarks += _besides(grounds, suspects, sentence)
+    remarks += [grounds.stretch] if grounds.stretch else []
+    remarks += [] if grounds.places_searched else [TOO_SHALLOW]
+    law = grounds.laws is not None and law_in_words(grounds.laws) in sentence
+    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
+        remarks.append(
+            f"The misfit that is left is still larger than the errors allow ({misfit.told}, p = {misfit.p:.1g})."
+        )
+    return remarks
+
+
+def _besides(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> list[str]:
+    """What else was taken into account, set aside, or cannot be tested, as far as the sentence does not say it."""
+    errors, effects, remarks = grounds.errors, grounds.findings.effects, []
+    if grounds.model_error is not None:
+        remarks.append(model_error_in_words(grounds.model_error))
+    if grounds.laws is not None and (law := law_in_words(grounds.laws)) not in sentence:
+        rather = f", rather than {' and '.join(effects)}" if effects else ""
+        remarks.append(f"To first order {law}{rather}. {TO_DISCOVER}")
+    if errors.correlation > 0:
+        remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
+    if errors.scale > 1:
+        remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
+    remarks += [words for one in grounds.findings.instruments if (words := _told_of(one)) not in sentence]
+    told = {name for group in grounds.not_excluded for name in group} | {*effects}
+    hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
+    if hidden:
+        names = ", ".join(_untestable(suspect) for suspect in hidden)
+        also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
+        remarks.append(f"Untestable with these data{also}, neither present nor absent: {names}.")
+    return remarks
+
+
+def _told_of(instrument: FaultyInstrument) -> str:
+    """What a remark says of an instrument that was set aside."""
+    words = instruments_in_words((instrument,))
+    faint = f" It is off by less than {CLEARLY_OFF} standard errors, which chance or the model may make."
+    return words if is_clear(instrument) else f"{words}{faint}"
+
+
+def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
+    names = [name for group in groups for name in group]
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    one = "one more effect hide beside it" if something_named else "exactly one effect hide here"
+    said = (
+        f"Should {one}, of two to four standard errors, it is most likely one of these, "
+        f"the likeliest first: {', '.join(names[:NAMES_SHOWN])}{more}; what is smaller may be any."
+    )
+    return [said] if names else []
+
+
+def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str]:
+    by_name = {suspect.name: suspect for suspect in suspects}
+    far = [one for step in steps if (one := by_name[step.accepted]).amplitude.relative_size > IMPLAUSIBLE]
+    return [
+        f"{one.name} is {one.amplitude.relative_size:.1f} times what is plausible for it: it may stand in for "
+        "something that is not in the library."
+        for one in far
+    ]
+
+
+def _untestable(suspect: Suspect) -> str:
+    alike = suspect.detectability.looks_like
+    return f"{suspect.name} (looks like a change of {alike})" if alike else suspect.name
