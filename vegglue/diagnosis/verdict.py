@@ -140,7 +140,7 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
         )
     unearned = _unearned(grounds)
     if unearned:
-        return "cannot-tell", f"Nothing stands out ({misfit.told}), but {unearned}."
+        return "cannot-tell", _nothing_further(grounds, unearned)
     if grounds.between > UNSEEN_RATIO:
         return _unsure_between(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
@@ -161,15 +161,26 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[Ve
 
 def _unsure_between(grounds: Grounds) -> tuple[VerdictKind, str]:
     """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
-    instruments = grounds.findings.instruments
     unsure = (
         "where nobody measured, halfway between the sections, the model may miss by as much as "
         f"{grounds.between:.1f} times the errors of the data, by its own errors, those of its site and its parameters, "
         "as far as these data know them: a missing effect may hide in that"
     )
-    if instruments and all(is_clear(one) for one in instruments):
-        return "instrument", f"{instruments_in_words(instruments)} Nothing else stands out, but {unsure}."
-    return "cannot-tell", f"Nothing stands out ({grounds.misfit.told}), but {unsure}."
+    return ("instrument" if _all_clear(grounds) else "cannot-tell"), _nothing_further(grounds, unsure)
+
+
+def _nothing_further(grounds: Grounds, doubt: str) -> str:
+    """Instruments that are clearly off, or nothing, and why it cannot be said that nothing else is missing."""
+    if not _all_clear(grounds):
+        return f"Nothing stands out ({grounds.misfit.told}), but {doubt}."
+    off = instruments_in_words(grounds.findings.instruments)
+    return f"{off} Nothing else stands out ({grounds.misfit.told}), but {doubt}."
+
+
+def _all_clear(grounds: Grounds) -> bool:
+    """Whether there are instruments that are off, and all of them clearly; readings side by side are none."""
+    instruments = grounds.findings.instruments
+    return bool(instruments) and not grounds.neighbours and all(is_clear(one) for one in instruments)
 
 
 def _unearned(grounds: Grounds) -> str:
