@@ -1,8 +1,10 @@
-"""Compiled loops of the shallow-water residual; the innermost axis of every array is the member (a SIMD lane).
+"""Compiled loops of the shallow-water residual; the innermost axis of every array is the member.
 
 Staggered grid of nx x ny cells: level at cell centres, u on west-east faces, v on south-north faces. Shapes, with m
 members: cells (nx, ny, m), west-east faces (nx + 1, ny, m), south-north faces (nx, ny + 1, m), corners (nx + 1, ny +
 1, m). `bend` is None on a straight grid, for which each loop is compiled of its own, without a trace of bends.
+
+Within, rows and members of a column are one axis, (nx, ny m) for cells, see `columns`.
 """
 
 import math
@@ -10,6 +12,23 @@ import math
 import numpy as np
 
 from vegglue.compilation import compiled
+from vegglue.flow.columns import (
+    beside_x,
+    beside_y,
+    beyond_outlet,
+    carrying,
+    end_of_rows,
+    flat,
+    level_drop,
+    rows_around,
+    shear_at_corners,
+    south_of,
+    straight_on,
+    strain_along,
+    upwind,
+    upwind_downstream,
+    with_rows_beyond,
+)
 from vegglue.flow.stretch import at_cell, at_face, columns_of
 from vegglue.flow.wet_and_dry import afloat, depths
 from vegglue.resistance.physical_constants import GRAVITY
@@ -23,130 +42,40 @@ STRIP, HALO = 40, 3
 
 
 @compiled
-def _upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
-    """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
-    from_left = left + (right - left) / 3.0 + (left - far_left) / 6.0
-    from_right = right + (left - right) / 3.0 + (right - far_right) / 6.0
-    return from_left if flux > 0.0 else from_right
-
-
-@compiled
-def _upwind_downstream(flux: float, far_left: float, left: float, right: float) -> float:
-    """The same where the flux runs downstream; first order against it, so that the Jacobian's blocks stay narrow."""
-    return left + (right - left) / 3.0 + (left - far_left) / 6.0 if flux > 0.0 else right
-
-
-@compiled
-def _straight_on(out, last, before_it):
-    """Values (rows, m) one cell beyond the last: second order where a further neighbour is missing."""
-    rows, m = out.shape
-    for j in range(rows):
-        for k in range(m):
-            out[j, k] = 2.0 * last[j, k] - before_it[j, k]
-
-
-@compiled
-def _beyond_outlet(out, last, before_it, carrier):
-    """Values (rows, m) one cell beyond the outlet: straight on where water leaves; where it enters, as in the last.
-
-    Straight on, water that enters would be carried from upstream, and whatever disturbs it would grow by |c| / dx.
-    """
-    rows, m = out.shape
-    for j in range(rows):
-        for k in range(m):
-            out[j, k] = 2.0 * last[j, k] - before_it[j, k] if carrier[j, k] > 0.0 else last[j, k]
-
-
-@compiled
-def _carrier(out, flux, depth, other_flux, other_depth):
-    """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
-    rows, m = out.shape
-    for j in range(rows):
-        for k in range(m):
-            out[j, k] = (flux[j, k] + other_flux[j, k]) / (depth[j, k] + other_depth[j, k])
-
-
-@compiled
-def _shear(out, f, u, v, viscosity, corner, per_x, per_y, bend):
-    """h nu (du/dy + dv/dx) [m3/s2] at the corners (ny + 1, m) of west-east faces f; none at walls and ends."""
-    nx, ny, m = viscosity.shape
-    a, b = max(f - 1, 0), min(f, nx - 1)
-    out[0], out[ny] = 0.0, 0.0
-    for j in range(1, ny):
-        stretch = at_face(bend, f, j)
-        for k in range(m):
-            nu = 0.25 * (viscosity[a, j, k] + viscosity[b, j, k] + viscosity[a, j - 1, k] + viscosity[b, j - 1, k])
-            turn = (u[f, j, k] - u[f, j - 1, k]) * per_y + (v[b, j, k] - v[a, j, k]) * (per_x / stretch)
-            if bend is not None:
-                turn += 0.5 * (u[f, j, k] + u[f, j - 1, k]) * bend.at_faces[f] / stretch
-            out[j, k] = nu * corner[f, j, k] * turn
-
-
-@compiled
-def _strain_along(out, f, u, v, viscosity, cell, per_x, bend):
-    """2 h nu du/dx [m3/s2] of the cells (ny, m) of column f; none beyond the outlet."""
-    nx, ny, m = cell.shape
-    for j in range(ny):
-        stretch = at_cell(bend, min(f, nx - 1), j + 0.5)
-        for k in range(m):
-            stress = viscosity[f, j, k] * cell[f, j, k] * (u[f + 1, j, k] - u[f, j, k]) if f < nx else 0.0
-            out[j, k] = 2.0 * stress * (per_x / stretch)
-            if bend is not None and f < nx:
-                turned = 0.5 * (v[f, j, k] + v[f, j + 1, k]) * bend.at_cells[f] / stretch
-                out[j, k] -= 2.0 * viscosity[f, j, k] * cell[f, j, k] * turned
-
-
-@compiled
-def _beside_x(bend, f, j, per_x):
-    """1 / (J dx) [1/m] of west-east face f in row j, and (J / that J)^2 at its south and its north end [-]."""
-    stretch = at_face(bend, f, j + 0.5)
-    lift_s, lift_n = at_face(bend, f, j) / stretch, at_face(bend, f, j + 1) / stretch
-    return per_x / stretch, lift_s * lift_s, lift_n * lift_n
-
-
-@compiled
-def _beside_y(bend, i, j, per_x):
-    """1 / (J dx) [1/m] of the south face of a cell, and J / that J in the cells south and north of it [-]."""
-    stretch = at_cell(bend, i, j)
-    return per_x / stretch, at_cell(bend, i, j - 0.5) / stretch, at_cell(bend, i, j + 0.5) / stretch
-
-
-@compiled
 def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
-    """u [m/s] two faces and one west of face f and one east of it, (ny, m) each; where a side is nearer, into
-    what is given.
+    """u [m/s] two faces and one west of face f and one east of it, (ny m,) each; where a side is nearer, into what is
+    given.
 
     On the west side the depth is not known, so that the first cell counts by the velocity in its middle: by its flux
     over its depth, at least half of that of its face.
     """
-    nx, rows, m = cell.shape
+    nx, n = cell.shape
     if f == nx:
-        _beyond_outlet(east, u[nx], u[nx - 1], carrier)
+        beyond_outlet(east, u[nx], u[nx - 1], carrier)
     if f == 1:
-        for j in range(rows):
-            for k in range(m):
-                # At a waterline no water is as fast as the flux over the depth of a cell far thinner than its face.
-                thick = max(cell[0, j, k], 0.5 * face[1, j, k])
-                near[j, k] = (flux[0, j, k] + flux[1, j, k]) / thick - u[1, j, k]
+        for t in range(n):
+            # At a waterline no water is as fast as the flux over the depth of a cell far thinner than its face.
+            thick = max(cell[0, t], 0.5 * face[1, t])
+            near[t] = (flux[0, t] + flux[1, t]) / thick - u[1, t]
     west = u[f - 1] if f > 1 else near
     if f <= 2:
-        _straight_on(far, west, u[f])
+        straight_on(far, west, u[f])
     return u[f - 2] if f > 2 else far, west, u[f + 1] if f < nx else east
 
 
 @compiled
-def _neighbours_of_v(far, near, east, i, v, carrier):
-    """v [m/s] two columns and one west of column i and one east of it, (ny + 1, m) each; where a side is nearer, into
+def _neighbours_of_v(far, near, east, m, i, v, carrier):
+    """v [m/s] two columns and one west of column i and one east of it, ((ny + 1) m,) each; where a side is nearer, into
     what is given.
 
     Water enters through the west side with no velocity across: beyond it v has the other sign.
     """
     last = v.shape[0] - 1
     if i == last:
-        _beyond_outlet(east[1:-1], v[i, 1:-1], v[max(i - 1, 0), 1:-1], carrier)
+        beyond_outlet(east[m:-m], v[i, m:-m], v[max(i - 1, 0), m:-m], carrier)
     if i == 0:
         near[:] = -v[0]
-        _straight_on(far, near, v[0])
+        straight_on(far, near, v[0])
     if i == 1:
         far[:] = -v[0]
     return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
@@ -157,110 +86,161 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
-    nx, ny, m = level.shape
-    west, east, before, behind = np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m)), np.empty((ny, m))
-    side, shear, ends = np.empty((ny + 1, m)), np.empty((ny + 1, m)), np.empty((3, ny, m))
-    _carrier(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
-    _strain_along(behind, first, u, v, viscosity, cell, per_x, bend)
+    (nx, n), ny, m = level.shape, outlet.size, outlet_level.size
+    west, east, before, behind, drop = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    side, shear, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 4 * m)
+    ends, lengths = np.empty((3, n)), np.empty((3, n))
+    beside_x(lengths, bend, first + 1, m, per_x)
+    carrying(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
+    strain_along(behind, m, first, u, v, viscosity, cell, per_x, bend)
     for f in range(first + 1, stop + 1):
         a, b, f2 = f - 1, min(f, nx - 1), min(f + 1, nx)
         west, east, before, behind = east, west, behind, before
-        _carrier(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
-        u1, u2, u3 = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, face_x, cell)
-        _strain_along(behind, f, u, v, viscosity, cell, per_x, bend)
-        _carrier(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
-        _shear(shear, f, u, v, viscosity, corner, per_x, per_y, bend)
-        for j in range(ny):
-            if f == nx and not outlet[j]:
-                out[offset + a - first, 2, j] = u[f, j]
-                continue
-            j1, j2, j3, j4 = max(j - 2, 0), max(j - 1, 0), min(j + 1, ny - 1), min(j + 2, ny - 1)
-            per_length, lift_s, lift_n = _beside_x(bend, f, j, per_x)
-            for k in range(m):
-                here = u[f, j, k]
-                c_w, c_e, c_s, c_n = west[j, k], east[j, k], side[j, k], side[j + 1, k]
-                u_w = _upwind_downstream(c_w, u1[j, k], u2[j, k], here)
-                u_e = _upwind_downstream(c_e, u2[j, k], here, u3[j, k])
-                u_s = _upwind(c_s, u[f, j1, k], u[f, j2, k], here, u[f, j3, k])
-                u_n = _upwind(c_n, u[f, j2, k], here, u[f, j3, k], u[f, j4, k])
-                carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_length + (
-                    c_n * (u_n - here) - c_s * (u_s - here)
-                ) * per_y
-                mixed = (behind[j, k] - before[j, k]) * per_length + (
-                    lift_n * shear[j + 1, k] - lift_s * shear[j, k]
-                ) * per_y
-                across = 0.25 * (v[a, j, k] + v[a, j + 1, k] + v[b, j, k] + v[b, j + 1, k])
-                if bend is not None:
-                    carried -= bend.at_faces[f] * dx * per_length * here * across
-                speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
-                stress = drag[a, j, k] * cell[a, j, k] + drag[b, j, k] * cell[b, j, k]
-                drop = level[b, j, k] - level[a, j, k] if f < nx else 2.0 * (outlet_level[k] - level[a, j, k])
-                moved = carried * afloat(face_x[f, j, k], half_per_film)
-                pulled = (stress * speed * here - 2.0 * mixed) / (cell[a, j, k] + cell[b, j, k])
-                out[offset + a - first, 2, j, k] = moved + GRAVITY * drop * per_length + pulled
+        carrying(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
+        of_u = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, face_x, cell)
+        strain_along(behind, m, f, u, v, viscosity, cell, per_x, bend)
+        carrying(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
+        shear_at_corners(shear, m, f, u, v, viscosity, corner, per_x, per_y, bend)
+        level_drop(drop, f, level, outlet_level)
+        with_rows_beyond(wide, u[f], m)
+        if bend is not None:
+            beside_x(lengths, bend, f, m, per_x)
+        _u_of_column(
+            out[offset + a - first, 2],
+            (*rows_around(wide, m), *of_u),
+            (west, east, side[:-m], side[m:]),
+            (v[a, :-m], v[a, m:], v[b, :-m], v[b, m:]),
+            (before, behind, shear[:-m], shear[m:], per_y),
+            (drag[a], drag[b], cell[a], cell[b], face_x[f], drop, half_per_film),
+            (lengths[0], lengths[1], lengths[2]),
+            bend,
+            f,
+            dx,
+        )
+        if f == nx:
+            for j in range(ny):
+                if not outlet[j]:
+                    out[offset + a - first, 2, j * m : j * m + m] = u[f, j * m : j * m + m]
 
 
 @compiled
-def momentum_y(out, offset, first, stop, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
+def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, dx):
+    """`momentum_x` of one column; all are (ny m,) but per_y and half_per_film."""
+    u_ss, u_s1, u_here, u_n1, u_nn, u_ww, u_w1, u_e1 = of_u
+    c_west, c_east, c_south, c_north = carriers
+    v_1, v_2, v_3, v_4 = of_v
+    before, behind, shear_s, shear_n, per_y = stresses
+    drag_a, drag_b, cell_a, cell_b, face, drop, half_per_film = column
+    per_length, lift_s, lift_n = lengths
+    for t in range(out.size):
+        here = u_here[t]
+        c_w, c_e, c_s, c_n = c_west[t], c_east[t], c_south[t], c_north[t]
+        u_w = upwind_downstream(c_w, u_ww[t], u_w1[t], here)
+        u_e = upwind_downstream(c_e, u_w1[t], here, u_e1[t])
+        u_s = upwind(c_s, u_ss[t], u_s1[t], here, u_n1[t])
+        u_n = upwind(c_n, u_s1[t], here, u_n1[t], u_nn[t])
+        carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_length[t] + (
+            c_n * (u_n - here) - c_s * (u_s - here)
+        ) * per_y
+        mixed = (behind[t] - before[t]) * per_length[t] + (lift_n[t] * shear_n[t] - lift_s[t] * shear_s[t]) * per_y
+        across = 0.25 * (v_1[t] + v_2[t] + v_3[t] + v_4[t])
+        if bend is not None:
+            carried -= bend.at_faces[f] * dx * per_length[t] * here * across
+        speed = math.sqrt(here * here + across * across + REST_SPEED * REST_SPEED)
+        stress = drag_a[t] * cell_a[t] + drag_b[t] * cell_b[t]
+        moved = carried * afloat(face[t], half_per_film)
+        pulled = (stress * speed * here - 2.0 * mixed) / (cell_a[t] + cell_b[t])
+        out[t] = moved + GRAVITY * drop[t] * per_length[t] + pulled
+
+
+@compiled
+def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
     """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
-    _, ny, m = level.shape
-    west, east, side = np.empty((ny - 1, m)), np.empty((ny - 1, m)), np.empty((ny, m))
-    before, behind, strain = np.empty((ny + 1, m)), np.empty((ny + 1, m)), np.empty((ny, m))
-    ends = np.empty((3, ny + 1, m))
-    _carrier(east, flux_x[first, :-1], face_x[first, :-1], flux_x[first, 1:], face_x[first, 1:])
-    _shear(behind, first, u, v, viscosity, corner, per_x, per_y, bend)
+    n = level.shape[1]
+    west, east, side, strain = np.empty(n - m), np.empty(n - m), np.empty(n), np.zeros(n)
+    before, behind, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 5 * m)
+    ends, lengths = np.empty((3, n + m)), np.empty((3, n - m))
+    beside_y(lengths, bend, first, m, per_x)
+    carrying(east, flux_x[first, :-m], face_x[first, :-m], flux_x[first, m:], face_x[first, m:])
+    shear_at_corners(behind, m, first, u, v, viscosity, corner, per_x, per_y, bend)
     for i in range(first, stop):
         f = i + 1
         west, east, before, behind = east, west, behind, before
-        _carrier(east, flux_x[f, :-1], face_x[f, :-1], flux_x[f, 1:], face_x[f, 1:])
-        v1, v2, v3 = _neighbours_of_v(ends[0], ends[1], ends[2], i, v, east)
-        _shear(behind, f, u, v, viscosity, corner, per_x, per_y, bend)
-        _carrier(side, flux_y[i, :-1], face_y[i, :-1], flux_y[i, 1:], face_y[i, 1:])
+        carrying(east, flux_x[f, :-m], face_x[f, :-m], flux_x[f, m:], face_x[f, m:])
+        v1, v2, v3 = _neighbours_of_v(ends[0], ends[1], ends[2], m, i, v, east)
+        shear_at_corners(behind, m, f, u, v, viscosity, corner, per_x, per_y, bend)
+        carrying(side, flux_y[i, :-m], face_y[i, :-m], flux_y[i, m:], face_y[i, m:])
+        with_rows_beyond(wide, v[i], m)
         if bend is not None:
-            _strain_along(strain, i, u, v, viscosity, cell, per_x, bend)
-        for j in range(1, ny):
-            j1, j4 = max(j - 2, 0), min(j + 2, ny)
-            per_length, lift_s, lift_n = _beside_y(bend, i, j, per_x)
-            for k in range(m):
-                here = v[i, j, k]
-                c_s, c_n, c_w, c_e = side[j - 1, k], side[j, k], west[j - 1, k], east[j - 1, k]
-                v_s = _upwind(c_s, v[i, j1, k], v[i, j - 1, k], here, v[i, j + 1, k])
-                v_n = _upwind(c_n, v[i, j - 1, k], here, v[i, j + 1, k], v[i, j4, k])
-                v_w = _upwind_downstream(c_w, v1[j, k], v2[j, k], here)
-                v_e = _upwind_downstream(c_e, v2[j, k], here, v3[j, k])
-                carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_length + (
-                    c_n * (v_n - here) - c_s * (v_s - here)
-                ) * per_y
-                t_n = viscosity[i, j, k] * cell[i, j, k] * (v[i, j + 1, k] - here)
-                t_s = viscosity[i, j - 1, k] * cell[i, j - 1, k] * (here - v[i, j - 1, k])
-                mixed = (behind[j, k] - before[j, k]) * per_length + 2.0 * (lift_n * t_n - lift_s * t_s) * per_y * per_y
-                along = 0.25 * (u[i, j, k] + u[i + 1, j, k] + u[i, j - 1, k] + u[i + 1, j - 1, k])
-                if bend is not None:
-                    carried += bend.at_cells[i] * dx * per_length * along * along
-                    mixed += bend.at_cells[i] * dx * per_length * 0.5 * (strain[j, k] + strain[j - 1, k])
-                speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
-                stress = drag[i, j, k] * cell[i, j, k] + drag[i, j - 1, k] * cell[i, j - 1, k]
-                slope = (level[i, j, k] - level[i, j - 1, k]) * per_y
-                moved = carried * afloat(face_y[i, j, k], half_per_film)
-                pulled = (stress * speed * here - 2.0 * mixed) / (cell[i, j, k] + cell[i, j - 1, k])
-                out[offset + i - first, 1, j, k] = moved + GRAVITY * slope + pulled
+            strain_along(strain, m, i, u, v, viscosity, cell, per_x, bend)
+            beside_y(lengths, bend, i, m, per_x)
+        _v_of_column(
+            out[offset + i - first, 1, m:],
+            (*rows_around(wide[m:-m], m), v1[m:-m], v2[m:-m], v3[m:-m]),
+            (west, east, side[:-m], side[m:]),
+            (u[i, m:], u[f, m:], u[i, :-m], u[f, :-m]),
+            (before[m:-m], behind[m:-m], strain[:-m], strain[m:], viscosity[i, :-m], viscosity[i, m:], per_y),
+            (drag[i, :-m], drag[i, m:], cell[i, :-m], cell[i, m:], face_y[i, m:-m], half_per_film),
+            (level[i, :-m], level[i, m:]),
+            (lengths[0], lengths[1], lengths[2]),
+            bend,
+            i,
+            dx,
+        )
 
 
 @compiled
-def continuity(out, offset, first, stop, flux_x, flux_y, dx, dy, bend):
+def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, bend, i, dx):
+    """`momentum_y` of one column; all are ((ny - 1) m,) but per_y and half_per_film."""
+    v_ss, v_s1, v_here, v_n1, v_nn, v_ww, v_w1, v_e1 = of_v
+    c_west, c_east, c_south, c_north = carriers
+    u_1, u_2, u_3, u_4 = of_u
+    before, behind, strain_s, strain_n, nu_s, nu_n, per_y = stresses
+    drag_s, drag_n, cell_s, cell_n, face, half_per_film = column
+    level_s, level_n = levels
+    per_length, lift_s, lift_n = lengths
+    for t in range(out.size):
+        here = v_here[t]
+        c_s, c_n, c_w, c_e = c_south[t], c_north[t], c_west[t], c_east[t]
+        v_s = upwind(c_s, v_ss[t], v_s1[t], here, v_n1[t])
+        v_n = upwind(c_n, v_s1[t], here, v_n1[t], v_nn[t])
+        v_w = upwind_downstream(c_w, v_ww[t], v_w1[t], here)
+        v_e = upwind_downstream(c_e, v_w1[t], here, v_e1[t])
+        carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_length[t] + (
+            c_n * (v_n - here) - c_s * (v_s - here)
+        ) * per_y
+        t_n = nu_n[t] * cell_n[t] * (v_n1[t] - here)
+        t_s = nu_s[t] * cell_s[t] * (here - v_s1[t])
+        mixed = (behind[t] - before[t]) * per_length[t] + 2.0 * (lift_n[t] * t_n - lift_s[t] * t_s) * per_y * per_y
+        along = 0.25 * (u_1[t] + u_2[t] + u_3[t] + u_4[t])
+        if bend is not None:
+            carried += bend.at_cells[i] * dx * per_length[t] * along * along
+            mixed += bend.at_cells[i] * dx * per_length[t] * 0.5 * (strain_n[t] + strain_s[t])
+        speed = math.sqrt(here * here + along * along + REST_SPEED * REST_SPEED)
+        stress = drag_n[t] * cell_n[t] + drag_s[t] * cell_s[t]
+        slope = (level_n[t] - level_s[t]) * per_y
+        moved = carried * afloat(face[t], half_per_film)
+        pulled = (stress * speed * here - 2.0 * mixed) / (cell_n[t] + cell_s[t])
+        out[t] = moved + GRAVITY * slope + pulled
+
+
+@compiled
+def continuity(out, offset, first, stop, m, flux_x, flux_y, dx, dy, bend):
     """Rate R_level = d(hu)/dx + d(hv)/dy [m/s] of columns first .. stop - 1, into out[offset ..]."""
     per_x, per_y = 1.0 / dx, 1.0 / dy
-    _, _, ny, m = out.shape
     for i in range(first, stop):
-        for j in range(ny):
+        west, east, south, north = flux_x[i], flux_x[i + 1], flux_y[i, :-m], flux_y[i, m:]
+        found, end = out[offset + i - first, 0], 0
+        while end < found.size:
+            begin, end = end, end_of_rows(bend, end, found.size, m)
+            j = begin // m
             stretch = at_cell(bend, i, j + 0.5)
             lift_s, lift_n = at_cell(bend, i, j) / stretch, at_cell(bend, i, j + 1) / stretch
-            for k in range(m):
-                along = (flux_x[i + 1, j, k] - flux_x[i, j, k]) * (per_x / stretch)
-                across = lift_n * flux_y[i, j + 1, k] - lift_s * flux_y[i, j, k]
-                out[offset + i - first, 0, j, k] = along + across * per_y
+            for t in range(begin, end):
+                along = (east[t] - west[t]) * (per_x / stretch)
+                found[t] = along + (lift_n * north[t] - lift_s * south[t]) * per_y
 
 
 @compiled
@@ -275,7 +255,7 @@ def push(out, depth, x, y, xx, xy, yy, film, dx, dy, bend):
     along, across = _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend)
     for i in range(nx):
         for j in range(ny):
-            _, lift_s, lift_n = _beside_y(bend, i, j, 1.0)
+            _, lift_s, lift_n = south_of(bend, i, j, 1.0)
             length = dx * at_face(bend, i + 1, j + 0.5)
             for k in range(m):
                 here = depth[i, j, k]
@@ -365,18 +345,19 @@ def rates(
     bend,
 ):
     """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
-    nx = state.shape[0]
-    out = np.empty_like(state)
+    nx, _, ny, m = state.shape
+    out, friction, mixing = np.empty((nx, 3, ny * m)), flat(drag), flat(viscosity)
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
         cell, face_x, face_y, corner = depths(level, bed[a:b], rise[a:b], half_range[a:b], film, smallest, outlet_level)
         u, v = velocities(state, a, b, cell, west, south, north)
-        wet = (cell, face_x, face_y, corner, face_x * u, face_y * v)
-        lo, hi, here, law = first - a, stop - a, columns_of(bend, a, b), (drag[a:b], viscosity[a:b])
-        continuity(out, first, lo, hi, wet[4], wet[5], dx, dy, here)
-        momentum_y(out, first, lo, hi, level, u, v, wet, *law, film, dx, dy, here)
-        momentum_x(out, first, lo, hi, level, u, v, wet, *law, outlet, outlet_level, film, dx, dy, here)
-        out[first:stop, 1, 0] = state[first:stop, 1, 0]
-    return out
+        flux_x, flux_y, flow = flat(face_x * u), flat(face_y * v), (flat(level), flat(u), flat(v))
+        wet = (flat(cell), flat(face_x), flat(face_y), flat(corner), flux_x, flux_y)
+        lo, hi, here, law = first - a, stop - a, columns_of(bend, a, b), (friction[a:b], mixing[a:b])
+        continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
+        momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
+        momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
+        out[first:stop, 1, :m] = state[first:stop, 1, 0]
+    return out.reshape((nx, 3, ny, m))
