@@ -150,6 +150,7 @@ def save(figure: Figure, path: Path, dots_per_inch: float = 200) -> None:
     """Write a figure by itself, PNG or SVG by the ending of `path`, in a folder that is made if need be."""
     drawn = BytesIO()
     with _styled_context():
+        _lay_out(figure)
         figure.savefig(drawn, format=path.suffix.removeprefix("."), dpi=dots_per_inch)
     write_file(path, drawn.getvalue(), MAKE_ROOM)
 
