@@ -12,6 +12,7 @@ from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.diagnosis import rivals_again
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.rivals_again import Again, with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.engine.interface import Model, linearise
@@ -22,6 +23,8 @@ from vegglue.screening.residual_screening import screen
 # What is hidden, what was taken for the first of both, and amplitudes that are clearly seen.
 TRUE, LATER, TAKEN = "viscosity", "discharge_error[high]", "edge_mixing"
 HIDDEN = {TRUE: 0.02, LATER: 0.1}
+# Where a probe stood in every section [m].
+PROBE = -1.0
 
 
 def a_step(name: str) -> Step:
@@ -34,19 +37,23 @@ def with_effects(model: Model, *names: str) -> Model:
     )
 
 
-@pytest.fixture(scope="module")
-def measured() -> Model:
+def measured_with(hidden: dict[str, float]) -> Model:
     """The coarse twin at measurements of what is hidden, with errors of what is stated."""
     model, _ = coarse_twin()
-    true = with_effects(model, *HIDDEN)
+    true = with_effects(model, *hidden)
     theta = theta_at(model.case, np.zeros((1, len(model.names))))
-    for name, size in HIDDEN.items():
+    for name, size in hidden.items():
         theta[candidate_named(model.case, model.station, name).parameter] = np.array([size])
     point = linearise(true, z_at(true.case, theta)[0])
     assert point is not None
     error = model.station["standard_error"].to_numpy(float)
     values = point.prediction + error * np.random.default_rng(4).standard_normal(error.size)
     return replace(model, station=model.station.assign(value=values))
+
+
+@pytest.fixture(scope="module")
+def measured() -> Model:
+    return measured_with(HIDDEN)
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +95,15 @@ def test_a_step_stays_where_no_flow_is_found(lost: str, monkeypatch: pytest.Monk
     base = Baseline(*coarse_twin()[:1], None, None, None, None)
     known = {TAKEN: a_suspect(TAKEN)}
     assert with_rivals_again(base, (a_step(TAKEN),), (), known, silent) == (base, (a_step(TAKEN),), known)
+
+
+@pytest.mark.slow
+def test_an_instrument_that_is_set_aside_is_no_rival_of_what_went_before() -> None:
+    """A probe off by four standard errors is first one of two that may be off, and then set aside beside the other."""
+    model = measured_with({TRUE: 0.01})
+    station = model.station
+    probe = (station["kind"] == "velocity") & (station["y"] == PROBE)
+    found = diagnose_model(replace(model, station=station.assign(value=station["value"] + 0.044 * probe)))
+    (step,) = found.steps
+    assert (step.accepted, step.others) == (TRUE, {})
+    assert [one.kind for one in found.instruments] == ["probe"]

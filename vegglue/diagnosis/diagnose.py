@@ -89,13 +89,12 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             found = replace(found, undecided=following)
             break
         found, base = following.found, following.base
-        if following.what != "instrument":
-            newest = 1 if following.what == "effect" else 0
-            earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
-            base, again, suspects = with_rivals_again(base, earlier, found.flagged, suspects, watch)
-            found = _with_steps(found, (*again, *last))
-        else:  # amplitudes that were calibrated with these readings are no longer true
-            suspects = {step.accepted: suspects[step.accepted] for step in found.steps}
+        if following.what == "instrument":  # amplitudes that were calibrated with these readings are no longer true
+            suspects = tested | {step.accepted: suspects[step.accepted] for step in found.steps}
+        newest = 1 if following.what == "effect" else 0
+        earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
+        base, again, suspects = with_rivals_again(base, earlier, found.flagged, suspects, watch)
+        found = _with_steps(found, (*again, *last))
         watch(Progress("looking for what is missing with it"))
         at_hand = following.screening if base is following.base else None
         screening = at_hand or screen(base, found.flagged)

@@ -26,7 +26,7 @@ def with_rivals_again(
     """The model with the best rival of every step, the steps with the chances as they are now, and the suspects with
     the amplitudes of their refits.
 
-    steps: of effects that were accepted before what was last, be that an effect or something at a place; flagged:
+    steps: of effects that were accepted before what was last: an effect, something at a place, an instrument; flagged:
     readings set aside, indices among the used stations.
     """
     kept, known = list[Step](), dict(suspects)
