@@ -8,7 +8,8 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.fit import MapEstimate, at_point
-from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
+from vegglue.calibration.noise import Noise, draw_whitened_errors
+from vegglue.calibration.noise_estimate import estimate_noise
 from vegglue.case.parameter_space import z_of
 from vegglue.flow.local_changes import Term
 from vegglue.screening import score_test
