@@ -10,13 +10,13 @@ from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import at_point, chi2, covariance
-from vegglue.calibration.noise import with_correlation
+from vegglue.calibration.noise import noise_of, with_correlation
 from vegglue.case.config import load_case
 from vegglue.effects.definition import Amplitude
 from vegglue.screening.evidence import HypothesisKind, alarm_p
 from vegglue.screening.fingerprints import Fingerprints
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
-from vegglue.screening.residual_screening import Screening, screen
+from vegglue.screening.residual_screening import Screening, _estimated_noise, screen
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 STATION = stations_of(CASE, ("A", "B"), 6)
@@ -173,3 +173,16 @@ def test_an_amplitude_on_one_side_of_off_has_one_sign(low: float, high: float, s
     amplitude = Amplitude("share", "-", "", 0.3, low, high)
     assert amplitude.only_sign == sign
     assert {way for way in (1, -1) if amplitude.allows(0.1 * way, 1.0)} == ({sign} if sign else {1, -1})
+
+
+@pytest.mark.parametrize("length", [1e3, 1e5])
+def test_a_parameter_that_is_known_to_a_thousandth_leaves_errors_as_they_are(length: float) -> None:
+    """The amplitude that is free was then 1e7 standard errors long, and its covariance could not be factored."""
+    noise = noise_of(STATION.assign(value=0.0, standard_error=0.01, used=True))
+    random = np.random.default_rng(5)
+    direction = random.standard_normal(noise.rows.size)
+    slope = (noise.error * length * direction / np.linalg.norm(direction))[:, None]
+    found = _estimated_noise(
+        noise, (slope, 0.5 * slope), noise.error * random.standard_normal(noise.rows.size), np.array([5.0])
+    )
+    assert (found.correlation, found.scale) == (0.0, 1.0)

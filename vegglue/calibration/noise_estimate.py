@@ -94,7 +94,7 @@ def _has_neighbours(noise: Noise) -> bool:
 
 
 def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:
-    """-2 ln likelihood (rho, s, ln t) up to a constant."""
+    """-2 ln likelihood (rho, s, ln t) up to a constant; infinite where t is so large that nothing can be factored."""
     gram = systematic @ systematic.T
     known = covariance_of(replace(noise, scale=0.0))
     variance = np.outer(noise.error, noise.error)
@@ -110,7 +110,7 @@ def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[
         # Asked by name, and for the transpose, which it need not copy: half the time of scipy's own words for it.
         factor, failed = scipy.linalg.lapack.dpotrf(covariance.T, lower=1, clean=0, overwrite_a=1)
         if failed:
-            raise np.linalg.LinAlgError("The covariance of the errors is not positive definite.")
+            return np.inf
         solved, _ = scipy.linalg.lapack.dpotrs(factor, residual, lower=1)
         return float(2.0 * np.log(np.diag(factor)).sum() + residual @ solved)
 

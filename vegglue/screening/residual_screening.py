@@ -30,6 +30,9 @@ from vegglue.site.channel_geometry import half_width
 # its amplitude is free, else a missing effect passes for correlated errors (a floor 2 cm too high did, and its score
 # fell from 7.2 to 4.2). From 100 on verdicts are the same; with 1e6 the covariance can no longer be factored.
 FREE_SIZE = 1e4
+# Longest that it is made, before what calibration can mimic is taken off [standard errors]: at the largest of the sizes
+# that are tried, ten, its square is 1e15, the last that is factored beside errors of 1.
+LONGEST_FREE = 3e6
 
 
 # Sizes of spots over plausible ones when the noise is estimated [-]. Hundreds of spots overlap, one of them is there:
@@ -203,15 +206,18 @@ def _known_under(noise: Noise, fitted: MapEstimate) -> MapEstimate:
 def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:
     """The noise of a residual (n,); used: slopes, and changes by all that could be missing (n, ...), at used stations.
 
-    Estimated twice: the second time the amplitude of the change with the best score is free.
+    Estimated twice: the second time the amplitude of the change with the best score is free. Where nothing is missing
+    that is the slope of the parameter furthest off its prior, of which calibration leaves next to nothing.
     """
     slope, changes = used
     systematic = np.hstack([slope, changes])
     first = estimate_noise(noise, residual, systematic)
     projected = score_test.project(first.whiten(slope), first.whiten(residual), z, first.whiten(systematic))
     best = int(np.argmax((projected.units.T @ projected.residual) ** 2))
-    free = systematic[:, best : best + 1] * (FREE_SIZE / max(float(projected.length[best]), 1e-300))
-    return estimate_noise(first, residual, np.hstack([systematic, free]))
+    column = systematic[:, best : best + 1]
+    whole = float(np.linalg.norm(first.whiten(column)))
+    free = min(FREE_SIZE / max(float(projected.length[best]), 1e-300), LONGEST_FREE / max(whole, 1e-300))
+    return estimate_noise(first, residual, np.hstack([systematic, free * column]))
 
 
 def refit_start(screening: Screening, candidate: int, column: int) -> Array:
