@@ -116,11 +116,11 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     """
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)
-    names = base.model.station["experiment"].to_numpy()[noise.rows]
+    names, errors = base.model.station["experiment"].to_numpy()[noise.rows], covariance_of(noise)
     told, estimates = [], []
     for experiment in dict.fromkeys(names):
         rows = np.flatnonzero(names == experiment)
-        step, spread = _step(noise, slope, left, point.z, rows)
+        step, spread = _step(errors, slope, left, point.z, rows)
         told.append(without_prior(base.model.case, point.z + step, np.diag(spread)))
         estimates.append((rows, slope[rows], spread))
     value, error = (np.array(part) for part in zip(*told, strict=True))
@@ -167,7 +167,7 @@ def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
     errors = covariance_of(noise)
     for name in names:
         out, kept = np.flatnonzero(groups == name), np.flatnonzero(groups != name)
-        step, covariance = _step(noise, slope, left, point.z, kept)
+        step, covariance = _step(errors, slope, left, point.z, kept)
         error[out] = left[out] - slope[out] @ step
         shared = np.linalg.solve(errors[np.ix_(kept, kept)], errors[np.ix_(kept, out)])
         of_step = slope[out] @ covariance - 2.0 * shared.T @ slope[kept] @ covariance
@@ -175,9 +175,9 @@ def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
     return error, spread
 
 
-def _step(noise: Noise, slope: Array, left: Array, z: Array, kept: np.ndarray) -> tuple[Array, Array]:
-    """The linear step when only some rows are kept, and the covariance of z then."""
-    lower = np.linalg.cholesky(covariance_of(noise)[np.ix_(kept, kept)])
+def _step(errors: Array, slope: Array, left: Array, z: Array, kept: np.ndarray) -> tuple[Array, Array]:
+    """The linear step when only some rows are kept, and the covariance of z then; errors: covariance of all (n, n)."""
+    lower = np.linalg.cholesky(errors[np.ix_(kept, kept)])
     white, right = np.linalg.solve(lower, slope[kept]), np.linalg.solve(lower, left[kept])
     matrix = white.T @ white + np.eye(z.size)
     return np.asarray(np.linalg.solve(matrix, white.T @ right - z)), np.asarray(np.linalg.inv(matrix))

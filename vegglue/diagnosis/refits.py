@@ -36,6 +36,8 @@ REFIT_STEPS = 10
 # Shares of the way to a start at which a flow is looked for, the next where the one before has none. Chosen, not
 # measured: with a tenth of a size nearly every flow is found that is found without.
 SHARES_OF_START = (1.0, 0.3, 0.1)
+# An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
+NEEDED = 2.0
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,6 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
 
 def _with(model: Model, tried: RefitTrial | Refit) -> Model:
     return replace(model, case=with_effect(model.case, tried.candidate, tried.shapes))
-
-
-# An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
-NEEDED = 2.0
 
 
 def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, list[str]]:

@@ -32,6 +32,8 @@ class Nominee:
 
 
 Names = tuple[str, ...]
+# Why each of what is not in the model is not, by name.
+Reasons = dict[str, str]
 # Sections and experiments that do not judge.
 Untold = Mapping[By, set[str]]
 # The model with some of the nominees, in the order they were named; None where it finds no flow.
@@ -43,7 +45,7 @@ class Choice:
     """stages: names in the model, from none to the last, each with all of those before; refused: why, by name."""
 
     stages: tuple[Names, ...]
-    refused: dict[str, str]
+    refused: Reasons
 
 
 def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False) -> Choice:
@@ -59,64 +61,61 @@ def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False)
         assert before is not None
         return both, why_not_kept(before, rung_with(both), clearly, _untold([one for one in named if one.name in more]))
 
-    stages: list[Names] = [()]
-    kept, refused = _one_by_one(order, better, stages)
-    kept = _together(kept, refused, better, stages)
-    kept = _needed_of({one.name: one for one in named}, kept, refused, rung_with)
-    kept = _known_of(named, kept, refused, rung_with)
+    stages, refused = _together(*_one_by_one(order, better), better)
+    kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, rung_with)
+    kept, refused = _known_of(named, kept, refused, rung_with)
     earlier = [stage for stage in stages if set(stage) < set(kept)]
     return Choice((*earlier, kept), refused)
 
 
 Better = Callable[[Names, Names], tuple[Names, str]]
+# Names in the model after each step, and why others are not.
+Stages = tuple[tuple[Names, ...], Reasons]
 
 
-def _one_by_one(order: Sequence[str], better: Better, stages: list[Names]) -> tuple[Names, dict[str, str]]:
+def _one_by_one(order: Sequence[str], better: Better) -> Stages:
     """What helps by itself, and why the others do not."""
-    kept: Names = ()
-    refused: dict[str, str] = {}
+    stages: tuple[Names, ...] = ((),)
+    refused: Reasons = {}
     for name in order:
-        both, why = better(kept, (name,))
+        both, why = better(stages[-1], (name,))
         if why:
-            refused[name] = why
+            refused = {**refused, name: why}
         else:
-            kept = both
-            stages.append(kept)
-    return kept, refused
+            stages = (*stages, both)
+    return stages, refused
 
 
-def _together(kept: Names, refused: dict[str, str], better: Better, stages: list[Names]) -> Names:
-    """What helps with the next of those that do not by themselves; what is kept leaves `refused`."""
+def _together(stages: tuple[Names, ...], refused: Reasons, better: Better) -> Stages:
+    """What helps with the next of those that do not by themselves, too; what is kept is no longer refused."""
     group: Names = ()
-    for name in tuple(refused):
+    for name in refused:
         group = (*group, name)
-        both, why = better(kept, group)
-        refused[name] = why or refused[name]
-        if not why:
-            kept, group = both, _left(refused, group)
-            stages.append(kept)
-    return kept
+        both, why = better(stages[-1], group)
+        if why:
+            refused = {**refused, name: why}
+        else:
+            refused = _without(refused, *group)
+            stages, group = (*stages, both), ()
+    return stages, refused
 
 
-def _left(refused: dict[str, str], group: Names) -> Names:
-    """No group, after those of it are no longer refused."""
-    for name in group:
-        del refused[name]
-    return ()
+def _without(refused: Reasons, *names: str) -> Reasons:
+    """The reasons, but for those of some names."""
+    return {name: why for name, why in refused.items() if name not in names}
 
 
-def _needed_of(named: dict[str, Nominee], kept: Names, refused: dict[str, str], rung_with: RungWith) -> Names:
-    """What is left when all that the model does not need is dropped; the reasons go to `refused`."""
+def _needed_of(named: dict[str, Nominee], kept: Names, refused: Reasons, rung_with: RungWith) -> tuple[Names, Reasons]:
+    """What is left when all that the model does not need is dropped, and why each of the others is not in it."""
     for name in kept:
         fewer = tuple(one for one in kept if one != name)
         if why := _why_dropped(named[name], rung_with(()), rung_with(fewer), rung_with(kept)):
-            refused[name] = why
-            return _needed_of(named, fewer, refused, rung_with)
-    return kept
+            return _needed_of(named, fewer, {**refused, name: why}, rung_with)
+    return kept, refused
 
 
-def _known_of(named: Sequence[Nominee], kept: Names, refused: dict[str, str], rung_with: RungWith) -> Names:
-    """What is left when what is vaguer makes room for what is known and helps hardly less."""
+def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, rung_with: RungWith) -> tuple[Names, Reasons]:
+    """What is left when what is vaguer makes room for what is known and helps hardly less, and why not the others."""
     for one in named:
         known = one.instead_of
         if one.name not in kept or not known or known in kept:
@@ -130,10 +129,9 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: dict[str, str], ru
         if with_known is None or why_not_kept(without, with_known, False, untold):
             continue
         if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer, untold).values()):
-            del refused[known]
-            refused[one.name] = f"with {known}, which is known, held-out errors are not clearly higher"
-            kept = both
-    return kept
+            why = f"with {known}, which is known, held-out errors are not clearly higher"
+            kept, refused = both, {**_without(refused, known), one.name: why}
+    return kept, refused
 
 
 def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: Rung | None) -> str:

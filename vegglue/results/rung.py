@@ -104,5 +104,5 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def _interval(low: float | None, value: float | None, high: float | None) -> tuple[float, float, float]:
-    return _number(low), _number(value), _number(high)
+def _interval(value: float | None, low: float | None, high: float | None) -> tuple[float, float, float]:
+    return _number(value), _number(low), _number(high)

@@ -5,9 +5,8 @@
 B is the Bayes factor of a hypothesis of size N(0, s^2) against nothing, T its score and |S_perp| the length of its
 fingerprint per unit of size, both in standard errors (see `score_test`): the width of its prior is charged (Occam's
 factor). Groups of kinds (listed effects, places, instruments) are as likely before; of a group all kinds are, of a kind
-all hypotheses, of one hypothesis all settings. What is
-missing is one of them or nothing. The alarm is sounded by the sum over all, against the same sum in draws of errors
-alone.
+all hypotheses, of one hypothesis all settings. What is missing is one of them or nothing. The alarm is sounded by the
+sum over all, against the same sum in draws of errors alone.
 Source: Kass and Raftery (1995), doi:10.2307/2291091, for Bayes factors; not checked against it.
 """
 
@@ -43,7 +42,11 @@ class HypothesisKind:
     @property
     def log_evidence(self) -> Array:
         """ln B + ln prior of each column (c,)."""
-        return log_factors(self.scores, self.size) + self.log_prior
+        return self.of_scores(self.scores)
+
+    def of_scores(self, scores: Array) -> Array:
+        """The same, had the columns these scores (c,)."""
+        return log_factors(scores, self.size) + self.log_prior
 
     @property
     def gain(self) -> Array:
@@ -91,7 +94,7 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
 
     errors (draws, n): whitened; slack: by how much scores are made smaller first [standard errors].
     """
-    found = logsumexp([logsumexp(_of_scores(kind, np.maximum(np.abs(kind.scores) - slack, 0.0))) for kind in kinds])
+    found = logsumexp([logsumexp(kind.of_scores(np.maximum(np.abs(kind.scores) - slack, 0.0))) for kind in kinds])
     rows = kinds[0].projected.residual.size
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     drawn = np.hstack([errors, of_prior]).astype(np.float32)
@@ -112,7 +115,7 @@ class _DrawnTerms:
 
 
 def _drawn_terms(kind: HypothesisKind) -> _DrawnTerms:
-    constant = log_factors(np.zeros(kind.size.size), kind.size) + kind.log_prior
+    constant = kind.of_scores(np.zeros(kind.size.size))
     return _DrawnTerms(
         kind.projected.units.astype(np.float32), kind.only_sign, constant, 0.5 * prior_shrinkage(kind.size)
     )
@@ -137,7 +140,3 @@ def _sums_of_kind(one: _DrawnTerms, drawn: Single) -> Array:
     values -= most[:, None]
     np.exp(values, out=values)
     return np.asarray(most + np.log(values.sum(axis=1)))
-
-
-def _of_scores(kind: HypothesisKind, scores: Array) -> Array:
-    return log_factors(scores, kind.size) + kind.log_prior

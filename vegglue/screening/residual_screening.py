@@ -33,13 +33,9 @@ FREE_SIZE = 1e4
 # Longest that it is made, before what calibration can mimic is taken off [standard errors]: at the largest of the sizes
 # that are tried, ten, its square is 1e15, the last that is factored beside errors of 1.
 LONGEST_FREE = 3e6
-
-
 # Sizes of spots over plausible ones when the noise is estimated [-]. Hundreds of spots overlap, one of them is there:
 # at their full sizes they explain, together, whatever neighbours share. Chosen, not measured.
 SPOTS_IN_NOISE = 0.3
-
-
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
 
