@@ -20,7 +20,8 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
 from vegglue.parallel import at_most
-from vegglue.report_page.posterior_words import describe, validation_in_words
+from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.validation_words import validation_in_words
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut
 from vegglue.solver.status import FAILED

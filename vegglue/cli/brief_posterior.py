@@ -13,8 +13,9 @@ from vegglue.figures.typography import PLAIN_TEXT
 from vegglue.in_short import so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.homogeneity_words import homogeneity_rejected, moving_parameters
-from vegglue.report_page.posterior_words import DOUBTED, UNBELIEVED, correlated_pairs, errors_by_kind, fit_in_words
+from vegglue.report_page.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
+from vegglue.report_page.validation_words import DOUBTED, UNBELIEVED
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
 from vegglue.results.refinement import MisfitTest
 

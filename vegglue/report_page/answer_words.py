@@ -18,8 +18,8 @@ from vegglue.report_page.cause_words import (
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.page_file import set_as_code
-from vegglue.report_page.posterior_words import UNBELIEVED
 from vegglue.report_page.run import Run
+from vegglue.report_page.validation_words import UNBELIEVED
 from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

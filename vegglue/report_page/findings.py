@@ -30,17 +30,16 @@ from vegglue.report_page.key_numbers import (
 )
 from vegglue.report_page.page_file import set_as_code
 from vegglue.report_page.posterior_words import (
-    UNBELIEVED,
     canopy_in_words,
     correlations_in_words,
     fit_in_words,
     parameter_in_words,
     search_in_words,
-    validation_in_words,
     weights_in_words,
 )
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.run import Run, median_plants
+from vegglue.report_page.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import entered_above

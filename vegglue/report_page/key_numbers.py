@@ -11,8 +11,9 @@ from vegglue.figures.typography import NARROW, count, percent, plus_minus, short
 from vegglue.in_short import listed
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import DOUBTED, UNBELIEVED, identification
+from vegglue.report_page.posterior_words import identification
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
+from vegglue.report_page.validation_words import DOUBTED, UNBELIEVED
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.solver.status import FAILED
