@@ -18,10 +18,11 @@ from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.site.gridded_site import Site, build_site
-from vegglue.solver.batch import CLUSTER_SIZE, blend, put_rows, solve_members
+from vegglue.solver.batch import CLUSTER_SIZE, solve_members
 from vegglue.solver.block_elimination import minimise
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.jacobian import eliminate
+from vegglue.solver.member_states import blend, put_rows
 from vegglue.solver.parameter_metric import clusters, principal_axes
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import widen
