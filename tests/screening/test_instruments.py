@@ -40,6 +40,13 @@ def test_a_probe_may_be_off_wherever_it_stood() -> None:
     assert (found["position"][0].x, found["position"][0].y) == (5.0, -1.0)
 
 
+def test_a_probe_on_the_axis_is_one_whatever_side_of_it_was_rounded() -> None:
+    """Places turned from a map lie at 0 or at -0, which were two probes."""
+    turned = USED.assign(y=[-1.0, 0.0, 1.0, -1.0, -0.0, -1.0, -1e-9, 0.0, 0.0])
+    for kind in ("probe", "gauge"):
+        assert rows_of(instruments_of(turned)[kind]) == rows_of(instruments_of(USED)[kind])
+
+
 def test_a_gauge_may_be_off_in_all_experiments_and_is_no_probe() -> None:
     found = instruments_of(USED)
     assert rows_of(found["gauge"]) == {(4, 7)}

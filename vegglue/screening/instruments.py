@@ -6,7 +6,7 @@ By its offset it is found. A probe may be off by a factor, too: once it is set a
 `error_columns`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -41,8 +41,9 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
     rows = range(len(used))
     probes = [row for row in rows if kinds[row].velocity]
     gauges = [row for row in rows if kinds[row].instrument == "gauge"]
-    of = [f"{kinds[row].name} {places[row, 0]:.3f} {places[row, 1]:.3f}" for row in rows]
-    across = [f"{kinds[row].name} {places[row, 1]:.3f}" for row in rows]
+    # To a millimetre: a place on the axis that was turned from a map lies at 0 or at -0.
+    of = [(kinds[row].name, round(float(places[row, 0]), 3), round(float(places[row, 1]), 3)) for row in rows]
+    across = [(name, y) for name, _, y in of]
     positions = _shared("position", {row: of[row] for row in probes}, places)
     at_one_place = {one.readings for one in positions}
     return {
@@ -75,9 +76,9 @@ def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
     return columns
 
 
-def _shared(kind: InstrumentKind, name: Mapping[int, str], places: Array) -> tuple[Instrument, ...]:
+def _shared(kind: InstrumentKind, name: Mapping[int, Hashable], places: Array) -> tuple[Instrument, ...]:
     """Instruments of more than one reading, rows of the same name together; places: x, y of all rows (n, 2) [m]."""
-    together: dict[str, list[int]] = {}
+    together: dict[Hashable, list[int]] = {}
     for row, its in name.items():
         together.setdefault(its, []).append(row)
     return tuple(
