@@ -79,3 +79,13 @@ def test_nothing_draws_before_there_is_something_to_draw(verb: str) -> None:
         env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert {name.split(".")[0] for name in found.stdout.split()} & {"jinja2", "matplotlib", "rich", "typer"} == set()
+
+
+@pytest.mark.parametrize("verb", ["check", "simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
+def test_distributions_and_splines_wait_for_who_needs_them(verb: str) -> None:
+    """A second of a processor, which each worker of an ensemble would spend anew."""
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys, vegglue; vegglue.{verb}; print(*sys.modules)"],
+        env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert set(found.stdout.split()) & {"scipy.stats", "scipy.interpolate", "scipy.optimize"} == set()

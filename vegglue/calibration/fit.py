@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import scipy.stats
+from scipy.special import chdtrc
 
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
@@ -80,7 +80,7 @@ def squared_misfit(noise: Noise, prediction: Array) -> float:
 
 def chance_of_misfit(misfit: float, freedom: int) -> float:
     """P(chi2_f >= chi2): the chance of a misfit as large under errors alone [-]; freedom: its degrees."""
-    return float(scipy.stats.chi2.sf(misfit, max(freedom, 1)))
+    return float(chdtrc(max(freedom, 1), misfit))
 
 
 def determined(spread: Array) -> float:

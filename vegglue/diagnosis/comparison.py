@@ -13,7 +13,7 @@ from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
-import scipy.stats
+from scipy.special import ndtri
 
 from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import Baseline
@@ -150,7 +150,7 @@ def _in_sample(noise: Noise, left: Array, kind: np.ndarray, velocity: Mask) -> I
 
 def _predictive_scores(error: Array, spread: Array) -> PredictiveScores:
     """Of held-out errors (v,) that were predicted with a spread (v,)."""
-    density = scipy.stats.norm.logpdf(error, scale=spread)
+    density = -0.5 * (error / spread) ** 2 - np.log(spread) - 0.5 * np.log(2.0 * np.pi)
     log_score = float(np.nanmean(density)) if np.isfinite(density).any() else float("nan")
     surprise = np.abs(error / spread)
     return PredictiveScores(log_score, _share(surprise, 0.5), _share(surprise, 0.95))
@@ -193,4 +193,4 @@ def _validated(base: Baseline, validation: Model) -> float:
 
 def _share(surprise: Array, level: float) -> float:
     known = surprise[np.isfinite(surprise)]
-    return float(np.mean(known < scipy.stats.norm.ppf(0.5 + 0.5 * level))) if known.size else float("nan")
+    return float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan")

@@ -13,7 +13,7 @@ Source: Satterthwaite (1946), doi:10.2307/3002019, for k; not checked against it
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+from scipy.special import chdtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
@@ -49,7 +49,7 @@ def unseen_errors(base: Baseline, unseen: Model) -> UnseenErrors:
     squares = (alike**2).sum(axis=1)
     total = float((own + squares).sum())
     degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
-    by_chance = float(np.sqrt(scipy.stats.chi2.isf(BY_CHANCE, degrees) / degrees))
+    by_chance = float(np.sqrt(chdtri(degrees, BY_CHANCE) / degrees))
     return UnseenErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 

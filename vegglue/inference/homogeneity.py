@@ -16,8 +16,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import scipy.stats
 from numpy.typing import NDArray
+from scipy.special import chdtrc, fdtrc
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, covariance, determined, fit, squared_misfit
@@ -107,8 +107,8 @@ def _scale(fits: Sequence[MapEstimate | None], stations: Sequence[int], least: f
 def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:
     """P(chi2 or more) [-] of so many degrees of freedom, over errors whose size is estimated from `free` others."""
     if math.isinf(free):
-        return float(scipy.stats.chi2.sf(chi2, freedom))
-    return float(scipy.stats.f.sf(chi2 / freedom, freedom, free))
+        return float(chdtrc(freedom, chi2))
+    return float(fdtrc(freedom, free, chi2 / freedom))
 
 
 def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
@@ -64,7 +63,9 @@ def sample(
 
     Errors: InputError when fewer than FEWEST_SOLVED of the draws have a density.
     """
-    points = scipy.stats.qmc.Halton(start.centre.shape[1] + 2, seed=seed)
+    from scipy.stats import qmc  # late: other commands need not wait for it
+
+    points = qmc.Halton(start.centre.shape[1] + 2, seed=seed)
     mixture, size = start, FIRST_DRAWS
     rounds: list[tuple[int, Mixture]] = []
     parts: list[tuple[Array, Array, Array]] = []

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-import scipy.stats
+from scipy.special import ndtr
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import chance_of_misfit, freedom_of_misfit, squared_misfit
@@ -70,13 +70,15 @@ def _modes(base: ModesAndErrors, drawn: Sample) -> PosteriorModes:
 
 def _leave_one_out(left: Array, precision: Array, weights: Array, at_all: Callable[[Array], Array]) -> LeaveOneOut:
     """Residuals (m, n) of members with weights (m,); at_all puts values of the used stations (n,) among all."""
+    from scipy.stats import kstest  # late: other commands need not wait for it
+
     scored = leave_one_out(left, precision, weights)
     return LeaveOneOut(
         elpd=float(scored.score.sum()),
         elpd_error=float(np.sqrt(left.shape[1]) * scored.score.std()),
         inside50=share_inside(scored.below, 0.5),
         inside95=share_inside(scored.below, 0.95),
-        p_calibration=float(scipy.stats.kstest(scored.below, "uniform").pvalue),
+        p_calibration=float(kstest(scored.below, "uniform").pvalue),
         score=at_all(scored.score),
         score_k=at_all(scored.k),
         below=at_all(scored.below),
@@ -93,7 +95,7 @@ def _misfit(base: ModesAndErrors, prediction: Array, at_all: Callable[[Array], A
         freedom=freedom,
         p_misfit=chance_of_misfit(chi2, freedom),
         surprise=at_all(base.standardised),
-        outlier=at_all(count * scipy.stats.norm.sf(np.abs(base.standardised)) * 2) < OUTLIER_BELOW,
+        outlier=at_all(count * ndtr(-np.abs(base.standardised)) * 2) < OUTLIER_BELOW,
     )
 
 

@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from vegglue.arrays import Array
 from vegglue.case.site_schema import CentrelineShape, Stretch
@@ -88,6 +87,8 @@ def _nearest_node(line: Centreline, x: Array, y: Array) -> NDArray[np.int64]:
 
 def _position(line: Centreline, s: Array) -> tuple[Array, Array]:
     """X(s) and Y(s): cubics between the nodes, which keep their directions."""
+    from scipy.interpolate import CubicHermiteSpline  # late: a straight grid need not wait for it
+
     inside = np.clip(s, line.s[0], line.s[-1])
     beyond, theta = s - inside, heading_at(line, s)
     x = CubicHermiteSpline(line.s, line.x, np.cos(line.heading))(inside)
@@ -97,6 +98,8 @@ def _position(line: Centreline, s: Array) -> tuple[Array, Array]:
 
 def _through(points: Array) -> Centreline:
     """A natural cubic spline through points, its parameter the length of the polygon."""
+    from scipy.interpolate import CubicSpline  # late: a straight grid need not wait for it
+
     chord = np.hypot(*np.diff(points, axis=0).T)
     at = _summed(0.0, chord)
     curve = CubicSpline(at, points, bc_type="natural")
