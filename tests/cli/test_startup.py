@@ -72,7 +72,7 @@ def test_only_numpy_is_needed_to_refuse_an_effect(tmp_path: Path) -> None:
     assert imported & HEAVY == {"numpy"}
 
 
-@pytest.mark.parametrize("verb", ["simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
+@pytest.mark.parametrize("verb", ["check", "simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
 def test_nothing_draws_before_there_is_something_to_draw(verb: str) -> None:
     found = subprocess.run(
         [sys.executable, "-c", f"import sys, vegglue; vegglue.{verb}; print(*sys.modules)"],

@@ -12,7 +12,6 @@ from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
-from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
 from vegglue.screening.beyond_seen import laws_beyond_their_range
@@ -39,6 +38,8 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
 
     Errors: InputError for a file that cannot be read, or a command that fails.
     """
+    from vegglue.figures.channel import save_channel_figure  # late: every command says what is odd, one draws
+
     observations, site = read_observations(case), build_site(case)
     picture = folder_of(runs, case) / "channel.png"
     remarks = [*check_case(case, site, observations), *_beyond_seen(case)]
