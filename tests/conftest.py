@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 import vegglue.parallel
 
 TESTS = Path(__file__).parent
-# Files that take minutes: begun last, one of them would keep one process at work while the others wait.
+# Files that take minutes, or half of one: begun last, one of them would keep one process at work while the others wait.
 LONGEST = [
     TESTS / name
     for name in (
@@ -29,6 +29,15 @@ LONGEST = [
         "verification/test_independent_code.py",
         "workflow/test_run.py",
         "end_to_end/test_faults.py",
+        "checks/test_effect_contract.py",
+        "cli/test_cli.py",
+        "studies/test_ranks_of_twins.py",
+        "end_to_end/test_own_engine_faults.py",
+        "test_cluster.py",
+        "studies/test_second_engine.py",
+        "verification/test_operator.py",
+        "verification/test_lateral.py",
+        "verification/test_steady.py",
     )
 ]
 assert all(path.is_file() for path in LONGEST)
