@@ -374,3 +374,21 @@ def test_what_a_bed_has_no_use_for_is_told_as_not_read(tmp_path: Path) -> None:
     said = read_terrain(tmp_path / "bed.csv", Placement(), FileWords(), sections=False).said
     assert "x from x [m], y from y [m], z from z [m];" in said
     assert said.endswith("not read: depth and u")
+
+
+@pytest.mark.parametrize(
+    ("table", "advice"),
+    [
+        (
+            "River Station,Station,Elevation\n40,1,2.5\n40,2,2.4\n",
+            r"got Elevation, River Station, Station; .*flip: \[x, y\]",
+        ),
+        ("section,x,y,depth below datum\nA,0,1,2.5\nA,0,2,2.4\n", r"or off the datum that they count from"),
+        ("Geom Title=Mill\n#Sta/Elev= 2\n 0 3.2 1 2.7\n", "got a geometry of HEC-RAS; write its cross-sections into"),
+    ],
+)
+def test_sections_as_others_keep_them_are_refused_with_what_to_do(tmp_path: Path, table: str, advice: str) -> None:
+    """Only the columns that were known were named, and a geometry of HEC-RAS was a row with too many fields."""
+    (tmp_path / "bed.g01").write_text(table, encoding="utf-8")
+    with pytest.raises(InputError, match=advice):
+        read_terrain(tmp_path / "bed.g01", Placement(), FileWords(), sections=True)

@@ -1,6 +1,6 @@
 """Beds from files, brought onto the channel: GeoTIFF and ESRI ASCII grids, scattered points, and cross-sections."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import role_of, words_of
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.loose_table import read_loosely
@@ -22,6 +23,8 @@ from vegglue.site.terrain import Raster, read_raster
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")
+# How a geometry of HEC-RAS begins (.g01 and on), of which no reader is kept here.
+GEOMETRY_OF_RAS = b"Geom Title="
 # Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, keys, and, of GDAL, what marks no data.
 PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA = 33550, 33922, 34735, 42113
 # Among the keys, in fours from the fifth number on: the one of the type of raster, and its value where a place on the
@@ -57,6 +60,13 @@ def read_terrain(path: Path, place: Placement, words: FileWords, sections: bool)
     ending = path.suffix.lower()
     if ending in RASTERS:
         return _of_raster(read_geotiff(path) if ending in (".tif", ".tiff") else read_raster(path), place)
+    with path.open("rb") as file:
+        of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS
+    if of_ras:
+        raise InputError(
+            f"{shown_path(path)}: expected a table or a grid, got a geometry of HEC-RAS; write its cross-sections into "
+            "a table with the columns section, x, y and z, x from upstream and y from the middle to the left."
+        )
     points, names, said = _points(path, place, words)
     return _of_sections(_sections(path, points, names), said) if sections else _of_points(path, points, said)
 
@@ -135,13 +145,9 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     unnamed = not words.columns and read_loosely(path, words.sheet).headings == tuple(bare.values())
     taken = read_rows(path, replace(words, columns=bare) if unnamed else words)
     if not {"x", "y", "z"} <= taken.numbers.keys():
-        advice = (
-            "take depths off the level of the water above them, and call that z"
-            if {"depth", "below"} & taken.numbers.keys() and "z" not in taken.numbers
-            else f"name them by `columns`, or by place where there is no heading: {bare}"
-        )
+        headings = [*taken.columns.values(), *taken.others]
         raise InputError(
-            f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(taken.columns.values())}; {advice}."
+            f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(headings)}; {_naming(headings)}."
         )
     taken = in_the_channel(taken, place, words)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
@@ -150,6 +156,21 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
         raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
     said = taken_in_words(taken.leaving(*(taken.columns.keys() - ROLES_OF_BED)))
     return points[there], list(taken.only(there).words.get("section", [])), said
+
+
+def _naming(headings: Sequence[str]) -> str:
+    """What to do about the columns of a bed that are not known."""
+    roles = {known[0] for heading in headings if (known := role_of(heading)) is not None}
+    deep = {"depth", "below"} & roles or any("depth" in words_of(heading).split() for heading in headings)
+    if deep and "z" not in roles:
+        return (
+            "take depths off the level of the water above them, and call that z (or off the datum that they count from)"
+        )
+    return (
+        "name them in its entry of the site file, `bed: {file: ..., columns: {x: Chainage, y: Station, z: Elevation}}` "
+        "(1, 2 and 3 where there is no heading), with `flip: [x, y]` and `zero: [40, 5]` where x counts upstream from "
+        "an end at 40 m and y from a left bank 5 m off the axis"
+    )
 
 
 def _of_points(path: Path, points: Array, said: str) -> Terrain:
