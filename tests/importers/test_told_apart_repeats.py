@@ -31,6 +31,7 @@ def survey(heading: str, factors: dict[str, float], places: str = "x;y", z: str 
         ("date", {"3/6/2024": 1.0, "9/7/2024": 1.3}),
         ("Syvyys", {"0.1": 1.2, "0.3": 1.0, "0.6": 0.7}),
         ("position", {"20 %": 1.15, "80 %": 0.85}),
+        ("Q", {"1.8": 1.0, "2.4": 1.2}),
     ],
 )
 def test_two_surveys_at_the_same_places_are_no_repeats(tmp_path: Path, heading: str, factors: dict[str, float]) -> None:

@@ -63,18 +63,19 @@ def station_tables(
     """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
     at = [role for role in ("x", "y") if role in taken.numbers]
     no_place = (*_lacking(taken, at, np.all), *_without_section(taken, words))
-    taken, shares = whole_discharges(_named(taken, words, known.names, f"{file}:"))
+    named = _named(taken, words, known.names, f"{file}:")
+    taken, shares = whole_discharges(named)
     taken, once = levels_once(taken)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
     if _in_verticals(taken):
-        refuse_told_apart(taken, _heights(taken), file)
+        refuse_told_apart(named, _heights(named), file)
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
         lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(vertical_role(taken))], np.all), *beside)
         return StationTables([_points(taken, stem, words)], lacking)
     refuse_lost_heights(taken, _places(taken), file)
-    refuse_told_apart(taken, _places(taken), file)
+    refuse_told_apart(named, _places(named), file)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares, *once))

@@ -21,12 +21,13 @@ Numbers = NDArray[np.int64]
 
 
 def refuse_told_apart(taken: Taken, places: Sequence[Hashable], file: str) -> None:
-    """Errors: InputError where velocities of one place differ with a column in no role, alike at many places.
+    """Errors: InputError where velocities of one place differ with a column in no role, or the discharge, alike at many
+    places.
 
     places (rows,): what is one where they are equal. A number of the repeat, or the time of it, makes no difference.
     """
     for role in DOWNSTREAM:
-        for heading, texts in taken.others.items() if role in taken.numbers else ():
+        for heading, texts in _columns(taken).items() if role in taken.numbers else ():
             u = taken.numbers[role]
             rows = [row for row, text in enumerate(texts) if text.strip() and np.isfinite(u[row])]
             names = [texts[row] for row in rows]
@@ -39,6 +40,15 @@ def refuse_told_apart(taken: Taken, places: Sequence[Hashable], file: str) -> No
                     "`files` of the site file, by what it holds (`experiment`, `section`, `y`, `z`, `height`, "
                     "`below`), keep the rows of one, or take the column out where they are repeats of one flow."
                 )
+
+
+def _columns(taken: Taken) -> dict[str, Sequence[str]]:
+    """By heading: what may tell one flow or height from another."""
+    discharges = taken.numbers.get("discharge")
+    if discharges is None:
+        return dict(taken.others)
+    texts = ["" if np.isnan(one) else f"{one:g} m3/s" for one in discharges.tolist()]
+    return {taken.columns["discharge"]: texts, **taken.others}
 
 
 def _differ_with_names(u: Array, place: Numbers, name: Numbers) -> bool:
