@@ -24,9 +24,10 @@ def numbers_of_column(path: Path, table: LooseTable, place: int, missing: Sequen
         try:
             number = table.number(row[place])
         except ValueError as error:
+            again = "the heading stands there again: put what is said above each block, such as its place, in a column"
             raise InputError(
                 f"{shown_path(path)}, row {line}: expected a number in column {table.headings[place]}, got "
-                f"{row[place]!r}; {error}."
+                f"{row[place]!r}; {again if row[place] == table.headings[place] else error}."
             ) from None
         values[i] = np.nan if number is None else number
     marked = (

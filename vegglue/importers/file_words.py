@@ -127,6 +127,10 @@ def _places(given: Mapping[str, Any], where: str) -> dict[str, Any]:
         if not isinstance(ends, list | tuple) or len(ends) != 2:
             raise InputError(f"{where}.line expected two points [[x, y], [x, y]], got {ends!r}.")
         found["line"] = tuple(_numbers(end, 2, f"{where}.line") for end in ends)
+        if found["line"][0] == found["line"][1]:
+            raise InputError(
+                f"{where}.line expected two points, one at each end of the tape, got {ends!r}; correct it."
+            )
     return found
 
 
