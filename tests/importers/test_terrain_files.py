@@ -392,3 +392,12 @@ def test_sections_as_others_keep_them_are_refused_with_what_to_do(tmp_path: Path
     (tmp_path / "bed.g01").write_text(table, encoding="utf-8")
     with pytest.raises(InputError, match=advice):
         read_terrain(tmp_path / "bed.g01", Placement(), FileWords(), sections=True)
+
+
+def test_a_bed_of_more_levels_than_a_case_reads_is_refused(tmp_path: Path) -> None:
+    """x in mm, say, asked for 30 GB: the memory was full, and nothing said of what."""
+    points = "\n".join(["x,y,z", *(f"{x},{y},{abs(y)}" for x in (0, 40) for y in (-4, 0, 4))])
+    site = "bed: {file: bed.csv}\ngrid: {x: [0, 40000], y: [-4, 4], cell: [0.5, 0.005]}\n" + JUNE
+    folder = folder_of(tmp_path / "brook", site, bed__csv=points, a__csv="x,y,u\n8,2,0.4\n")
+    with pytest.raises(InputError, match=r"at most 10,000,000 levels .* got 1\.28e\+10; say larger cells"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

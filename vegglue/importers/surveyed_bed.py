@@ -9,6 +9,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
+from vegglue.case.size_limits import MOST_CELLS
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.banks import BANK, bank_break, found_banks, with_banks
@@ -24,6 +25,7 @@ from vegglue.site.grid import Grid, centres
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
 NO_LEVEL = -9999
+MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,15 @@ def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) ->
             )
     dy = (y[1] - y[0]) / SURVEYED_ROWS
     columns = max(even((x[1] - x[0]) / (dy * LENGTH_OF_CELLS)), 4)
-    return {"x": x, "y": y, "cell": list(given.cell or ((x[1] - x[0]) / columns, dy))}
+    cell = list(given.cell or ((x[1] - x[0]) / columns, dy))
+    levels = (x[1] - x[0]) / min(cell) * (y[1] - y[0]) / min(cell)
+    if levels > MOST_LEVELS:
+        raise InputError(
+            f"{shown_path(path)}: expected a bed of at most {MOST_LEVELS:,} levels on squares as small as the cells, "
+            f"got {levels:.3g}; say larger cells by `grid.cell` in the site file, or less of the bed by `grid.x` and "
+            "`grid.y`."
+        )
+    return {"x": x, "y": y, "cell": cell}
 
 
 def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tuple[str, float]:
@@ -112,7 +122,7 @@ def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tu
     else:
         rows = np.column_stack([*place.to_case(at_x, at_y), level])
         text = "x,y,z\n" + "".join(f"{at[0]:.4f},{at[1]:.4f},{at[2]:.4f}\n" for at in rows.tolist())
-    return text, float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean())
+    return text, float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean()) if inside.any() else 0.0
 
 
 def _ascii(x: Array, y: Array, size: float, level: Array) -> str:
