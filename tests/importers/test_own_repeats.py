@@ -105,3 +105,16 @@ def test_repeats_by_chance_count_each(tmp_path: Path) -> None:
     table, said = brook_of_repeats(tmp_path, rows)
     assert "in a row" not in said
     assert table["standard_error"].to_numpy() == pytest.approx(np.full(40, 0.05 / 40**0.5), rel=0.5)
+
+
+def test_repeats_far_beyond_their_stated_errors_are_told(tmp_path: Path) -> None:
+    """0.9 and 0.1 m/s beside 0.4, each known to 2 cm/s, were one mean known to 1 cm/s, and nothing was said of it."""
+    site = CHANNEL + JUNE + "files: {a.csv: {standard_error: 2 cm/s}}\n"
+    for name, rows, told in (("odd", (0.4, 0.9, 0.1), True), ("even", (0.4, 0.43, 0.38), False)):
+        table = "x,y,u\n" + "".join(f"8,1,{u}\n" for u in rows)
+        case = vegglue.import_folder(folder_of(tmp_path / name, site, a__csv=table), tmp_path / f"{name}.yaml")
+        assert case.imported is not None
+        said = (
+            "2 repeats averaged, which differ by 20 times their stated errors at x = 8, y = 1 m: see whether they are"
+        )
+        assert (said in case.imported[0].taken) == told

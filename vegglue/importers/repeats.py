@@ -24,6 +24,8 @@ NARROW_TO_WIDE = (4, 2, 1)
 # Degrees of freedom nu of a scatter. chi^2 is nu / (nu - 2) times too large on average with it: 7 % with 30. The whole
 # file may give fewer: with 10, a standard error is known to 1 / sqrt(2 nu), about a quarter.
 ENOUGH, LEAST_OF_FILE = 30, 10
+# Repeats that differ by so many of their errors do not by chance: of two, one pair in two million.
+BEYOND_ERRORS = 5.0
 Scatter = Mapping[tuple[object, ...], tuple[float, int]]
 
 
@@ -43,14 +45,37 @@ def means_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> l
 
 
 def said_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
-    """How many values were averaged, and where they are too few for a standard error that is missing."""
+    """How many values were averaged, where they are too few for a standard error that is missing, and where they differ
+    by more than the errors that are stated.
+    """
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
     repeats = sum(len(values) - 1 for values in gathered.values())
     freedom = sum(len(values) - 1 for values in unstated.values())
     too_few = f", too few for a standard error: {LEAST_OF_FILE} are needed" if 0 < freedom < LEAST_OF_FILE else ""
     tau = _in_a_row(unstated)
     alike = f", {tau:.2g} in a row as one, as neighbours are alike" if tau > 1.0 else ""
-    return (f", {repeats} repeats averaged{alike}" if repeats else "") + too_few
+    return (f", {repeats} repeats averaged{alike}" if repeats else "") + too_few + _beyond_errors(gathered)
+
+
+def _beyond_errors(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
+    """Where repeats differ most, by more than BEYOND_ERRORS times their stated errors; nothing where none do."""
+    several = {place: values for place, values in gathered.items() if len(values) > 1 and _stated(values)}
+    if not several:
+        return ""
+    place = max(several, key=lambda one: _times_error(several[one]))
+    times = _times_error(several[place])
+    where = f"at x = {place[2]:g}, y = {place[3]:g} m"
+    return (
+        f", which differ by {times:.2g} times their stated errors {where}: see whether they are repeats"
+        if times > BEYOND_ERRORS
+        else ""
+    )
+
+
+def _times_error(values: Sequence[RepeatedValue]) -> float:
+    """Root of sum ((u - mean u) / se)^2 / (n - 1) [-], of values with stated errors."""
+    u, error = np.array(values).T
+    return float(np.sqrt(np.sum(((u - u.mean()) / error) ** 2) / (u.size - 1)))
 
 
 def without_repeats(points: Taken, keys: Sequence[tuple[object, ...]], errors: Array) -> tuple[Taken, str]:
