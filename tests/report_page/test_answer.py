@@ -190,6 +190,9 @@ def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:
     hidden = Question("steep_bank from a change of k_s", (GAUGE,))
     (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden,))))
     assert "to test “Steep banks touch more water than their width says” (steep_bank), which a change" in plain(step)
+    both = LoopResults(questions=(hidden, Question("eddies from a change of phi", (GAUGE,))))
+    (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=both))
+    assert "which a change of k_s hides, and to test eddies, which a change of phi hides: 1 station" in plain(step)
 
 
 def test_the_page_of_a_child_tells_whose_verdict_it_is(toy: Run) -> None:

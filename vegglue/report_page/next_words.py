@@ -68,7 +68,7 @@ def _measurements(run: Run, command: str) -> Iterator[str]:
     for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
         purposes = [_to_see(one) for one in settled if one.useful[0].name == best.name]
         yield (
-            f"Measure <b>{html.escape(best.name)}</b>, {' and '.join(purposes)}: {count(best.stations, 'station')}, "
+            f"Measure <b>{html.escape(best.name)}</b>, {', and '.join(purposes)}: {count(best.stations, 'station')}, "
             f"some {short(best.hours, 2)}{NARROW}hours of field work."
         )
     left = [_to_see(one) for one in questions if one not in settled]
