@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 import scipy.special
 
 from vegglue.arrays import Array
@@ -71,6 +70,8 @@ def _likeliest(
     scale_free: bool,
 ) -> _Likeliest:
     """The least of -2 ln L by Nelder and Mead, from the best pair of rho and ln t; rho stays 0 where that is given."""
+    from scipy.optimize import minimize  # late: many a command and every worker estimates nothing
+
     pairs = itertools.product(correlations, np.log(START_SIZES))
     _, rho, size = min((deviance(rho, 1.0, size), rho, size) for rho, size in pairs)
     correlated = rho > 0.0
@@ -81,7 +82,7 @@ def _likeliest(
         return float(found), float(scale), float(np.clip(x[0], -20.0, 10.0))
 
     begin = [size, *([0.0] if scale_free else []), *([np.log(rho / (LARGEST_RHO - rho))] if correlated else [])]
-    end = scipy.optimize.minimize(
+    end = minimize(
         lambda x: deviance(*unfold(x)), np.array(begin), method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.02}
     )
     _, scale, log_size = unfold(end.x)
