@@ -38,6 +38,10 @@ the same, and 170 more, sized in the truth. What was chosen after seeing some of
   channel with nothing hidden and small imperfections, and all 36 of the stranger with an instrument or, in that
   channel, a bad probe were made anew: two of the former that named an effect cannot tell now, and in all others
   the verdict is the same.
+- Since then Smagorinsky's length is kept on other cells, and effects compete again once an instrument is set aside.
+  After the first of these the 28 sets 124 to 151 of the small channel with something unlisted were made anew, as many
+  as the time allowed. In 24 the verdict is of the same kind. Two that named a known effect say none of these now; of
+  two that said it one names a known effect, and one cannot tell. One hole is placed 3 m further off.
 
 On what nobody had looked at it is right less often than on what it was chosen after. What `extend --auto` keeps is
 counted as it was before the last changes of its rule in all but the last 170: in 42 sets all that was named was
