@@ -72,20 +72,20 @@ def test_only_numpy_is_needed_to_refuse_an_effect(tmp_path: Path) -> None:
     assert imported & HEAVY == {"numpy"}
 
 
-@pytest.mark.parametrize("verb", ["check", "simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
-def test_nothing_draws_before_there_is_something_to_draw(verb: str) -> None:
+@pytest.fixture(scope="module", params=["check", "simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
+def of_verb(request: pytest.FixtureRequest) -> set[str]:
+    """Modules that are there once a verb is at hand."""
     found = subprocess.run(
-        [sys.executable, "-c", f"import sys, vegglue; vegglue.{verb}; print(*sys.modules)"],
+        [sys.executable, "-c", f"import sys, vegglue; vegglue.{request.param}; print(*sys.modules)"],
         env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert {name.split(".")[0] for name in found.stdout.split()} & {"jinja2", "matplotlib", "rich", "typer"} == set()
+    return set(found.stdout.split())
 
 
-@pytest.mark.parametrize("verb", ["check", "simulate", "infer", "diagnose", "extend_stepwise", "compare", "run"])
-def test_distributions_and_splines_wait_for_who_needs_them(verb: str) -> None:
+def test_nothing_draws_before_there_is_something_to_draw(of_verb: set[str]) -> None:
+    assert {name.split(".")[0] for name in of_verb} & {"jinja2", "matplotlib", "rich", "typer"} == set()
+
+
+def test_distributions_and_splines_wait_for_who_needs_them(of_verb: set[str]) -> None:
     """A second of a processor, which each worker of an ensemble would spend anew."""
-    found = subprocess.run(
-        [sys.executable, "-c", f"import sys, vegglue; vegglue.{verb}; print(*sys.modules)"],
-        env=ENVIRONMENT_HERE, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert set(found.stdout.split()) & {"scipy.stats", "scipy.interpolate", "scipy.optimize"} == set()
+    assert of_verb & {"scipy.stats", "scipy.interpolate", "scipy.optimize"} == set()
