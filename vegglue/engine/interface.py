@@ -34,7 +34,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Cause:
-    """A change whose response is asked for: a case with one parameter more, which does nothing at `amplitude.off`.
+    """A change whose response is asked for: a case that differs by its effects alone, with one parameter more, which
+    does nothing at `amplitude.off`.
 
     experiments: where it acts, empty for all of them.
     """

@@ -14,7 +14,8 @@ LEAST_OF_SERIES = 10
 
 def values_that_are_one(series: Iterable[Sequence[float]]) -> float:
     """tau = 1 + 2 sum_k rho_k, up to the first rho_k that is not above 0 (k in values): the mean of n has the variance
-    s^2 tau / n, where s^2 is that of a value (e.g. Sokal 1997). 1 where neighbours are as alike as chance makes them.
+    s^2 tau / n, where s^2 is that of a value (e.g. Sokal 1997, Monte Carlo Methods in Statistical
+    Mechanics; not checked against it). 1 where neighbours are as alike as chance makes them.
 
     series: each of one place, in the order of time; their autocovariances are added up, each about its own mean.
     """

@@ -55,7 +55,9 @@ def _differ_with_names(u: Array, place: Numbers, name: Numbers) -> bool:
     """Whether names explain what u (rows,) of one place differs by, beyond chance; place and name by their numbers.
 
     d = u - mean u of its place, e = mean d of its name; F = (sum e^2 / (names - 1)) / (sum (d - e)^2 / (rows - places -
-    names + 1)), of two ways without interaction; it is exact where each name stands once at each place.
+    names + 1)), an analysis of variance in two ways without
+    interaction (Scheffe 1959, The Analysis of Variance; not checked against it), exact where each name stands once at
+    each place.
     """
     several = np.bincount(place)[place] > 1 if u.size else np.zeros(0, dtype=bool)
     u, place, name = u[several], place[several], name[several]
