@@ -7,8 +7,8 @@ from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.contender_choice import (
     KNOWN_FIRST_ODDS,
     MOST_FOLLOWED,
-    SAME_KIND_ODDS,
     What,
+    chance_of_a_place,
     chosen_contender,
     nearly_as_likely,
 )
@@ -34,14 +34,13 @@ def test_no_more_are_followed_than_are_worth_it() -> None:
     ("what", "odds", "expected"),
     [
         (("effect", "place"), (1.0, 1.1), 0),  # what is known is the likeliest
-        (("place", "effect"), (1.0, 12.0), 0),  # what is vague leads by enough
+        (("place", "effect"), (1.0, 1.1 * KNOWN_FIRST_ODDS), 0),  # what is vague leads by enough
         (("place", "effect"), (1.0, 0.9 * KNOWN_FIRST_ODDS), 1),  # and by too little
-        (("place", "effect"), (1.0, 8.0), None),
+        (("place", "effect", "effect"), (1.0, 8.0, 8.0), None),  # by enough of each, and not of both
         (("place", "instrument"), (1.0, 3.0), None),
-        (("place", "place"), (1.0, 0.9 * SAME_KIND_ODDS), None),
-        (("place", "place"), (1.0, 1.1 * SAME_KIND_ODDS), 0),  # both say the same: none of what is known
-        (("place", "place", "effect"), (1.0, 4.0, 12.0), 0),
-        (("place", "place", "instrument"), (1.0, 4.0, 9.0), None),
+        (("place", "place"), (1.0, 1.1), 0),  # both say the same: none of what is known
+        (("place", "place", "effect"), (1.0, 1.1, 9.0), 0),
+        (("place", "place", "instrument"), (1.0, 4.0, 9.0), 0),
         (("place", "place", "effect"), (1.0, 1.1, 2.0), 2),
         (("instrument", "place"), (1.0, 2.0), 0),
     ],
@@ -50,4 +49,12 @@ def test_what_is_vague_has_to_lead_what_is_known(
     what: tuple[What, ...], odds: tuple[float, ...], expected: int | None
 ) -> None:
     """odds: of the likeliest against each; little evidence, so that it is not tempered."""
-    assert chosen_contender(what, -np.log(np.array(odds))) == expected
+    likely = 1.0 / np.array(odds)
+    at_a_place = likely[[one == "place" for one in what]].sum() / likely.sum()
+    assert chosen_contender(what, np.log(likely), at_a_place) == expected
+
+
+def test_chances_of_places_count_together() -> None:
+    kinds = ("drag", "effect", "bed", "probe")
+    contenders = [Contender(kind, kind, 0.0, 0, None) for kind in kinds]
+    assert chance_of_a_place(contenders, (0.5, 0.2, 0.2, 0.1)) == pytest.approx(0.7)

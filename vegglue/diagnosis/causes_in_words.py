@@ -16,6 +16,7 @@ from vegglue.results.diagnosis import (
     Suspect,
 )
 from vegglue.screening.instruments import Instrument
+from vegglue.screening.places import EFFECT_AT_PLACE
 
 # Chance of what is named, below which it is stated: above, it would be told as 100 %.
 STATED_BELOW = 0.995
@@ -23,6 +24,8 @@ STATED_BELOW = 0.995
 TOLD_ERROR = 0.3
 # Terms whose size is part of what acts, in words.
 TOLD_BY_SIZE = ("bed", "inflow")
+# Odds of a place against what is known above which they are not told: the set of the likeliest ends there.
+KNOWN_TOLD_ODDS = 20.0
 # Contenders that are told where none is surely it.
 UNDECIDED_TOLD = 3
 
@@ -34,14 +37,20 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 
 
 def _place_words(place: Location) -> str:
-    rivals = {name: odds for name, odds in place.odds.items() if name in ("drag", "bed", "inflow", "viscosity")}
-    against = [f"{_odds(odds)} against {name}" for name, odds in sorted(rivals.items(), key=lambda one: one[1])[:1]]
     low, high = place.interval95
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
     range95 = f"{low:.3g} to {high:.3g}"
     told = f"{range95} {place.unit}" if place.term in TOLD_BY_SIZE else f"{place.amplitude:.3g} {place.unit}, {range95}"
     what = _what_acts(place.term, place.amplitude)
-    return f"at {at} it acts as if {what} ({'; '.join([told, *against])})"
+    return f"at {at} it acts as if {what} ({'; '.join([told, *_against(place)])})"
+
+
+def _against(place: Location) -> list[str]:
+    """Odds against the nearest other term, and against what is known where that is near."""
+    nearest = sorted(place.odds.items(), key=lambda one: one[1])
+    terms = [one for one in nearest if one[0] in EFFECT_AT_PLACE][:1]
+    known = [(name, odds) for name, odds in nearest if name not in EFFECT_AT_PLACE and odds < KNOWN_TOLD_ODDS][:1]
+    return [f"{_odds(odds)} against {FAULT_WORDS.get(name, name)}" for name, odds in (*terms, *known)]
 
 
 def _what_acts(term: str, amplitude: float) -> str:

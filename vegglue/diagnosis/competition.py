@@ -33,8 +33,8 @@ from vegglue.screening.second_looks import SecondLook, second_looks
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
 MOST_REFITTED, REACH = 8, 6.0
-# Odds by which the best must lead, or others are followed too, and by which what is vaguer, a place or a field, must
-# beat the rest: 10 to 1, where strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091).
+# Odds by which the best must lead, or others are followed too, and by which a law must beat all else: 10 to 1, where
+# strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091).
 LEAST_ODDS = 10.0
 # Shares of the size that its score promises from which something at a place is refitted: at all of it a flow may not be
 # found. Chosen, not measured.

@@ -24,10 +24,17 @@ from vegglue.diagnosis.competition import (
     tempered_chances,
 )
 from vegglue.diagnosis.conclusion import concluded
-from vegglue.diagnosis.contender_choice import What, chosen_contender, nearly_as_likely
+from vegglue.diagnosis.contender_choice import What, chance_of_a_place, chosen_contender, nearly_as_likely
 from vegglue.diagnosis.findings import Charge, Findings, Undecided
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import followed_further, instrument_found, location_found, step_found, undecided_of
+from vegglue.diagnosis.rivals import (
+    followed_further,
+    instrument_found,
+    location_found,
+    place_followed_further,
+    step_found,
+    undecided_of,
+)
 from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.verdict import MOST_GROUPS
@@ -134,20 +141,28 @@ def _following(
         return possible[0][1] if possible else Undecided(tuple(contenders), tuple(chances_of(contenders)))
     ends = in_threads(_screened, [(one,) for _, one in possible])
     score = np.array([_prospect(one, found) for one in ends]) - log_evidence(screening.base)
-    best = chosen_contender([one.what for one in ends], score)
-    followed, chance = [contenders[j].name for j, _ in possible], tempered_chances(score)
-    if best is None:
-        return undecided_of(contenders, followed, chance)
-    return _told_beside(ends[best], followed, chance)
+    followed = [contenders[j] for j, _ in possible]
+    undecided = undecided_of(contenders, [one.name for one in followed], tempered_chances(score))
+    at_a_place = chance_of_a_place(contenders, undecided.chances)
+    best = chosen_contender([one.what for one in ends], score, at_a_place)
+    return undecided if best is None else _told_beside(ends[best], followed, best, score)
 
 
-def _told_beside(following: Following, followed: Sequence[str], chance: Array) -> Following:
-    """What was taken, a listed effect with the chances of all that was followed; chance (k,): of each, by name."""
-    if following.what != "effect":
-        return following
-    *earlier, last = following.found.steps
-    steps = (*earlier, followed_further(last, followed, chance))
-    return replace(following, found=replace(following.found, steps=steps))
+def _told_beside(following: Following, followed: Sequence[Contender], taken: int, evidence: Array) -> Following:
+    """What was taken: a listed effect with the chances of all that was followed, a place with its odds against them.
+
+    evidence (k,): ln of that of each that was followed [-].
+    """
+    found = following.found
+    if following.what == "effect":
+        *earlier, step = found.steps
+        step = followed_further(step, [one.name for one in followed], tempered_chances(evidence))
+        return replace(following, found=replace(found, steps=(*earlier, step)))
+    if following.what == "place":
+        *before, place = found.places
+        place = place_followed_further(place, followed, taken, evidence)
+        return replace(following, found=replace(found, places=(*before, place)))
+    return following
 
 
 def _screened(one: Following) -> Following:

@@ -73,6 +73,21 @@ def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step
     return with_chances(step, step.accepted, shared_anew(step.chance | step.others, followed, chance))
 
 
+def place_followed_further(place: Location, followed: Sequence[Contender], taken: int, evidence: Array) -> Location:
+    """The place, which was taken, with its odds against the others that have been followed; evidence (k,): ln [-]."""
+    odds = {
+        _rival_name(one): tempered_odds(float(evidence[taken]), float(of_one))
+        for one, of_one in zip(followed, evidence, strict=True)
+        if one.kind != place.term
+    }
+    return replace(place, odds=place.odds | odds)
+
+
+def _rival_name(one: Contender) -> str:
+    """Under which a rival of a place is told: an effect by its own, another by its kind."""
+    return one.name if one.kind == "effect" else one.kind
+
+
 def undecided_of(contenders: Sequence[Contender], followed: Sequence[str], chance: Array) -> Undecided:
     """All contenders, none of them surely it, once some have been followed further, see `shared_anew`."""
     told = dict(zip([one.name for one in contenders], map(float, chances_of(contenders)), strict=True))
@@ -107,7 +122,7 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
     # What was not worth a refit counts to first order.
     evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
-    evidence |= {one.name if one.kind == "effect" else one.kind: one.log_evidence for one in reversed(contenders)}
+    evidence |= {_rival_name(one): one.log_evidence for one in reversed(contenders)}
     return Location(
         **refit.shapes,
         x_error=best.errors[0],
