@@ -37,8 +37,14 @@ def test_odds_are_told_against_the_closest_other_term() -> None:
     odds = {"wind": 2.0, "bed": 400.0, "viscosity": 7000.0}
     assert "400 to 1 against bed" in said(grounds(places=(a_location(odds=odds),)))[1]
     assert "over 1,000 to 1 against bed" in said(grounds(places=(a_location(odds={"bed": 7000.0}),)))[1]
-    assert "against" not in said(grounds(places=(a_location(odds={"wind": 2.0}),)))[1]
     assert "; 1 to 3 against bed" in said(grounds(places=(a_location(odds={"bed": 0.35}),)))[1], "and not 0 to 1"
+
+
+def test_odds_against_what_is_known_are_told_where_it_is_near() -> None:
+    near = {"bed": 400.0, "wind": 8.0, "probe": 9.0}
+    assert "400 to 1 against bed; 8 to 1 against wind)" in said(grounds(places=(a_location(odds=near),)))[1]
+    assert "against a probe that is off" in said(grounds(places=(a_location(odds={"probe": 8.0}),)))[1]
+    assert "against" not in said(grounds(places=(a_location(odds={"wind": 21.0}),)))[1]
 
 
 def test_a_field_is_none_of_the_known_effects() -> None:
