@@ -123,7 +123,7 @@ def a_diagnosis(
         steps=(step,) if steps is None else steps,
         verdict=Verdict(
             "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
-            a_location(), not_excluded=(),
+            a_location(), not_excluded=(), clears_the_model=False, tells_laws=False,
         ),
         misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
         errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),

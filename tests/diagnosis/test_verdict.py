@@ -12,6 +12,7 @@ from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.rivals import undecided_of
+from vegglue.diagnosis.verdict import judged
 from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step
 from vegglue.screening.instruments import Instrument
 
@@ -74,6 +75,14 @@ def test_silence_is_not_earned_where_the_model_may_miss_between_the_sections() -
     assert "the model may miss by as much as 1.5 times the errors of the data" in sentence
     assert said(grounds(between=1.2))[0] == "nothing-missing"
     assert said(grounds(between=float("nan")))[0] == "nothing-missing"
+
+
+def test_only_a_verdict_that_says_so_clears_the_model() -> None:
+    off, suspects = (an_instrument(),), (NONE,)
+    assert judged(grounds(), suspects).clears_the_model
+    assert judged(grounds(instruments=off), suspects).clears_the_model
+    assert not judged(grounds(instruments=off, between=1.5), suspects).clears_the_model
+    assert not judged(grounds(step("a")), [a_suspect("a")]).clears_the_model
 
 
 def test_an_instrument_has_to_be_off_by_more_where_the_flow_is_unsure() -> None:

@@ -7,6 +7,7 @@ from verdicts import MISSES, grounds, said, step
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Undecided
 from vegglue.diagnosis.remarks import TOO_SHALLOW
+from vegglue.diagnosis.verdict import judged
 
 
 def test_a_place_wins_over_steps_and_all_are_told() -> None:
@@ -59,6 +60,12 @@ def test_a_field_is_none_of_the_known_effects() -> None:
 # What competed last and led to nothing.
 UNSURE = Undecided((Contender("effect", "wind", 3.0, 0, None),), (1.0,))  # type: ignore[arg-type]
 LIKELY = laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp")
+
+
+def test_a_verdict_says_whether_its_sentence_tells_of_laws() -> None:
+    assert judged(grounds(laws=LIKELY, misfit=MISSES), ()).tells_laws
+    assert judged(grounds(laws=laws_suspected_of("a", chance=0.2)), ()).tells_laws
+    assert not judged(grounds(step("a"), laws=LIKELY), [a_suspect("a")]).tells_laws, "a remark does"
 
 
 def test_a_law_is_none_of_the_known_effects() -> None:

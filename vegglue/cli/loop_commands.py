@@ -71,11 +71,8 @@ def diagnose_command(
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
     if not (quiet or as_object):
-        from vegglue.diagnosis.causes_in_words import TO_DISCOVER
-
-        of_law = found.laws is not None and TO_DISCOVER in found.verdict.sentence
         found_something = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
-        following = ("discover", config) if of_law else found_something
+        following = ("discover", config) if found.verdict.tells_laws else found_something
         print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from vegglue.diagnosis.findings import Findings
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
-from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed
+from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed, VerdictKind
 
 # Chance of the last misfit under errors alone, below which something is still missing.
 POOR = 1e-3
@@ -38,6 +38,19 @@ class Grounds:
     laws: LawsSuspected | None = None
     stretch: str = ""
     places_searched: bool = True
+
+
+@dataclass(frozen=True)
+class Statement:
+    """The sentence of a verdict, its kind, and what it says besides: whether it clears the model but for instruments,
+    whether it tells the laws that stand out, and of which instruments it tells.
+    """
+
+    kind: VerdictKind
+    sentence: str
+    clears_the_model: bool = False
+    tells_laws: bool = False
+    instruments: tuple[FaultyInstrument, ...] = ()
 
 
 def is_clear(instrument: FaultyInstrument) -> bool:

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
-from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, is_clear
+from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
 from vegglue.results.causes import FaultyInstrument
-from vegglue.results.diagnosis import Step, Suspect, VerdictKind
+from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening.places import LEAST_DEPTH
 
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
@@ -18,35 +18,38 @@ TOO_SHALLOW = (
 )
 
 
-def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], kind: VerdictKind, sentence: str) -> list[str]:
-    """All of them, those on what is named first; kind, sentence: of the verdict."""
+def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
+    """All of them, those on what is named first; statement: beside which they stand."""
     found, misfit = grounds.findings, grounds.misfit
     remarks = _implausible(found.steps, suspects)
     remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
-    remarks += _besides(grounds, suspects, sentence)
+    remarks += _besides(grounds, suspects, statement)
     remarks += [grounds.stretch] if grounds.stretch else []
     remarks += [] if grounds.places_searched else [TOO_SHALLOW]
-    law = grounds.laws is not None and law_in_words(grounds.laws) in sentence
-    if kind in ("identified", "one-of", "none-of-these", "instrument") and misfit.p < POOR and not law:
+    if (
+        statement.kind in ("identified", "one-of", "none-of-these", "instrument")
+        and misfit.p < POOR
+        and not statement.tells_laws
+    ):
         remarks.append(
             f"The misfit that is left is still larger than the errors allow ({misfit.told}, p = {misfit.p:.1g})."
         )
     return remarks
 
 
-def _besides(grounds: Grounds, suspects: Sequence[Suspect], sentence: str) -> list[str]:
-    """What else was taken into account, set aside, or cannot be tested, as far as the sentence does not say it."""
+def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
+    """What else was taken into account, set aside, or cannot be tested, as far as the statement does not say it."""
     errors, effects, remarks = grounds.errors, grounds.findings.effects, []
     if grounds.model_error is not None:
         remarks.append(model_error_in_words(grounds.model_error))
-    if grounds.laws is not None and (law := law_in_words(grounds.laws)) not in sentence:
+    if grounds.laws is not None and not statement.tells_laws:
         rather = f", rather than {' and '.join(effects)}" if effects else ""
-        remarks.append(f"To first order {law}{rather}. {TO_DISCOVER}")
+        remarks.append(f"To first order {law_in_words(grounds.laws)}{rather}. {TO_DISCOVER}")
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
-    remarks += [words for one in grounds.findings.instruments if (words := _told_of(one)) not in sentence]
+    remarks += [_told_of(one) for one in grounds.findings.instruments if one not in statement.instruments]
     told = {name for group in grounds.not_excluded for name in group} | {*effects}
     hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
     if hidden:

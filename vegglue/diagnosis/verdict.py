@@ -17,11 +17,12 @@ from vegglue.diagnosis.causes_in_words import (
     undecided_in_words,
     with_their_chances,
 )
-from vegglue.diagnosis.grounds import POOR, Grounds, is_clear
+from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.results.causes import LawsSuspected
-from vegglue.results.diagnosis import NOTHING_ELSE, Suspect, Verdict, VerdictKind
+from vegglue.results.diagnosis import Misfit, Suspect, Verdict, VerdictKind
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -45,16 +46,22 @@ NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad pro
 
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     """The verdict, its sentence, and what else should be known."""
-    kind, sentence = _sentence(grounds, suspects)
-    places = grounds.findings.places
-    remarks = remarks_of(grounds, suspects, kind, sentence)
-    return Verdict(kind, sentence, tuple(remarks), places[0] if places else None, grounds.not_excluded)
+    statement, places = _stated(grounds, suspects), grounds.findings.places
+    return Verdict(
+        kind=statement.kind,
+        sentence=statement.sentence,
+        remarks=tuple(remarks_of(grounds, suspects, statement)),
+        location=places[0] if places else None,
+        not_excluded=grounds.not_excluded,
+        clears_the_model=statement.clears_the_model,
+        tells_laws=statement.tells_laws,
+    )
 
 
-def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
+def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     found, misfit = grounds.findings, grounds.misfit
     if found.absurd:
-        return "cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}"
+        return Statement("cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}")
     doubt = _doubt(grounds, suspects)
     named = causes_in_words(found, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)
@@ -62,30 +69,35 @@ def _sentence(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKin
         return _with_a_law(grounds.laws, grounds, doubt)
     if grounds.field is not None:
         words = field_sentence(grounds.field) + (f", rather than {named}" if named else "")
-        return "none-of-these", f"None of the known effects: {words} ({misfit.told} without it)."
-    if found.places or found.steps:
-        if doubt:
-            return "cannot-tell", f"These data cannot tell: {doubt}. What explains most of the misfit: {named}."
-        if found.places:
-            return "none-of-these", f"None of the known effects: {named}; {misfit.told} with it."
-        if len(found.steps[0].groups) > MOST_GROUPS:
-            names = ", ".join(with_their_chances(found.steps[0], found.steps[0].rivals))
-            which = f"which of {names} it is (chances among those calibrated)"
-            return "cannot-tell", f"Something is missing, but these data cannot tell {which}."
-        single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
-        also = f" {instruments_in_words(found.instruments)}" if found.instruments else ""
-        which = found.steps[-1].accepted if any(step.likelier_place for step in found.steps) else "it"
-        return ("identified" if single else "one-of"), f"Missing: {named}; {misfit.told} with {which}.{also}"
+        return Statement("none-of-these", f"None of the known effects: {words} ({misfit.told} without it).")
+    if (found.places or found.steps) and doubt:
+        return Statement("cannot-tell", f"These data cannot tell: {doubt}. What explains most of the misfit: {named}.")
+    if found.places:
+        return Statement("none-of-these", f"None of the known effects: {named}; {misfit.told} with it.")
+    if found.steps:
+        return _with_effects(found, named, misfit)
     if found.undecided:
         names = undecided_in_words(found.undecided)
-        return (
-            "cannot-tell",
-            f"These data cannot tell: it may be {names}, but none of them surely ({misfit.told}).",
-        )
+        unsure = f"it may be {names}, but none of them surely ({misfit.told})"
+        return Statement("cannot-tell", f"These data cannot tell: {unsure}.")
     return _without_findings(grounds, suspects)
 
 
-def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[VerdictKind, str]:
+def _with_effects(found: Findings, named: str, misfit: Misfit) -> Statement:
+    """Listed effects, or too many to name; named: all of them in words."""
+    first = found.steps[0]
+    if len(first.groups) > MOST_GROUPS:
+        names = ", ".join(with_their_chances(first, first.rivals))
+        which = f"which of {names} it is (chances among those calibrated)"
+        return Statement("cannot-tell", f"Something is missing, but these data cannot tell {which}.")
+    single = all(len(step.rivals) == 1 and not step.others for step in found.steps)
+    also = f" {instruments_in_words(found.instruments)}" if found.instruments else ""
+    which = found.steps[-1].accepted if any(step.likelier_place for step in found.steps) else "it"
+    sentence = f"Missing: {named}; {misfit.told} with {which}.{also}"
+    return Statement("identified" if single else "one-of", sentence, instruments=found.instruments)
+
+
+def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> Statement:
     """A law where no known effect explains the misfit; an instrument that is clearly off goes before one that is not
     likelier than all else, but for readings side by side.
     """
@@ -93,14 +105,16 @@ def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> tuple[Verd
     if grounds.neighbours and not is_likelier(laws):
         doubt = doubt or NEIGHBOURS_ASIDE
     if doubt:
-        return "cannot-tell", f"These data cannot tell: {doubt}. To first order {law}. {TO_DISCOVER}"
+        told = f"These data cannot tell: {doubt}. To first order {law}. {TO_DISCOVER}"
+        return Statement("cannot-tell", told, tells_laws=True)
     if is_likelier(laws):
-        return "none-of-these", f"None of the known effects: {law}. {TO_DISCOVER}"
-    instruments = grounds.findings.instruments
-    if instruments and all(is_clear(one) for one in instruments):
-        off = instruments_in_words(instruments)
-        return "instrument", f"{off} These data cannot tell whether anything else is missing: {law}. {TO_DISCOVER}"
-    return "cannot-tell", f"These data cannot tell whether anything is missing: {law}. {TO_DISCOVER}"
+        return Statement("none-of-these", f"None of the known effects: {law}. {TO_DISCOVER}", tells_laws=True)
+    off = grounds.findings.instruments
+    if off and all(is_clear(one) for one in off):
+        unsure = f"These data cannot tell whether anything else is missing: {law}. {TO_DISCOVER}"
+        return Statement("instrument", f"{instruments_in_words(off)} {unsure}", tells_laws=True, instruments=off)
+    told = f"These data cannot tell whether anything is missing: {law}. {TO_DISCOVER}"
+    return Statement("cannot-tell", told, tells_laws=True)
 
 
 def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
@@ -130,51 +144,50 @@ def _is_at_bound(suspect: Suspect) -> bool:
     return amplitude.relative_size > FURTHEST - AT_BOUND or any(abs(amplitude.value - end) < margin for end in ends)
 
 
-def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> tuple[VerdictKind, str]:
+def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     misfit = grounds.misfit
     testable = [suspect for suspect in suspects if suspect.detectability.testable]
     if misfit.p < POOR:
-        return (
-            "cannot-tell",
-            f"The misfit is larger than the errors allow ({misfit.told}), but no known effect and no place stands out.",
-        )
+        larger = f"The misfit is larger than the errors allow ({misfit.told})"
+        return Statement("cannot-tell", f"{larger}, but no known effect and no place stands out.")
     unearned = _unearned(grounds)
     if unearned:
-        return "cannot-tell", _nothing_further(grounds, unearned)
+        return _nothing_further(grounds, unearned, "cannot-tell")
     if grounds.between > UNSEEN_RATIO:
         return _unsure_between(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
-        return (
-            "cannot-tell",
-            f"Nothing stands out ({misfit.told}), but only {len(testable)} of {len(suspects)} effects would be seen "
-            "in these data if they were there at twice a plausible size.",
-        )
+        seen = f"only {len(testable)} of {len(suspects)} effects would be seen in these data"
+        unsure = f"{seen} if they were there at twice a plausible size"
+        return Statement("cannot-tell", f"Nothing stands out ({misfit.told}), but {unsure}.")
     nothing = (
         f"{misfit.told}, and none of {len(suspects)} effects stands out ({len(testable)} of them would be seen at "
         "twice a plausible size)."
     )
-    clear = [one for one in grounds.findings.instruments if is_clear(one)]
+    clear = tuple(one for one in grounds.findings.instruments if is_clear(one))
     if clear:
-        return "instrument", f"{instruments_in_words(clear)} {NOTHING_ELSE}: {nothing}"
-    return "nothing-missing", f"Nothing is missing that these data could show: {nothing}"
+        told = f"{instruments_in_words(clear)} Nothing else is missing: {nothing}"
+        return Statement("instrument", told, clears_the_model=True, instruments=clear)
+    told = f"Nothing is missing that these data could show: {nothing}"
+    return Statement("nothing-missing", told, clears_the_model=True)
 
 
-def _unsure_between(grounds: Grounds) -> tuple[VerdictKind, str]:
+def _unsure_between(grounds: Grounds) -> Statement:
     """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
     unsure = (
         "where nobody measured, halfway between the sections, the model may miss by as much as "
         f"{grounds.between:.1f} times the errors of the data, by its own errors, those of its site and its parameters, "
         "as far as these data know them: a missing effect may hide in that"
     )
-    return ("instrument" if _all_clear(grounds) else "cannot-tell"), _nothing_further(grounds, unsure)
+    return _nothing_further(grounds, unsure, "instrument" if _all_clear(grounds) else "cannot-tell")
 
 
-def _nothing_further(grounds: Grounds, doubt: str) -> str:
+def _nothing_further(grounds: Grounds, doubt: str, kind: VerdictKind) -> Statement:
     """Instruments that are clearly off, or nothing, and why it cannot be said that nothing else is missing."""
     if not _all_clear(grounds):
-        return f"Nothing stands out ({grounds.misfit.told}), but {doubt}."
-    off = instruments_in_words(grounds.findings.instruments)
-    return f"{off} Nothing else stands out ({grounds.misfit.told}), but {doubt}."
+        return Statement(kind, f"Nothing stands out ({grounds.misfit.told}), but {doubt}.")
+    off = grounds.findings.instruments
+    told = f"{instruments_in_words(off)} Nothing else stands out ({grounds.misfit.told}), but {doubt}."
+    return Statement(kind, told, instruments=off)
 
 
 def _all_clear(grounds: Grounds) -> bool:

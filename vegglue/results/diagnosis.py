@@ -24,9 +24,7 @@ from vegglue.results.causes import (
 )
 from vegglue.results.suspect import Suspect
 
-# How the sentence of an instrument goes on where the rest of the model is cleared.
-NOTHING_ELSE = "Nothing else is missing"
-# instrument: some readings are off. Whether more is missing the sentence says, see `Verdict.clears_the_model`.
+# instrument: some readings are off. Whether more is missing says `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
 
 
@@ -67,6 +65,8 @@ class Step:
 class Verdict:
     """What was concluded. location: of something that no listed effect explains, None without; not_excluded: groups
     of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
+    clears_the_model: whether nothing is missing in the model, an instrument or none being off; tells_laws: whether the
+    sentence tells of laws that stand out.
     """
 
     kind: VerdictKind
@@ -74,11 +74,8 @@ class Verdict:
     remarks: tuple[str, ...]
     location: Location | None
     not_excluded: tuple[tuple[str, ...], ...]
-
-    @property
-    def clears_the_model(self) -> bool:
-        """Whether it says that nothing is missing in the model, an instrument or none being off."""
-        return self.kind == "nothing-missing" or (self.kind == "instrument" and NOTHING_ELSE in self.sentence)
+    clears_the_model: bool
+    tells_laws: bool
 
 
 @dataclass(frozen=True)

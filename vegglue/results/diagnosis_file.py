@@ -102,6 +102,8 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "name": diagnosis.name,
         "verdict": verdict.kind,
         "sentence": verdict.sentence,
+        "clears_the_model": verdict.clears_the_model,
+        "tells_laws": verdict.tells_laws,
         "chi2_first": misfit.chi2_first,
         "chi2": misfit.chi2,
         "freedom": misfit.freedom,
@@ -194,6 +196,8 @@ def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
         remarks=_parsed(tuple[str, ...], attributes["remarks"]),
         location=_parsed(Location | None, attributes["where"]),
         not_excluded=_parsed(tuple[tuple[str, ...], ...], attributes["not_excluded"]),
+        clears_the_model=stated_as(bool, attributes, "clears_the_model"),
+        tells_laws=stated_as(bool, attributes, "tells_laws"),
     )
 
 

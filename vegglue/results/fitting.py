@@ -50,11 +50,18 @@ def _has_type(values: np.ndarray, wanted: Any) -> bool:
     return values.dtype.kind != "O" or all(isinstance(one, str) for one in values.flat)
 
 
+_STATED: dict[type, tuple[tuple[type, ...], str]] = {
+    str: ((str,), "text"),
+    bool: ((bool, np.bool_), "yes or no"),
+}
+
+
 def stated_as(kind: type, stated: Mapping[str, Any], name: str) -> Any:
-    """A number or word that a file states. Errors: KeyError without it, ValueError where it is none of this kind."""
+    """A number, word, or yes or no that a file states. Errors: KeyError without it, ValueError where it is no such."""
     value = stated[name]
-    if not isinstance(value, str if kind is str else (int, float, np.integer, np.floating)):
-        raise ValueError(f"{name} is no {'text' if kind is str else 'number'}")
+    types, words = _STATED.get(kind, ((int, float, np.integer, np.floating), "number"))
+    if not isinstance(value, types):
+        raise ValueError(f"{name} is no {words}")
     return kind(value)
 
 
