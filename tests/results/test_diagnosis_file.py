@@ -19,8 +19,8 @@ HASH = "d" * 64
 ATTRIBUTES = {
     "chi2", "chi2_first", "config", "config_hash", "correlation", "field", "first_parameters", "first_scores",
     "flagged", "format", "freedom", "grid_error", "instruments", "laws", "locations", "mapped_term", "model_error",
-    "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "tells_laws", "threshold",
-    "verdict", "clears_the_model", "version", "where",
+    "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "tells_laws",
+    "threshold", "verdict", "clears_the_model", "version", "where",
 }  # fmt: skip
 OF_STATIONS = [
     "experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device",
