@@ -121,6 +121,11 @@ ROWS = {
     ),
     "depth_dependent_bed": (cells(), {"exponent": 2.0, "reference_depth": 0.4}, {"rate": 0.1 * 4.0}),
     "bank_trend": (cells(on=geometry(bank=1.0, share_along=0.25)), {"trend": 2.0}, {"rate": 0.1 * exp(0.5)}),
+    "bank_drag_trend": (
+        cells(on=geometry(bank=1.0, share_along=-0.25)),
+        {"drag": 0.4, "direction": -1.0},
+        {"rate": 0.1 + 0.4 * 0.75},
+    ),
     "bed_trend": (cells(on=geometry(share_along=-0.25)), {"trend": 2.0}, {"rate": 0.1 * exp(-0.5)}),
     "bank_difference": (cells(on=geometry(bank=1.0, offset=-1.3)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(-0.5)}),
     "steep_bank": (cells(on=geometry(side_slope=0.75)), {"share": 1.0}, {"rate": 0.1 * 1.25}),  # 3, 4, 5
@@ -217,6 +222,7 @@ def test_effect_hands_on_what_its_equation_says(name):
     [
         ("patch_density", plant_cells(patch=0.0), {"phi": 2.0}),
         ("bank_trend", cells(on=geometry(share_along=0.25)), {"rate": 0.1}),
+        ("bank_drag_trend", cells(on=geometry(share_along=-0.25)), {"rate": 0.1}),
         ("bed_trend", cells(on=geometry(bank=1.0, share_along=0.25)), {"rate": 0.1}),
         ("bed_trend", cells(on=geometry(planted=1.0, share_along=0.25)), {"rate": 0.1}),
     ],

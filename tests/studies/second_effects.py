@@ -145,6 +145,9 @@ DRAG: dict[str, Effect] = {
     "depth_dependent_bank": lambda s, exponent, reference_depth: _deep(s, exponent * s.lie.bank, reference_depth),
     "depth_dependent_bed": lambda s, exponent, reference_depth: _deep(s, exponent * s.open_floor, reference_depth),
     "bank_trend": lambda s, trend: s.k * np.exp(trend * s.lie.bank * (s.lie.x / s.length - 0.5)),
+    "bank_drag_trend": lambda s, drag, direction: (
+        s.k + drag * (0.5 + direction * (s.lie.x / s.length - 0.5)) * s.lie.bank
+    ),
     "bed_trend": lambda s, trend: s.k * np.exp(trend * s.open_floor * (s.lie.x / s.length - 0.5)),
     "bank_difference": lambda s, log_ratio: s.k * np.exp(0.5 * log_ratio * s.lie.bank * np.sign(s.lie.y)),
     "steep_bank": lambda s, share: s.k * (1.0 + share * s.lie.bank * ((1.0 + s.rise**2) ** 0.5 - 1.0)),

@@ -31,6 +31,11 @@ def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
     return {"rate": cells.rate * np.exp(trend * cells.geometry.bank * cells.geometry.share_along)}
 
 
+def bank_drag_trend(cells: Cells, drag: Array, direction: Array) -> dict[str, Array]:
+    """k -> k + c (1/2 + d (x - x_m) / L) on the banks."""
+    return {"rate": cells.rate + drag * (0.5 + direction * cells.geometry.share_along) * cells.geometry.bank}
+
+
 def bed_trend(cells: Cells, trend: Array) -> dict[str, Array]:
     """k -> k exp(a (x - x_m) / L) on the floor where no plants stand."""
     open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
@@ -90,6 +95,18 @@ EFFECTS = (
         equation="k -> k exp(a (x - x_m)/L) on the banks, x_m the middle of the grid, L its length",
         act=bank_trend,
         amplitude=Amplitude("trend", "-", "logarithm a of k at the end over k at the beginning", 0.5, -4.0, 4.0),
+        source="definition",
+        checked=True,
+    ),
+    Effect(
+        name="bank_drag_trend",
+        stage="resistance",
+        title="Plants or stones on the banks stand ever closer along the channel",
+        equation="k -> k + c (1/2 + d (x - x_m)/L) on the banks, x_m the middle of the grid, L its length",
+        act=bank_drag_trend,
+        # A bank with n = 0.03 holds back 0.3 m of water by 0.04 1/m.
+        amplitude=Amplitude("drag", "1/m", "drag c that is added where there is most", 0.05, 0.0, 5.0),
+        shapes=(Shape("direction", "-", "d, 1 where it grows downstream, -1 upstream", 1.0, -1.0, 1.0, (1.0, -1.0)),),
         source="definition",
         checked=True,
     ),
