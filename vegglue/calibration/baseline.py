@@ -63,10 +63,18 @@ def search_model(base: Baseline) -> SearchModel:
     The model itself where the coarse one has fewer than FEWEST_CELLS_ACROSS.
     """
     point = base.fitted.point
-    if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < FEWEST_CELLS_ACROSS:
+    if not searches_coarse_cells(base):
         return SearchModel(base.model, base.noise, point)
+    assert base.coarse is not None
+    assert base.on_coarse is not None
     shift = base.noise.used(point.prediction - base.on_coarse.prediction)
     return SearchModel(base.coarse, replace(base.noise, value=base.noise.value - shift), base.on_coarse)
+
+
+def searches_coarse_cells(base: Baseline) -> bool:
+    """Whether the search for missing effects uses cells of twice the size."""
+    coarse = None if base.on_coarse is None else base.coarse
+    return coarse is not None and cells_across(coarse.site) >= FEWEST_CELLS_ACROSS
 
 
 def model_that_errs(base: Baseline) -> SearchModel:
@@ -105,8 +113,10 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
 
 def with_coarse_point(base: Baseline) -> Baseline:
     """With the point on coarse cells at the same z."""
-    coarse, z = base.coarse, base.fitted.point.z
-    return replace(base, on_coarse=None if coarse is None else linearise(coarse, z, base.on_coarse))
+    coarse, z, known = base.coarse, base.fitted.point.z, base.on_coarse
+    if coarse is None or (known is not None and np.array_equal(known.z, z)):
+        return base
+    return replace(base, on_coarse=linearise(coarse, z, known))
 
 
 def _near(coarse: Model, noise: Noise, known: Array | None) -> Point | None:

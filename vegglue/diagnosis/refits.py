@@ -17,11 +17,12 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import (
     Baseline,
     SearchModel,
+    searches_coarse_cells,
     with_coarse_point,
     with_error_of_grid,
     with_own_error,
 )
-from vegglue.calibration.fit import MapEstimate, fit, interval95, log_evidence_under
+from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise, linearise_from
@@ -125,8 +126,11 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     start = linearise_from(model, place.z, place)
     if start is None:
         return None
-    trial = Baseline(model, base.noise, fit(model, base.noise, start), _with(base.coarse, best), base.on_coarse)
-    return with_own_error(with_error_of_grid(with_coarse_point(trial)))
+    # The error of the grid is told where the refit ended first: its flow on coarse cells is known if they are searched.
+    on_coarse = place if searches_coarse_cells(base) else base.on_coarse
+    trial = Baseline(model, base.noise, at_point(base.noise, start), _with(base.coarse, best), on_coarse)
+    near = with_error_of_grid(with_coarse_point(trial))
+    return with_own_error(with_error_of_grid(with_coarse_point(near)))
 
 
 def _with(model: Model, tried: RefitTrial | Refit) -> Model:
