@@ -119,12 +119,10 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemb
     np.testing.assert_array_equal(ensemble.seconds[there], seconds[there])  # of the wall clock: not solved again
 
 
-def test_the_numbers_do_not_depend_on_the_number_of_jobs(tmp_path: Path, uninterrupted: Ensemble) -> None:
-    vegglue(tmp_path, "simulate", several_chunks(tmp_path).name, "--jobs", 2)
-    ensemble = read_ensemble(tmp_path / ENSEMBLE)
-    assert_same_numbers(ensemble, uninterrupted)
-    assert (ensemble.status == SOLVED_BY_NEWTON).all()
-    assert len(np.unique(ensemble.prediction[:, 0])) == CHUNKS * CHUNK
+def test_all_are_solved_and_differ(uninterrupted: Ensemble) -> None:
+    """That their numbers do not depend on the number of jobs: above, where those before the kill had another."""
+    assert (uninterrupted.status == SOLVED_BY_NEWTON).all()
+    assert len(np.unique(uninterrupted.prediction[:, 0])) == CHUNKS * CHUNK
 
 
 @pytest.mark.usefixtures("interruptible")
