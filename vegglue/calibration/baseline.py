@@ -15,7 +15,7 @@ from vegglue.calibration.noise import (
     with_model_error,
 )
 from vegglue.case.parameter_space import refuse_without_parameters
-from vegglue.engine.interface import Model, Point, linearise, linearise_from
+from vegglue.engine.interface import Model, Point, by_itself, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
@@ -69,6 +69,15 @@ def search_model(base: Baseline) -> SearchModel:
     assert base.on_coarse is not None
     shift = base.noise.used(point.prediction - base.on_coarse.prediction)
     return SearchModel(base.coarse, replace(base.noise, value=base.noise.value - shift), base.on_coarse)
+
+
+def searched_by_itself(base: Baseline) -> Baseline:
+    """The baseline with nothing borrowed at the point of its search: many answers are asked for there."""
+    if searches_coarse_cells(base):
+        assert base.coarse is not None
+        assert base.on_coarse is not None
+        return replace(base, on_coarse=by_itself(base.coarse, base.on_coarse))
+    return replace(base, fitted=replace(base.fitted, point=by_itself(base.model, base.fitted.point)))
 
 
 def searches_coarse_cells(base: Baseline) -> bool:

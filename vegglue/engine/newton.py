@@ -17,6 +17,7 @@ from vegglue.flow.problem import EMPTY, Problem, crop
 from vegglue.flow.problem_setup import build_problem, with_effects_of
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import in_threads
+from vegglue.solver.chord import ChordSolution
 from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.newton import CLOSE
 from vegglue.solver.prolongation import on_grid
@@ -187,29 +188,32 @@ def _state_and_factors(
     before = None if near is None else near.flows.get(experiment)
     if near is not None and before is not None:
         warm = _warm(near, before, z, problem.shape)
-        borrowed = _borrowed(problem, before, warm, tolerance)
-        if borrowed is not None:
-            return borrowed
+        end = _borrowed(problem, before, warm, tolerance)
+        if end is not None and end.converged[0]:
+            moved = before.moved + float(np.abs(end.state - before.state).max())
+            return replace(before, state=end.state, moved=moved)
+        if end is not None and end.correction[0] < CLOSE:  # factors made here lead on, and are those of the flow itself
+            warm = widen(end.state, before.rows, before.band)
     solution, own, band = settled(problem, warm, tolerance)
     return None if own is None else SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
 
 
-def _borrowed(problem: Problem, before: SteadyFlow, warm: Array, tolerance: float) -> SteadyFlow | None:
-    """The flow by chord steps with factors of a flow nearby; None if these do not lead there in a few steps."""
+def _borrowed(problem: Problem, before: SteadyFlow, warm: Array, tolerance: float) -> ChordSolution | None:
+    """A few chord steps with factors of a flow nearby; None if that has other cells."""
     if before.state.shape[0] != problem.shape[0] or before.rows != problem.shape[1]:
         return None
     start = rows_inside(warm, before.band)
-    end = chord_in_band(problem, start, before.factors, before.band, tolerance, BORROWED_STEPS)
-    if not end.converged[0]:
-        return None
-    return replace(before, state=end.state, moved=before.moved + float(np.abs(end.state - before.state).max()))
+    return chord_in_band(problem, start, before.factors, before.band, tolerance, BORROWED_STEPS)
 
 
 def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> Array:
-    """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be."""
-    warm = widen(before.state, before.rows, before.band)
-    if before.slopes.shape[3] == z.size:
-        warm = warm + widen(before.slopes @ (z - near.z)[:, None], before.rows, before.band)
+    """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be.
+
+    Where an effect was added since, its amplitude is the last of z.
+    """
+    warm, known = widen(before.state, before.rows, before.band), before.slopes.shape[3]
+    if known <= z.size:
+        warm = warm + widen(before.slopes @ (z[:known] - near.z)[:, None], before.rows, before.band)
     return on_grid(warm, shape)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, search_model
+from vegglue.calibration.baseline import Baseline, SearchModel, search_model, searched_by_itself
 from vegglue.calibration.fit import MapEstimate, at_point
 from vegglue.calibration.noise import Noise, draw_whitened_errors
 from vegglue.calibration.noise_estimate import estimate_noise
@@ -94,6 +94,7 @@ def screen(
     The correlation of the errors is estimated first. known: fingerprints at the point of the search model, where they
     are at hand; seed: of the draws of errors alone.
     """
+    base = searched_by_itself(base)
     search = search_model(base)
     point = search.point
     fingerprints = known or fingerprints_of(search, half_width(base.model.site))
