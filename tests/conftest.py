@@ -12,32 +12,32 @@ from threadpoolctl import threadpool_limits
 import vegglue.parallel
 
 TESTS = Path(__file__).parent
-# Files that take minutes, or half of one: begun last, one of them would keep one process at work while the others wait.
+# Files that take minutes, or a third of one: begun last, one of them would keep a process at work while others wait.
 LONGEST = [
     TESTS / name
     for name in (
         "test_documents.py",
+        "end_to_end/test_open_effects.py",
         "end_to_end/test_open_pair.py",
         "diagnosis/test_diagnose_statistics.py",
-        "end_to_end/test_open_effects.py",
         "discovery/test_search.py",
         "engine/test_engines.py",
         "end_to_end/test_open_instruments.py",
         "end_to_end/test_open_places.py",
-        "verification/test_banks.py",
-        "ensemble/test_another_processor.py",
-        "verification/test_independent_code.py",
         "workflow/test_run.py",
-        "end_to_end/test_faults.py",
-        "checks/test_effect_contract.py",
-        "cli/test_cli.py",
-        "studies/test_ranks_of_twins.py",
         "end_to_end/test_own_engine_faults.py",
+        "end_to_end/test_faults.py",
+        "ensemble/test_another_processor.py",
+        "checks/test_effect_contract.py",
+        "end_to_end/test_kills.py",
+        "studies/test_ranks_of_twins.py",
         "test_cluster.py",
+        "cli/test_cli.py",
         "studies/test_second_engine.py",
+        "cli/test_every_command.py",
+        "verification/test_independent_code.py",
+        "cli/test_effect_commands.py",
         "verification/test_operator.py",
-        "verification/test_lateral.py",
-        "verification/test_steady.py",
     )
 ]
 assert all(path.is_file() for path in LONGEST)
