@@ -48,7 +48,7 @@ def closures(problem: Problem, state: Array, depth: Array) -> Closures:
     rate = bed_drag(problem, depth)
     if geometry is None or not stages & {"resistance", "exchange", "force"}:
         _add_plant_drag(problem, rate, depth, plants)
-        return Closures(rate, np.ascontiguousarray(np.broadcast_to(problem.viscosity, depth.shape)), {})
+        return Closures(rate, np.array(np.broadcast_to(problem.viscosity, depth.shape), order="C"), {})
     bed_rate = rate.copy()
     _add_plant_drag(problem, rate, depth, plants)
     return _after_effects(problem, geometry, state, _Friction(depth, rate, bed_rate))
