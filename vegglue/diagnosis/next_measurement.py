@@ -9,6 +9,7 @@ in squared standard errors, is the gain of the log-likelihood ratio (times two) 
 j may be the model without any effect: then D^2 says whether i would be seen at all.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -55,16 +56,11 @@ class MeasurementPlan:
 
 @dataclass(frozen=True)
 class MeasurementWorth:
-    """A plan, and the least D^2 between any two rivals now and with it [-]."""
+    """A plan, and the least D^2 between each rival and any other now and with it, (rival,) [-]."""
 
     plan: MeasurementPlan
-    now: float
-    then: float
-
-    @property
-    def per_hour(self) -> float:
-        """What it adds to D^2 for each hour of field work [1/h]."""
-        return (self.then - self.now) / self.plan.hours
+    now: Array
+    then: Array
 
 
 Rival = tuple[Candidate, dict[str, float], float]
@@ -73,8 +69,8 @@ Rival = tuple[Candidate, dict[str, float], float]
 def worth_of_measurements(
     model: Model, noise: Noise, here: Point, questions: Sequence[Sequence[Rival]]
 ) -> list[list[MeasurementWorth]]:
-    """For each question, plans ranked by gain per hour; a question is a few rivals to be told apart, or one effect to
-    be told from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
+    """For each question the worth of all plans; a question is a few rivals to be told apart, or one effect to be told
+    from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
     """
     for case in (*(_with_other_discharges(model, lower) for lower in (LOWER, ())), model.case):
         wide, plans = planned(model, case)
@@ -92,13 +88,13 @@ def worth_of_measurements(
     known[: len(model.station)] = model.station["used"].to_numpy(bool)
     ends = np.cumsum([len(question) for question in questions])
     own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
-    return [_ranked(plans, known, covariance, point.slope, part) for part in own]
+    return [_worths(plans, known, covariance, point.slope, part) for part in own]
 
 
-def _ranked(
+def _worths(
     plans: Sequence[MeasurementPlan], known: np.ndarray, covariance: Array, slope: Array, traces: Array
 ) -> list[MeasurementWorth]:
-    def least(rows: np.ndarray) -> float:
+    def least(rows: np.ndarray) -> Array:
         lower = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
         white = scipy.linalg.solve_triangular(lower, np.hstack([slope, traces])[rows], lower=True)
         return _least(white[:, : slope.shape[1]], white[:, slope.shape[1] :])
@@ -108,7 +104,7 @@ def _ranked(
         rows = known.copy()
         rows[plan.rows] = True
         found.append(MeasurementWorth(plan, now, least(rows)))
-    return sorted(found, key=lambda one: -one.per_hour)
+    return found
 
 
 def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
@@ -234,15 +230,17 @@ def _errors(station: pd.DataFrame, noise: Noise) -> Array:
     return errors
 
 
-def _least(slope: Array, traces: Array) -> float:
-    """The least D^2 over ordered pairs of rivals; against the model without any when there is only one."""
-    least = np.inf
-    for i in range(traces.shape[1]):
-        others: list[int | None] = [j for j in range(traces.shape[1]) if j != i] or [None]
-        for j in others:
-            calibrated = slope if j is None else np.column_stack([slope, traces[:, j]])
-            least = min(least, _left(calibrated, traces[:, i], slope.shape[1]))
-    return float(least)
+def _least(slope: Array, traces: Array) -> Array:
+    """The least D^2 between each rival and any other, either way, (rival,); from the model without any when there is
+    only one.
+    """
+    count, priors = traces.shape[1], slope.shape[1]
+    if count == 1:
+        return np.array([_left(slope, traces[:, 0], priors)])
+    between = np.full((count, count), np.inf)
+    for i, j in itertools.permutations(range(count), 2):
+        between[i, j] = _left(np.column_stack([slope, traces[:, j]]), traces[:, i], priors)
+    return np.minimum(between, between.T).min(axis=1)
 
 
 def _left(calibrated: Array, trace: Array, priors: int) -> float:

@@ -1,6 +1,6 @@
 """case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +29,8 @@ from vegglue.workflow.run_folder import calibrated, folder_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
+# Rivals from which on each is also asked for by itself: of two, one is told from the other as the other from it.
+FEWEST_PARTED = 3
 # Laws that one question is about at most: of more, two that are alike decide what no measurement answers.
 MOST_LAWS = 3
 
@@ -62,7 +64,8 @@ def next_measurement(
             base = with_places(calibrated(case, folder_of(runs, case), excluded_by(found), watch), found)
             watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
-        questions = [Question(what, (*map(_proposed, worth),)) for (what, _), worth in zip(asked, worths, strict=True)]
+        answered = zip(asked, worths, strict=True)
+        questions = [one for (what, rivals), worth in answered for one in _answers(what, rivals, worth)]
     if not between:
         write_questions(folder_of(runs, case), questions, wanted)
     return questions
@@ -81,9 +84,31 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def _proposed(one: MeasurementWorth) -> ProposedMeasurement:
+def _answers(what: str, rivals: Sequence[Rival], worths: Sequence[MeasurementWorth]) -> list[Question]:
+    """A question with what could be measured for it. Where nothing answers it and there are more than two rivals, those
+    that something tells from all others follow.
+    """
+    whole = Question(what, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
+    if whole.useful or len(rivals) < FEWEST_PARTED:
+        return [whole]
+    names = [candidate.name for candidate, _, _ in rivals]
+    single = [
+        Question(
+            f"{name} from {' or '.join(other for other in names if other != name)}",
+            _ranked(_proposed(one, one.now[i], one.then[i]) for one in worths),
+        )
+        for i, name in enumerate(names)
+    ]
+    return [whole, *(one for one in single if one.useful)]
+
+
+def _ranked(proposed: Iterable[ProposedMeasurement]) -> tuple[ProposedMeasurement, ...]:
+    return tuple(sorted(proposed, key=lambda one: -one.per_hour))
+
+
+def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasurement:
     plan = one.plan
-    return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, one.now, one.then)
+    return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, float(now), float(then))
 
 
 def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
