@@ -68,3 +68,16 @@ def test_a_place_without_flow_is_stepped_back_from(monkeypatch: pytest.MonkeyPat
     found = fit(None, NOISE, at(np.array([1.5, 0.0])))  # type: ignore[arg-type]
     assert 1.9 < found.point.z[0] < 2.0
     assert found.point.z[1] == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize(("worth", "followed"), [(-1.0, False), (1.0, True)])
+def test_a_search_that_promises_too_little_is_not_followed(asked: list[Array], worth: float, followed: bool) -> None:
+    """Of a model linear in z the slopes promise what is there."""
+    start, best = at(np.array([0.0, -3.0])), fit(None, NOISE, at(np.array([1.0, 0.6])))  # type: ignore[arg-type]
+    linear = Point(start.z, start.prediction, best.point.slope, {})
+    white = NOISE.whiten(linear.slope)
+    wide, target = np.vstack([white, np.eye(2)]), np.append(NOISE.whiten(NOISE.residual(linear.prediction)), -linear.z)
+    least = float(np.sum((target - wide @ np.linalg.lstsq(wide, target)[0]) ** 2))
+    asked.clear()
+    fit(None, NOISE, linear, enough=least + worth)  # type: ignore[arg-type]
+    assert bool(asked) == followed

@@ -2,17 +2,21 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import scipy.stats
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import log_evidence
 from vegglue.calibration.fit import covariance
 from vegglue.case.parameter_space import theta_at, z_of
 from vegglue.diagnosis import refits
 from vegglue.diagnosis.competition import Contender, chances_of
+from vegglue.diagnosis.refits import RefitTrial
 from vegglue.diagnosis.rivals import rivals_among
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.effects.library import library
@@ -132,3 +136,20 @@ def test_a_parameter_that_explains_nothing_is_charged() -> None:
     found = [log_evidence(at_best(CASE_OF_TWINS, station, values, one)) for one in (slope, np.hstack([slope, other]))]
     length = float(np.sum((other / 0.01) ** 2))
     assert found[1] - found[0] == pytest.approx(-0.5 * np.log1p(length)), "Occam's factor"
+
+
+def test_a_later_start_has_to_promise_more_than_the_best_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = {0.0: 9.0, 1.0: None, 2.0: 4.0, 3.0: 7.0}
+    asked = list[float]()
+
+    def refitted(search: Any, trial: RefitTrial, start: Array, enough: float) -> Any:
+        asked.append(enough)
+        objective = ends[float(start[0])]
+        return None if objective is None else SimpleNamespace(objective=objective)
+
+    monkeypatch.setattr(refits, "_refitted", refitted)
+    trial = RefitTrial(Candidate(library(None)["edge_mixing"]), {}, tuple(np.full(1, start) for start in ends))
+    best = refits._best_of_starts(None, trial)  # type: ignore[arg-type]
+    assert best is not None
+    assert best.objective == 4.0
+    assert asked == [np.inf, *(one - refits.WORTH_FOLLOWING for one in (9.0, 9.0, 4.0))]

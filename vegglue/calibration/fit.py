@@ -41,16 +41,16 @@ class MapEstimate:
     covariance: Array
 
 
-def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS) -> MapEstimate:
+def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enough: float = np.inf) -> MapEstimate:
     """The MAP estimate, searched from a point by Levenberg-Marquardt steps (More 1978, doi:10.1007/BFb0067700).
 
     The longest step shrinks where the slopes predict the decrease badly. The search ends when the predicted decrease is
-    below NEGLIGIBLE_DECREASE, or after `steps`.
+    below NEGLIGIBLE_DECREASE, after `steps`, or when slopes promise no objective below `enough`.
     """
     point, longest = start, LONGEST_FIT_STEP
     for _ in range(steps):
         step, predicted = _step(noise, point, longest)
-        if predicted < NEGLIGIBLE_DECREASE:
+        if predicted < NEGLIGIBLE_DECREASE or _promised(noise, point) > enough:
             break
         there, before = point.z + step, objective(noise, point)
         # The slopes of a step that is taken back are never asked for: they are half of its work.
@@ -130,6 +130,13 @@ def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, flo
     z[:, j] += NORMAL95 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
     middle, low, high = theta_at(model.case, z)[name]
     return float(middle), float(low), float(high)
+
+
+def _promised(noise: Noise, point: Point) -> float:
+    """F - b' H^-1 b: the least objective by the slopes at a point [-], H = J' W' W J + I, b = J' W' W (y - f) - z."""
+    slope = noise.whiten(noise.used(point.slope))
+    right = slope.T @ noise.whiten(noise.residual(point.prediction)) - point.z
+    return objective(noise, point) - float(right @ covariance(noise, point) @ right)
 
 
 def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:

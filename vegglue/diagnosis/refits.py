@@ -37,6 +37,8 @@ REFIT_STEPS = 10
 # Shares of the way to a start at which a flow is looked for, the next where the one before has none. Chosen, not
 # measured: with a tenth of a size nearly every flow is found that is found without.
 SHARES_OF_START = (1.0, 0.3, 0.1)
+# Fall of the objective that a later start has to promise [-]: half of it is evidence, e^0.25. Chosen, not measured.
+WORTH_FOLLOWING = 0.5
 # An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
 NEEDED = 2.0
 
@@ -73,15 +75,11 @@ class Refit:
 def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:
     """Each trial refitted, side by side; None where no flow is found."""
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
-    tasks = [(trial, start) for trial in trials for start in trial.starts]
-    finished = counted(watch, "refitting with each", len(tasks), "refits")
-    ends = iter(side_by_side(partial(_refitted, search), tasks, finished))
-    found: list[Refit | None] = []
-    for trial in trials:
-        fits = [end for end in [next(ends) for _ in trial.starts] if end is not None]
-        best = min(fits, key=lambda one: one.objective, default=None)
-        found.append(None if best is None else _refit(search, trial, best, nothing))
-    return found
+    finished = counted(watch, "refitting with each", len(trials), "refits")
+    ends = side_by_side(partial(_best_of_starts, search), [(trial,) for trial in trials], finished)
+    return [
+        None if best is None else _refit(search, trial, best, nothing) for trial, best in zip(trials, ends, strict=True)
+    ]
 
 
 def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z: Array, gain: float) -> Array:
@@ -91,12 +89,22 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
     return np.append(z, z_of(changed.parameters[candidate.parameter], amplitude))
 
 
-def _refitted(search: SearchModel, trial: RefitTrial, start: Array) -> MapEstimate | None:
+def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | None:
+    """The best end of all starts, each later one followed while it promises more than those before it."""
+    best: MapEstimate | None = None
+    for start in trial.starts:
+        found = _refitted(search, trial, start, np.inf if best is None else best.objective - WORTH_FOLLOWING)
+        if found is not None and (best is None or found.objective < best.objective):
+            best = found
+    return best
+
+
+def _refitted(search: SearchModel, trial: RefitTrial, start: Array, enough: float) -> MapEstimate | None:
     model = _with(search.model, trial)
     for share in SHARES_OF_START:
         point = linearise_from(model, _nearer(model, trial, search.point.z, start, share), search.point)
         if point is not None:
-            return fit(model, search.noise, point, REFIT_STEPS)
+            return fit(model, search.noise, point, REFIT_STEPS, enough)
     return None
 
 
