@@ -1,11 +1,9 @@
 """A diagnosis as the object that `vegglue diagnose --json` prints."""
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
+from vegglue.plain_json import plain
 from vegglue.results.diagnosis import Diagnosis, Suspect
 
 
@@ -35,7 +33,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "laws": None if diagnosis.laws is None else asdict(diagnosis.laws),
         "zones": misfit.zones.to_dict("records"),
     }
-    return {name: _plain(value) for name, value in tree.items()}
+    return {name: plain(value) for name, value in tree.items()}
 
 
 def flat_suspect(suspect: Suspect) -> dict[str, Any]:
@@ -67,14 +65,3 @@ def _flagged(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
     station = diagnosis.predictions.station.iloc[row]
     place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
     return place | {name: float(station[name]) for name in ("x", "y", "value")}
-
-
-def _plain(tree: Any) -> Any:
-    """Numbers as JSON knows them: no NaN, no infinity, no tuples."""
-    if isinstance(tree, Mapping):
-        return {key: _plain(value) for key, value in tree.items()}
-    if isinstance(tree, list | tuple):
-        return [_plain(value) for value in tree]
-    if isinstance(tree, float | np.floating):
-        return float(tree) if np.isfinite(tree) else None
-    return tree
