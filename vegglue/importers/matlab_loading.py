@@ -1,11 +1,17 @@
-"""MATLAB files of version 5, loaded by the process of `first_look` before the command loads them itself."""
+"""MATLAB files of version 5, loaded by the process of `first_look` before the command loads them itself, and their
+structures read.
+"""
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.io import loadmat
 
+from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.first_look import why_unreadable
 from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
@@ -44,3 +50,22 @@ def read_all_variables(path: str) -> None:
             raise
         except Exception:  # on damaged files it raises anything
             return
+
+
+@contextmanager
+def reading_structures(path: Path, kind: str, advice: str) -> Iterator[None]:
+    """Within, structures of a file are read: whatever they lack is told in one sentence, as an InputError.
+
+    kind: what was expected; advice: how to come by it, both in words.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (AttributeError, IndexError, ValueError, TypeError) as error:
+        raise InputError(f"{shown_path(path)}: expected {kind}, got others ({error}); {advice}.") from None
+
+
+def numbers_of_variable(values: Any) -> Array:
+    """A variable as numbers, a single one as an array of one."""
+    return np.atleast_1d(np.asarray(values, dtype=np.float64))

@@ -14,6 +14,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.in_short import so_many
@@ -23,16 +24,9 @@ QREV_VARIABLE = "meas_struct"  # the variable by which such a file is known
 
 def stations_of_qrev(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
     """Stations of all transects together that QRev used for the discharge. Errors: InputError naming the file."""
-    try:
+    with reading_structures(path, "the transects of a measurement saved by QRev", "save it anew in QRev"):
         used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]
         profiles = [profile for one in used for profile in _profiles(path, one, str(used[0].startEdge))]
-    except InputError:
-        raise
-    except (AttributeError, IndexError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{shown_path(path)}: expected the transects of a measurement saved by QRev, got others ({error}); save it "
-            "anew in QRev."
-        ) from None
     return stations_of_transect(path, words, profiles, f"QRev, {so_many(len(used), 'transect')}")
 
 
@@ -50,9 +44,9 @@ def _profiles(path: Path, transect: Any, first_bank: str) -> Iterator[BoatProfil
     inside = np.atleast_1d(transect.inTransectIdx).astype(int) - 1
     places = _track(transect)[inside]
     places = places - (places[0] if str(transect.startEdge) == first_bank else places[-1])
-    depth = _numbers(bed.depthProcessed_m)[inside]
+    depth = numbers_of_variable(bed.depthProcessed_m)[inside]
     below, east, north = (
-        np.atleast_2d(_numbers(one))[:, inside]
+        np.atleast_2d(numbers_of_variable(one))[:, inside]
         for one in (bed.depthCellDepth_m, water.uProcessed_mps, water.vProcessed_mps)
     )
     good = np.atleast_2d(np.asarray(water.validData)[..., 0].astype(bool))[:, inside]
@@ -66,10 +60,6 @@ def _profiles(path: Path, transect: Any, first_bank: str) -> Iterator[BoatProfil
 def _track(transect: Any) -> Array:
     """x_i = x_(i-1) + u_i dt_i east and north (n, 2) [m], as QRev sums it up."""
     boat = getattr(transect.boatVel, str(transect.boatVel.selected))
-    steps = _numbers(transect.dateTime.ensDuration_sec)
-    parts = (_numbers(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps))
+    steps = numbers_of_variable(transect.dateTime.ensDuration_sec)
+    parts = (numbers_of_variable(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps))
     return np.column_stack([np.nancumsum(one) for one in parts])
-
-
-def _numbers(values: Any) -> Array:
-    return np.atleast_1d(np.asarray(values, dtype=np.float64))

@@ -14,6 +14,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.matlab_loading import reading_structures
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.importers.unit_words import si_factor
@@ -26,15 +27,9 @@ EAST_NORTH_UP, OVER_GROUND, IN_TRANSECT = 2, (1, 2, 3), 3
 
 def stations_of_riversurveyor(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
     """Stations of a transect. Errors: InputError naming the file."""
-    try:
+    kind = "the structures of a MATLAB export of RiverSurveyor Live"
+    with reading_structures(path, kind, "export it anew"):
         return stations_of_transect(path, words, list(_profiles(path, parts)), "RiverSurveyor MATLAB export")
-    except InputError:
-        raise
-    except (AttributeError, IndexError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{shown_path(path)}: expected the structures of a MATLAB export of RiverSurveyor Live, got others "
-            f"({error}); export it anew."
-        ) from None
 
 
 def _profiles(path: Path, parts: dict[str, Any]) -> Iterator[BoatProfile]:

@@ -14,6 +14,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
+from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.nortek import LEAST_CORRELATION, refuse_nowhere, trusted_samples
 
@@ -29,16 +30,11 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], words: FileWords) -> Tak
     """
     refuse_nowhere(path, words)
     data, config = (parts[name] for name in PROFILER_VARIABLES)
-    try:
-        away, rate = _numbers(data.Profiles_Range).ravel(), float(config.sampleRate)
+    with reading_structures(path, "the structures of a Vectrino Profiler", "export it anew from MIDAS"):
+        away, rate = numbers_of_variable(data.Profiles_Range).ravel(), float(config.sampleRate)
         velocity = _velocity(data, config)
         correlation = np.stack([_samples(data, f"CorBeam{beam}") for beam in range(1, 5)], axis=2)
         trusted = _trusted(velocity, correlation) & _above_the_bed(data, away)
-    except (AttributeError, IndexError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{shown_path(path)}: expected the structures of a Vectrino Profiler, got others ({error}); export it anew "
-            "from MIDAS."
-        ) from None
     kept = np.flatnonzero(trusted.mean(axis=0) >= SOUND_SHARE)
     if not kept.size:
         raise InputError(
@@ -66,7 +62,7 @@ def _velocity(data: Any, config: Any) -> Array:
     if int(config.coordSystem) != BEAMS:
         return np.stack([_samples(data, f"Vel{axis}") for axis in ("X", "Y", "Z1")], axis=2)
     beams = np.stack([_samples(data, f"VelBeam{beam}") for beam in range(1, 5)], axis=2)
-    turn = _numbers(config.ProbeCalibration_calibrationMatrix).reshape(-1, 4, 4)
+    turn = numbers_of_variable(config.ProbeCalibration_calibrationMatrix).reshape(-1, 4, 4)
     return np.asarray(np.einsum("cij,ncj->nci", turn[: beams.shape[1]], beams)[..., :3])
 
 
@@ -82,7 +78,7 @@ def _trusted(velocity: Array, correlation: Array) -> Mask:
 
 def _above_the_bed(data: Any, away: Array) -> Mask:
     """Cells that end before the bed, where the probe saw it: at its median distance."""
-    seen = _numbers(getattr(data, "BottomCheck_BottomDistance", 0.0)).ravel()
+    seen = numbers_of_variable(getattr(data, "BottomCheck_BottomDistance", 0.0)).ravel()
     seen = seen[seen > 0.0]
     half = 0.5 * float(np.abs(np.diff(away)).min()) if away.size > 1 else 0.0
     return np.asarray(away + half <= (np.median(seen) if seen.size else np.inf))
@@ -90,9 +86,5 @@ def _above_the_bed(data: Any, away: Array) -> Mask:
 
 def _samples(data: Any, name: str) -> Array:
     """A variable (samples, cells)."""
-    values = _numbers(getattr(data, f"Profiles_{name}"))
-    return values if values.ndim == 2 else values.reshape(-1, _numbers(data.Profiles_Range).size)
-
-
-def _numbers(values: Any) -> Array:
-    return np.atleast_1d(np.asarray(values, dtype=np.float64))
+    values = numbers_of_variable(getattr(data, f"Profiles_{name}"))
+    return values if values.ndim == 2 else values.reshape(-1, numbers_of_variable(data.Profiles_Range).size)
