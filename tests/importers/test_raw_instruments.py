@@ -15,7 +15,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import read_flowtracker2
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.nortek import read_vector
-from vegglue.importers.raw_transects import read_pd0
+from vegglue.importers.pd0_transects import read_pd0
 from vegglue.importers.winriver import read_winriver
 
 ALONG = np.linspace(0.0, 15.0, 151)  # 0.06 m/s east and 0.08 m/s north, whole millimetres as the format has them

@@ -10,9 +10,9 @@ from vegglue.importers.loose_table import readable_text
 from vegglue.importers.matlab_exports import MAT_73_BEGINS, MAT_BEGINS, read_matlab
 from vegglue.importers.measured_rows import Taken
 from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
+from vegglue.importers.pd0_transects import PD0_BEGINS, read_pd0
 from vegglue.importers.placed_tables import read_placed_rows
 from vegglue.importers.qrev_summary import is_qrev_summary, read_qrev_summary
-from vegglue.importers.raw_transects import PD0_BEGINS, read_pd0
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
 from vegglue.importers.winriver import is_winriver, read_winriver
 
