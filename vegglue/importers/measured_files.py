@@ -10,10 +10,10 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, count
 from pathlib import Path
 
 from vegglue.case.resolved_config import Tree
+from vegglue.case.text_files import unused
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import observed
 from vegglue.importers.field_site import FieldSite
@@ -124,9 +124,7 @@ def _read(
 
 def _free_name(file: str, taken: Sequence[str]) -> str:
     """Where gauge.csv and gauge.txt are both there, `gauge-level.csv` and `gauge-level-2.csv`; also of Gauge.txt."""
-    stem, lower = file.removesuffix(".csv"), [name.casefold() for name in taken]
-    names = chain([file], (f"{stem}-{number}.csv" for number in count(2)))
-    return next(name for name in names if name.casefold() not in lower)
+    return f"{unused(file.removesuffix('.csv'), [name.removesuffix('.csv') for name in taken])}.csv"
 
 
 def data_folder(target: Path) -> Path:
