@@ -16,13 +16,15 @@ from vegglue.importers.qrev_summary import is_qrev_summary, read_qrev_summary
 from vegglue.importers.tape_tables import is_tape_table, read_tape_table
 from vegglue.importers.winriver import is_winriver, read_winriver
 
-InstrumentReader = Callable[[Path, FileWords], Taken]
+# What reads a file of measurements: its path, and what the site file says of it -> its rows in SI, by role. Errors:
+# InputError, which begins with the file.
+FileReader = Callable[[Path, FileWords], Taken]
 # Endings of files that instruments write for programs, beside those of tables.
 BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
 # How binary records of Nortek begin that no kept reader has: those of the Vectrino, and those of the Signature.
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
 # Readers of files that are no text, by how these begin.
-BY_BEGINNING: Mapping[bytes, InstrumentReader] = {
+BY_BEGINNING: Mapping[bytes, FileReader] = {
     PD0_BEGINS: read_pd0,
     VECTOR_BEGINS: read_vector,
     ZIP_BEGINS: read_flowtracker2,
@@ -32,7 +34,7 @@ BY_BEGINNING: Mapping[bytes, InstrumentReader] = {
 LONGEST_MARK = max(map(len, BY_BEGINNING))
 
 
-def reader_of(path: Path) -> InstrumentReader:
+def reader_of(path: Path) -> FileReader:
     """The reader that knows the file, told by how it begins. Errors: InputError for a record that none knows."""
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         return read_placed_rows

@@ -64,7 +64,7 @@ class Taken:
         return replace(self, numbers=numbers, words=words, others=others, lines=lines)
 
     def having(self, numbers: Mapping[str, Array], *said: str) -> "Taken":
-        """The rows with these numbers put in, None-valued roles left as they are, and what is said of it."""
+        """The rows with these numbers (rows,) in SI, in place of those of the same role, and what is said of it."""
         return replace(self, numbers={**self.numbers, **numbers}, said=(*self.said, *said))
 
     def without(self, *roles: str) -> "Taken":
