@@ -41,16 +41,17 @@ _LAYOUTS = (_VECTRINO, _VECTOR)
 
 
 def is_nortek(path: Path, text: str) -> bool:
-    """Whether it is a .dat with a .hdr of the same name beside it, and rows of numbers as wide as the exports."""
-    rows = text.splitlines()[:2]
-    return path.suffix.lower() == ".dat" and _heading(path) is not None and bool(rows) and len(rows[0].split()) >= 17
+    """Whether it is a .dat with its .hdr beside it, and as wide a first line as the exports have."""
+    line = next(iter(text.splitlines()), "")
+    wide = len(line.split()) >= min(layout.columns for layout in _LAYOUTS)
+    return wide and path.suffix.lower() == ".dat" and _header(path) is not None
 
 
 def read_nortek(path: Path, words: FileWords) -> Taken:
     """One row: the mean of an ASCII record at its `position`. Errors: InputError naming the file."""
     refuse_nowhere(path, words)
     layout, rows = _rows(path)
-    axes = _in_heading(path, r"Coordinate system\s+(\w+)") or "XYZ"
+    axes = _in_header(path, r"Coordinate system\s+(\w+)") or "XYZ"
     if axes not in ("XYZ", "ENU"):
         raise InputError(f"{shown_path(path)}: expected velocities in XYZ or ENU, got {axes}; export them anew.")
     velocity = rows[:, layout.velocity : layout.velocity + 3]
@@ -142,12 +143,13 @@ def _no_spike(velocity: Array) -> Mask:
     return np.asarray(off <= SPIKE * 1.4826 * max(float(np.median(off)), 1e-4))
 
 
-def _heading(path: Path) -> Path | None:
+def _header(path: Path) -> Path | None:
+    """The .hdr beside a record; None without."""
     return next((there for end in (".hdr", ".HDR") if (there := path.with_suffix(end)).is_file()), None)
 
 
 def _rate(path: Path) -> float:
-    found = _in_heading(path, r"Sampling rate\s+([\d.]+)\s*Hz")
+    found = _in_header(path, r"Sampling rate\s+([\d.]+)\s*Hz")
     if found is None:
         raise InputError(
             f"{shown_path(path)}: expected `Sampling rate` in the .hdr beside it, got none; export it too."
@@ -155,8 +157,8 @@ def _rate(path: Path) -> float:
     return float(found)
 
 
-def _in_heading(path: Path, line: str) -> str | None:
+def _in_header(path: Path, line: str) -> str | None:
     """What a line of the .hdr says; None without such a line."""
-    heading = _heading(path)
-    found = re.search(f"^{line}", readable_text(heading), re.MULTILINE) if heading else None
+    header = _header(path)
+    found = re.search(f"^{line}", readable_text(header), re.MULTILINE) if header else None
     return found[1] if found else None
