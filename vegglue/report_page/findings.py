@@ -1,6 +1,7 @@
-"""The list "What was found" of the page: findings (HTML), those that limit the use of the result first.
+"""The list below "Caveats" of the page: what the posterior says (HTML), what limits the use of the result first.
 
-The facts that the terminal prints too are written in posterior_words.py and homogeneity_words.py.
+The facts that the terminal prints too are written in posterior_words.py and homogeneity_words.py; what a diagnosis
+found is written in cause_words.py and diagnosis_words.py.
 """
 
 import html
