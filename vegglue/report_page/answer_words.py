@@ -8,12 +8,11 @@ from vegglue.in_short import listed
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import KINDS
 from vegglue.report_page.cause_words import (
-    OF_KIND,
     accepted_causes,
     field_in_words,
-    found_in_words,
+    instrument_at,
     likelier_place_in_words,
-    where,
+    place_in_headline,
 )
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
@@ -52,7 +51,7 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
     if kind == "nothing-missing":
         return f"Nothing {tense} missing from {model} that these data could show."
     if kind == "instrument":
-        which = " and ".join(f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}" for one in found.instruments)
+        which = " and ".join(map(instrument_at, found.instruments))
         told = "The model is sound, but an" if found.verdict.clears_the_model else "More may be missing, but an"
         return f"{told} instrument is off: {which}."
     if kind == "none-of-these" and found.field is not None:
@@ -85,7 +84,7 @@ def _law_in_words(found: Diagnosis) -> str:
 def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
     """Effects by their titles, places by what they do; tense: is or was."""
     effects = [f"{likelier_place_in_words(step)}{_effect_in_words(found, step)}" for step in found.steps]
-    places = [found_in_words(one) for one in found.places]
+    places = [place_in_headline(one) for one in found.places]
     parts = []
     if effects:
         many = NUMBERS[min(len(effects), 6)]

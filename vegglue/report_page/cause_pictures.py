@@ -12,7 +12,7 @@ from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture
 from vegglue.figures.typography import percent
 from vegglue.report_page.cause_words import (
-    FIELDS,
+    FIELD_WORDS,
     accepted_causes,
     field_in_words,
     field_scale,
@@ -91,7 +91,7 @@ def field_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     mapped, found = diagnosis.field_map, diagnosis.field
     if mapped is None or found is None:
         return
-    what, unit = FIELDS[found.term]
+    what, unit = FIELD_WORDS[found.term]
     scale = field_scale(found.term)
     drawn = DrawnField(mapped.x, mapped.y, scale * mapped.value, scale * mapped.error, f"change of {what}", unit)
     marks = plan_marks(diagnosis, outlines(run.case))

@@ -11,7 +11,7 @@ from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 
 # Quantity and unit of a field, as they are told: what has none in %.
-FIELDS: Mapping[str, tuple[str, str]] = {
+FIELD_WORDS: Mapping[str, tuple[str, str]] = {
     term: (words, UNIT_OF_FIELD[term].replace("-", "%"))
     for term, words in (
         ("friction", "friction"),
@@ -20,7 +20,8 @@ FIELDS: Mapping[str, tuple[str, str]] = {
         ("inflow", "water that enters"),
     )
 }
-OF_KIND = {
+# Instruments that are off, as they are told, by their kind.
+INSTRUMENT_WORDS = {
     "reading": "one reading",
     "position": "probe, in all experiments",
     "probe": "probe, in all sections",
@@ -95,7 +96,7 @@ def size_of(place: Location) -> str:
     return f"{short(place.amplitude, 2)}{NARROW}{unit_html(place.unit)}"
 
 
-def found_in_words(place: Location) -> str:
+def place_in_headline(place: Location) -> str:
     """'a lower bed by 0.19 m at x = 47.3 ± 0.4 m, y = −0.3 ± 0.1 m' (HTML); the word says the sign."""
     amount = f"{short(abs(place.amplitude), 2)}{NARROW}{unit_html(place.unit)}"
     at = ", ".join(
@@ -106,7 +107,7 @@ def found_in_words(place: Location) -> str:
 
 
 def place_in_words(place: Location) -> str:
-    """What, where, how large, and the odds (HTML)."""
+    """What, how large, where, and the odds, as below the map (HTML)."""
     told = against_rivals(place)
     return (
         f"{what_at(place)}, {size_of(place)} (95{NARROW}% in {interval(*place.interval95)}), at "
@@ -122,12 +123,17 @@ def likelier_place_in_words(step: Step) -> str:
     if not name:
         return ""
     place = step.places[name]
-    return f"most likely ({percent(step.others[name])}) {found_in_words(place)}, which is in no list, or else "
+    return f"most likely ({percent(step.others[name])}) {place_in_headline(place)}, which is in no list, or else "
+
+
+def instrument_at(one: FaultyInstrument) -> str:
+    """'probe, in all sections, at y = 0.5 m'."""
+    return f"{INSTRUMENT_WORDS[one.kind]}, at {where(one.x, one.y)}"
 
 
 def instrument_in_words(one: FaultyInstrument) -> str:
     """Which, where, by how much (HTML)."""
-    return f"{OF_KIND[one.kind]}, at {where(one.x, one.y)}, by {_offset(one)}"
+    return f"{instrument_at(one)}, by {_offset(one)}"
 
 
 def _offset(one: FaultyInstrument) -> str:
@@ -157,7 +163,7 @@ def instrument_rows(diagnosis: Diagnosis) -> list[InstrumentRow]:
     """All instruments that are off and were set aside."""
     return [
         InstrumentRow(
-            what=OF_KIND[one.kind],
+            what=INSTRUMENT_WORDS[one.kind],
             where=where(one.x, one.y),
             readings=count(len(one.stations), "reading"),
             offset=_offset(one),
@@ -174,7 +180,7 @@ def field_in_words(diagnosis: Diagnosis) -> str:
     if found is None:
         return ""
     scale = field_scale(found.term)
-    what, unit = FIELDS[found.term]
+    what, unit = FIELD_WORDS[found.term]
     value, error = (
         fixed(scale * part, 0) if unit == "%" else short(scale * part, 2) for part in (found.value, found.error)
     )
@@ -187,4 +193,4 @@ def field_in_words(diagnosis: Diagnosis) -> str:
 
 def field_scale(term: str) -> float:
     """By which values of a field are multiplied before they are told: friction in %."""
-    return 100.0 if FIELDS[term][1] == "%" else 1.0
+    return 100.0 if FIELD_WORDS[term][1] == "%" else 1.0

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from vegglue.effects.library import library
 from vegglue.figures.typography import NARROW, count, short
-from vegglue.report_page.cause_words import OF_KIND, where
+from vegglue.report_page.cause_words import instrument_at
 from vegglue.report_page.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ladder import LadderStep
@@ -26,7 +26,7 @@ def next_steps(run: Run) -> list[str]:
 
 def _of_instruments(found: Diagnosis) -> Iterator[str]:
     for one in found.instruments:
-        yield f"Look at the instrument again: {OF_KIND[one.kind]}, at {where(one.x, one.y)}. Its readings are left out."
+        yield f"Look at the instrument again: {instrument_at(one)}. Its readings are left out."
 
 
 def _better_model(run: Run) -> Iterator[str]:
