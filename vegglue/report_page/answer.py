@@ -3,8 +3,6 @@
 `answer_of` has its values, the macro `answer` of answer.html.j2 its looks; a page of several cases may show it again.
 """
 
-import html
-import shlex
 from dataclasses import dataclass
 
 from vegglue.figures.error_rows import draw_error_rows
@@ -13,7 +11,7 @@ from vegglue.report_page.answer_words import headline, of_which_model, where_it_
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words, ladder_rows
 from vegglue.report_page.next_words import next_steps
-from vegglue.report_page.run import Run, published_svg
+from vegglue.report_page.run import Run, command_about, published_svg
 from vegglue.report_page.section_pictures import SectionPanels, section_panels
 
 STAND_IN = "These parameters are of the model as it is: they may stand in for what is missing."
@@ -46,8 +44,7 @@ class CaseAnswer:
 def answer_of(run: Run) -> CaseAnswer:
     """The answer of a run; its pictures are written to run.folder/figures. run.flow is not asked for."""
     ladder = run.loop.ladder
-    command = f"<code>vegglue run {html.escape(shlex.quote(run.case.source.name))}</code>"
-    missing = f"{command} would show here how far the error falls with what is missing."
+    missing = f"{command_about(run, 'run')} would show here how far the error falls with what is missing."
     return CaseAnswer(
         name=run.case.name,
         headline=headline(run),

@@ -5,7 +5,6 @@ found is written in cause_words.py and diagnosis_words.py.
 """
 
 import html
-import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -39,7 +38,7 @@ from vegglue.report_page.posterior_words import (
     weights_in_words,
 )
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
-from vegglue.report_page.run import Run, median_plants
+from vegglue.report_page.run import Run, command_about, median_plants
 from vegglue.report_page.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -186,7 +185,7 @@ def _set_aside_since(run: Run) -> Iterator[Finding]:
     """Readings of the posterior that a diagnosis made after it set aside."""
     if many := run.set_aside_since:
         of = f"{count(many, 'reading')} that the diagnosis set aside {'is' if many == 1 else 'are'}"
-        again = f"<code>vegglue infer {html.escape(shlex.quote(run.case.source.name))}</code> makes one without"
+        again = f"{command_about(run, 'infer')} makes one without"
         yield Finding("stations", f"{of} still in this posterior; {again}.", doubt=True)
 
 

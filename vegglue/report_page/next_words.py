@@ -1,13 +1,12 @@
 """What to do next, in words (HTML): the command, the page, the measurement that leads on."""
 
 import html
-import shlex
 from collections.abc import Iterator
 
 from vegglue.effects.library import library
 from vegglue.figures.typography import NARROW, count, short
 from vegglue.report_page.cause_words import instrument_at
-from vegglue.report_page.run import Run
+from vegglue.report_page.run import Run, command_about
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ladder import LadderStep
 from vegglue.results.open_questions import HIDDEN_BEHIND, Question
@@ -18,10 +17,9 @@ QUESTIONS_SHOWN = 3
 
 def next_steps(run: Run) -> list[str]:
     """What to do next, the first thing first."""
-    command = html.escape(shlex.quote(run.case.source.name))
     if run.behind is None:
-        return [f"<code>vegglue diagnose {command}</code> tells which physical effect this model lacks, if any."]
-    return [*_better_model(run), *_measurements(run, command), *_of_instruments(run.behind)]
+        return [f"{command_about(run, 'diagnose')} tells which physical effect this model lacks, if any."]
+    return [*_better_model(run), *_measurements(run), *_of_instruments(run.behind)]
 
 
 def _of_instruments(found: Diagnosis) -> Iterator[str]:
@@ -30,15 +28,14 @@ def _of_instruments(found: Diagnosis) -> Iterator[str]:
 
 
 def _better_model(run: Run) -> Iterator[str]:
+    """The command that adds what is missing; where the loop has done so, the page of the model that has it."""
     ladder, found = run.loop.ladder, run.behind
     assert found is not None
     if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
-        command = html.escape(shlex.quote(run.case.source.name))
-        yield f"<code>vegglue discover {command}</code> calibrates laws that are in no list, and writes the best."
+        yield f"{command_about(run, 'discover')} calibrates laws that are in no list, and writes the best."
     if ladder is None:
         if found.steps or found.places:
-            command = html.escape(shlex.quote(run.case.source.name))
-            yield f"<code>vegglue extend {command} --auto</code> adds what is missing, and shows the error fall."
+            yield f"{command_about(run, 'extend', '--auto')} adds what is missing, and shows the error fall."
         return
     if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:
         yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
@@ -53,11 +50,11 @@ def _page_of(run: Run, step: LadderStep) -> str:
     return f'{config} (<a href="{html.escape(run.loop.pages[step.name])}">its report</a>)'
 
 
-def _measurements(run: Run, command: str) -> Iterator[str]:
+def _measurements(run: Run) -> Iterator[str]:
     """What to measure, and what no single measurement would settle."""
     questions = run.loop.questions
     if questions is None:
-        yield f"<code>vegglue next {command}</code> says what to measure next."
+        yield f"{command_about(run, 'next')} says what to measure next."
         return
     if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
         yield "What was found needs no further measurement. What that model leaves open stands in its report."

@@ -1,6 +1,8 @@
 """What one report is about: everything known of a run, and where in its channel things stand."""
 
+import html
 import re
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,6 +97,11 @@ def is_synthetic(case: Case) -> bool:
     """Whether a record was computed: an observation says so, or the case knows what it was made with."""
     made_with = case.reference is not None and bool(case.reference.made_with)
     return made_with or any(observation.synthetic for observation in case.observations)
+
+
+def command_about(run: Run, verb: str, *options: str) -> str:
+    """`vegglue VERB CONFIG` of the case of a run, to be copied (HTML)."""
+    return f"<code>vegglue {html.escape(shlex.join([verb, run.case.source.name, *options]))}</code>"
 
 
 def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
