@@ -4,20 +4,16 @@ import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from vegglue.case.schema import Case
 from vegglue.cli.output import command_line
 from vegglue.errors import shown_path
 from vegglue.figures.typography import PLAIN_TEXT
-from vegglue.in_short import so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.report_page.homogeneity_words import homogeneity_rejected, moving_parameters
 from vegglue.report_page.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
-from vegglue.report_page.validation_words import DOUBTED, UNBELIEVED
+from vegglue.report_page.validation_words import chi2_in_words, where_it_stands
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
-from vegglue.results.refinement import MisfitTest
 
 # A terminal as it opens is 24 lines high; lines up to 100 columns are read without turning the head.
 LINES, COLUMNS = 24, 100
@@ -101,16 +97,8 @@ def _fit(posterior: Posterior) -> list[str]:
     if refined.error_model.errors == "estimated":
         sizes = errors_by_kind(posterior.fit.sigma, "for")
         return [*said, f"Errors are estimated from this misfit ({sizes}): they do not test the model."]
-    return [*said, _chi2(refined.misfit)]
-
-
-def _chi2(misfit: MisfitTest) -> str:
-    if misfit.freedom < 1:
-        return f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."
-    result = f"chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = {misfit.p_misfit:.2g})"
-    if misfit.p_misfit < UNBELIEVED:
-        return f"{result}: something is missing in the model or its data; `vegglue diagnose` asks what."
-    return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."
+    missing = "something is missing in the model or its data; `vegglue diagnose` asks what."
+    return [*said, chi2_in_words(refined.misfit, missing)]
 
 
 def doubts(posterior: Posterior) -> list[str]:
@@ -146,8 +134,7 @@ def _of_stations(posterior: Posterior) -> list[str]:
         return []
     misfit = posterior.refinement.misfit
     count = int(misfit.outlier.sum())
-    worst = int(np.nanargmax(np.abs(np.where(misfit.outlier, misfit.surprise, np.nan))))
-    row = posterior.station.iloc[worst]
-    where = f"{row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m"
+    worst = misfit.worst_outlier
+    where = where_it_stands(posterior, worst)
     stand = "station stands" if count == 1 else "stations stand"
     return [f"{count} {stand} out, most of all {where}, by {misfit.surprise[worst]:+.1f} of its errors; kept."]

@@ -26,13 +26,19 @@ def validation_in_words(posterior: Posterior, refined: Refinement) -> list[str]:
 
 
 def _misfit_under_errors(misfit: MisfitTest) -> list[str]:
+    missing = "the errors do not explain what is left, something is missing in the model or in its data."
+    told = chi2_in_words(misfit, missing)
+    return [told if misfit.freedom < 1 else f"Under these errors {told}"]
+
+
+def chi2_in_words(misfit: MisfitTest, missing: str) -> str:
+    """chi2 with its degrees of freedom, and whether the errors explain it; missing: what is said where they do not."""
     if misfit.freedom < 1:
-        return [f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."]
-    result = f"Under these errors chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = "
-    result += f"{misfit.p_misfit:.2g})"
+        return f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."
+    result = f"chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = {misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
-        return [f"{result}: the errors do not explain what is left, something is missing in the model or in its data."]
-    return [f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."]
+        return f"{result}: {missing}"
+    return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."
 
 
 def _left_out(posterior: Posterior, alone: LeaveOneOut, groups: GroupsLeftOut) -> list[str]:
@@ -83,17 +89,20 @@ def _bands(alone: LeaveOneOut) -> list[str]:
 def _outliers(posterior: Posterior, misfit: MisfitTest) -> list[str]:
     outliers = int(misfit.outlier.sum())
     if outliers > OUTLIERS_NAMED:
-        worst = int(np.nanargmax(np.abs(np.where(misfit.outlier, misfit.surprise, np.nan))))
-        row = posterior.station.iloc[worst]
+        worst = misfit.worst_outlier
         return [
             f"{outliers} stations stand out by more than chance allows from what all others and the model tell, most "
-            f"of all {row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m, by "
-            f"{misfit.surprise[worst]:+.1f} of its errors: so many are no single errors but something missing."
+            f"of all {where_it_stands(posterior, worst)}, by {misfit.surprise[worst]:+.1f} of its errors: so many are "
+            "no single errors but something missing."
         ]
     return [
-        f"Station {row['experiment']} {row['section']} at x = {row['x']:g} m, y = {row['y']:g} m stands out by "
-        f"{surprise:+.1f} of its errors from what all others and the model tell; it is kept."
-        for (_, row), surprise in zip(
-            posterior.station[misfit.outlier].iterrows(), misfit.surprise[misfit.outlier], strict=True
-        )
+        f"Station {where_it_stands(posterior, row)} stands out by {misfit.surprise[row]:+.1f} of its errors from what "
+        "all others and the model tell; it is kept."
+        for row in np.flatnonzero(misfit.outlier).tolist()
     ]
+
+
+def where_it_stands(posterior: Posterior, row: int) -> str:
+    """`high D at x = 12.5 m, y = -0.3 m`: experiment, section and place of the station in a row."""
+    station = posterior.station.iloc[row]
+    return f"{station['experiment']} {station['section']} at x = {station['x']:g} m, y = {station['y']:g} m"

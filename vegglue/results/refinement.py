@@ -69,6 +69,11 @@ class MisfitTest:
     surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
     outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]  # one such among all is no chance
 
+    @property
+    def worst_outlier(self) -> int:
+        """The row of the station that stands out most, of those that are outliers; ValueError without any."""
+        return int(np.nanargmax(np.abs(np.where(self.outlier, self.surprise, np.nan))))
+
 
 @dataclass(frozen=True)
 class GroupsLeftOut:
