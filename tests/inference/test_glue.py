@@ -18,7 +18,7 @@ from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
 from vegglue.inference.posterior_summary import marginals, prior_mass_near_bounds
 from vegglue.measurements.observations import Observations
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.resistance.plant_laws import baptist_chezy
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import LEVELS, Posterior
@@ -209,7 +209,7 @@ def test_failed_members_have_no_weight_and_are_counted() -> None:
     assert posterior.sample.weights[[whole.sample.best, 11]].tolist() == [0, 0]
     assert posterior.sample.weights.sum() == pytest.approx(1)
     assert np.isfinite(posterior.predicted.model_band).all()
-    assert "2 of them failed" in describe(posterior)[0]
+    assert "2 of them failed" in posterior_in_words(posterior)[0]
 
 
 def test_chi2_against_known_errors() -> None:
@@ -287,7 +287,7 @@ def test_insensitive_parameter_is_not_identified_and_hits_no_bound() -> None:
     assert posterior.marginals.identified == {"a": True, "b": True, "c": False}
     assert posterior.marginals.width_ratio["c"] == pytest.approx(1, abs=0.1)
     assert not posterior.marginals.bound_hit["c"].any()
-    assert any(sentence.startswith("c is not identified") for sentence in describe(posterior))
+    assert any(sentence.startswith("c is not identified") for sentence in posterior_in_words(posterior))
 
 
 def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
@@ -310,7 +310,7 @@ def test_parameter_at_a_bound_is_named(true_a: float, side: int, word: str) -> N
     half_a_normal = 2 * 0.1554  # 2 (Phi(0.4) - 1/2)
     assert posterior.marginals.bound_mass["a"][side] == pytest.approx(half_a_normal, abs=0.05)
     assert not posterior.marginals.bound_hit["b"].any()
-    assert any(f"a presses against the {word} bound" in sentence for sentence in describe(posterior))
+    assert any(f"a presses against the {word} bound" in sentence for sentence in posterior_in_words(posterior))
 
 
 def test_parameter_settled_near_a_bound_is_no_hit() -> None:
@@ -324,17 +324,17 @@ def test_parameter_settled_near_a_bound_is_no_hit() -> None:
 def test_few_effective_members_claim_no_posterior(toy: Posterior) -> None:
     few = infer(stations(measured(), SIGMA), members=512, sigma="known")
     assert few.weighting.effective_size < 100 < toy.weighting.effective_size
-    assert any("no posterior is claimed" in sentence for sentence in describe(few))
-    assert not any("no posterior is claimed" in sentence for sentence in describe(toy))
+    assert any("no posterior is claimed" in sentence for sentence in posterior_in_words(few))
+    assert not any("no posterior is claimed" in sentence for sentence in posterior_in_words(toy))
 
 
 def test_strong_correlation_is_named() -> None:
     design = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.1], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3]])
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
     assert posterior.marginals.correlation[0, 1] < -0.7
-    assert any("a and b are correlated (-0" in sentence for sentence in describe(posterior))
+    assert any("a and b are correlated (-0" in sentence for sentence in posterior_in_words(posterior))
     few = changed(posterior, effective_size=2.0)
-    assert not any("are correlated (" in sentence for sentence in describe(few)), "any two members are"
+    assert not any("are correlated (" in sentence for sentence in posterior_in_words(few)), "any two members are"
 
 
 def chezy(phi: float, canopy_height: float, depth: float) -> float:
@@ -377,7 +377,7 @@ def test_canopy_correction_stands_beside_the_raw_median() -> None:
     expected = correct_phi_for_canopy(np.array([raw]), 0.8, 1.06, 1.36, 60.0)[0]
     assert posterior.canopy.median == pytest.approx(expected, rel=1e-3)
     assert 10**posterior.canopy.log10_median == pytest.approx(expected, rel=1e-3)
-    assert any(f"goes from {raw:.3g} to {expected:.3g}" in sentence for sentence in describe(posterior))
+    assert any(f"goes from {raw:.3g} to {expected:.3g}" in sentence for sentence in posterior_in_words(posterior))
 
 
 def test_a_prior_that_ends_where_it_is_largest_is_no_bound_that_is_pressed() -> None:

@@ -20,7 +20,7 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
 from vegglue.parallel import at_most
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.report_page.validation_words import validation_in_words
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut
@@ -92,7 +92,7 @@ def test_everything_comes_back_from_the_file(refined: Posterior, tmp_path: Path)
     assert back.refinement is not None
     assert_same(back, refined)
     assert list(back.refinement.groups.left_out) == ["June above", "June patch", "June below"]
-    assert describe(back) == describe(refined)
+    assert posterior_in_words(back) == posterior_in_words(refined)
 
 
 # Weighted draws are resampled for ArviZ. Some come twice, which its shape of a tail takes for heavy: 0.702, ours 0.11.
@@ -114,7 +114,7 @@ def test_arviz_reads_draws_likelihood_and_prior(refined: Posterior, tmp_path: Pa
 
 
 def test_what_is_said(refined: Posterior) -> None:
-    said = " ".join(describe(refined))
+    said = " ".join(posterior_in_words(refined))
     for part in ("downhill", "one mode", "errors are those stated", "chi2 = ", "log predictive density", "50 % band"):
         assert part in said, part
     assert "estimated from what" not in said
@@ -151,7 +151,7 @@ def test_errors_taken_from_the_residual_are_said_to_be(tmp_path: Path) -> None:
     assert posterior.refinement.error_model.errors == "estimated"
     left = posterior.fit.best_residual
     assert posterior.fit.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(left**2) * 15 / 13), rel=0.05)
-    said = " ".join(describe(posterior))
+    said = " ".join(posterior_in_words(posterior))
     assert "estimated from what the best place leaves" in said
     assert "degrees of freedom" not in said
 

@@ -21,7 +21,7 @@ from vegglue.inference.refine import log_posterior, refine
 from vegglue.inference.tried_members import points_of_prior
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.results.posterior import Posterior
 
 
@@ -48,7 +48,7 @@ def test_points_of_the_prior_lead_to_the_same_posterior(reach: SolvedReach, refi
     for name, quantiles in refined.marginals.quantiles.items():
         sd = refined.marginals.sd[name]
         assert found.marginals.quantiles[name] == pytest.approx(quantiles, abs=0.15 * sd)
-    assert "of the prior" in describe(found)[0]
+    assert "of the prior" in posterior_in_words(found)[0]
 
 
 def test_points_of_the_prior_are_tried_on_coarse_cells(tmp_path: Path) -> None:

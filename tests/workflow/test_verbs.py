@@ -14,7 +14,7 @@ import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.measurements.observations import SET_ASIDE, read_observations
 from vegglue.progress import Progress
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.storage.result_files import stored_hash, write_diagnosis
@@ -165,6 +165,6 @@ def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> 
     after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert after.fit.used == 13
     assert after.station.index[after.station["reason"] == SET_ASIDE].tolist() == [3, 7]
-    assert "2 measurements of 15 are left out, as the diagnosis set them aside." in describe(after)
+    assert "2 measurements of 15 are left out, as the diagnosis set them aside." in posterior_in_words(after)
     assert is_inferred(case, runs)
     assert results_of(case, case, runs).set_aside_since == 0

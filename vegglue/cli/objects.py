@@ -8,7 +8,7 @@ from typing import Any
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.discovery.discovered import LawFound
-from vegglue.report_page.posterior_words import describe
+from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
@@ -134,7 +134,7 @@ def _posterior(case: Case, found: Posterior) -> Told:
         "rmse": found.fit.rmse,
         "sigma": found.fit.sigma,
         "chi2": None if misfit is None else {"chi2": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p_misfit},
-        "sentences": describe(found, case.reference.table if case.reference else None),
+        "sentences": posterior_in_words(found, case.reference.table if case.reference else None),
     }
 
 

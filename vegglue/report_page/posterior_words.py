@@ -22,8 +22,8 @@ from vegglue.results.refinement import ErrorModel, PosteriorModes, Refinement
 STRONG_CORRELATION = 0.7
 
 
-def describe(posterior: Posterior, others: Mapping[str, object] | None = None) -> list[str]:
-    """Everything that `vegglue infer` prints of a posterior, one sentence or two in each entry.
+def posterior_in_words(posterior: Posterior, others: Mapping[str, object] | None = None) -> list[str]:
+    """All that is said of a posterior, as `vegglue infer --json` prints it, one sentence or two in each entry.
 
     In this order: the ensemble, its weights, each parameter, correlations, the fit, stations left out, whether the
     experiments agree, the corrected canopy. others: the reference table of the case, by key.
