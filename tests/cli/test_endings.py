@@ -202,13 +202,13 @@ def test_an_effect_that_ends_the_program_is_told(tmp_path: Path, say: Say) -> No
 
 
 @pytest.mark.parametrize("value", ["NaN", "1e999", "1e300", "1" + "0" * 400, '"far"', "[]", "null"])
-def test_a_best_place_that_is_none_counts_as_not_there(tmp_path: Path, say: Say, value: str) -> None:
+def test_a_best_fit_that_is_none_counts_as_not_there(tmp_path: Path, say: Say, value: str) -> None:
     from vegglue.case.config import load_case
     from vegglue.case.resolved_config import case_hash
-    from vegglue.workflow.run_folder import known_place
+    from vegglue.workflow.run_folder import kept_best_fit
 
     case = load_case(tmp_path / "brook.yaml")
     theta = ", ".join(f'"{name}": {value}' for name in case.parameters)
     (tmp_path / "best.json").write_text(f'{{"config_hash": "{case_hash(case)}", "theta": {{{theta}}}}}')
-    place = known_place(case, tmp_path)
-    assert place is None or abs(place).max() <= 6
+    best = kept_best_fit(case, tmp_path)
+    assert best is None or abs(best).max() <= 6

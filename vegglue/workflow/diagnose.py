@@ -17,7 +17,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
 from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.command_model import with_command, with_words_on_command
-from vegglue.workflow.run_folder import calibrated, folder_of, model_in, remember_place, validation_of
+from vegglue.workflow.run_folder import calibrated, folder_of, keep_best_fit, model_in, validation_of
 from vegglue.workflow.set_aside import set_aside_of
 
 
@@ -41,7 +41,7 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
-    remember_place(case, folder, found.parameters.first, wanted)
+    keep_best_fit(case, folder, found.parameters.first, wanted)
     write_diagnosis(path, found, resolved_yaml(case), wanted)  # last: where it is, nothing else is missing
     return found
 

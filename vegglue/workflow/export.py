@@ -29,7 +29,7 @@ from vegglue.storage.result_files import read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
 from vegglue.workflow.median_flow import median_flow
-from vegglue.workflow.run_folder import as_solved, folder_of, known_place
+from vegglue.workflow.run_folder import as_solved, folder_of, kept_best_fit
 from vegglue.workflow.set_aside import set_aside_of
 
 Form = Literal["csv", "geotiff", "netcdf"]
@@ -51,7 +51,7 @@ def export(
 ) -> Exported:
     """Write the flow of a case at cell centres, and its stations, into runs/<name>/export/.
 
-    The flow is that of the posterior's medians, else of the best place that a diagnosis found, else of the middle of
+    The flow is that of the posterior's medians, else of the best fit that a diagnosis found, else of the middle of
     the priors. csv: stations.csv and flow-<experiment>.csv; geotiff: one file for each quantity and experiment, none on
     a grid along a centreline; netcdf: flow.nc, a UGRID mesh. With a `frame` in the case all have their place on the
     map, and velocities are turned to it.
@@ -85,7 +85,7 @@ def _flow(case: Case, folder: Path) -> tuple[dict[str, FlowFields], Array | None
         posterior = read_posterior(folder / "posterior.h5", wanted)
         predicted = posterior.station["value"].to_numpy(float) - posterior.fit.residual
         return median_flow(sized, posterior, folder), predicted, "the medians of the posterior"
-    best = known_place(case, folder)
+    best = kept_best_fit(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
     words = "the middle of the priors" if best is None else "the best fit that was found"

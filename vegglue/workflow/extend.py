@@ -30,11 +30,11 @@ from vegglue.storage.kept_words import write_rung
 from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
-    best_place,
+    best_parameters,
     calibrated,
     calibrated_anew,
     folder_of,
-    remember_place,
+    keep_best_fit,
     validation_of,
 )
 from vegglue.workflow.stepwise_extension import StepwiseExtension, kept_extension
@@ -120,7 +120,7 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
         assert base is not None
         added = [named[name] for name in names]
         cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added, force))
-        remember_place(cases[-1], folder_of(runs, cases[-1]), best_place(base), case_hash(cases[-1]))
+        keep_best_fit(cases[-1], folder_of(runs, cases[-1]), best_parameters(base), case_hash(cases[-1]))
         bases.append(base)
     # Only now are the measurements for validation looked at.
     bases = [replace(base, model=replace(base.model, case=one)) for one, base in zip(cases, bases, strict=True)]

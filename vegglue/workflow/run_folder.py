@@ -31,8 +31,8 @@ from vegglue.storage.result_files import read_ensemble, read_posterior, stored_h
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 from vegglue.workflow.command_model import unseen_with_command, with_command
 
-# Standard errors within which two ends of a fit are one place. Chosen, not measured.
-SAME_PLACE = 1.0
+# Standard errors within which the ends of two fits are one. Chosen, not measured.
+SAME_FIT = 1.0
 
 
 def folder_of(runs: Path | str, case: Case) -> Path:
@@ -91,8 +91,8 @@ def validation_of(case: Case, folder: Path | None = None, watch: Watch = silent)
     return unseen if folder is None else unseen_with_command(unseen, model_in(case), folder, watch)
 
 
-def known_place(case: Case, folder: Path) -> Array | None:
-    """The best place that an earlier command found for exactly this case, z (p,)."""
+def kept_best_fit(case: Case, folder: Path) -> Array | None:
+    """Where an earlier command found that exactly this case fits best, z (p,)."""
     wanted = case_hash(case)
     try:
         found = json.loads(read_text(folder / "best.json", LARGEST_JSON))
@@ -109,8 +109,8 @@ def known_place(case: Case, folder: Path) -> Array | None:
     return z_at(case, {name: values[best] for name, values in posterior.sample.theta.items()})[0]
 
 
-def remember_place(case: Case, folder: Path, theta: Mapping[str, float], config_hash: str) -> None:
-    """Keep the best place for the next command; config_hash: of the case as it was read. Errors: StorageError."""
+def keep_best_fit(case: Case, folder: Path, theta: Mapping[str, float], config_hash: str) -> None:
+    """Keep where a case fits best for the next command; config_hash: of it as it was read. Errors: StorageError."""
     text = json.dumps({"config_hash": config_hash, "theta": {name: float(theta[name]) for name in case.parameters}})
     write_text(folder / "best.json", text, MAKE_ROOM)
 
@@ -119,14 +119,14 @@ def calibrated(case: Case, folder: Path, aside: pd.DataFrame, watch: Watch = sil
     """The case where it predicts best, which is kept for the next command; aside: measurements that are left out."""
     wanted = case_hash(case)
     model = with_command(model_in(case), folder, watch)
-    base = calibrated_anew(model, known_place(case, folder), aside)
-    remember_place(case, folder, best_place(base), wanted)
+    base = calibrated_anew(model, kept_best_fit(case, folder), aside)
+    keep_best_fit(case, folder, best_parameters(base), wanted)
     return base
 
 
 def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> Baseline:
     """The model where it predicts best, searched from the prior, whatever ran before; from z = `known` (p,), too: where
-    they end at different places, the one with more evidence, as the model's own error is another at each.
+    they end apart, the one with more evidence, as the model's own error is another at each.
     """
     model = excluding(model, aside)
     base = for_prediction(kept_baseline(model))
@@ -135,19 +135,19 @@ def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> B
     return max(base, for_prediction(baseline(model, known)), key=log_evidence)
 
 
-def best_place(base: Baseline) -> dict[str, float]:
+def best_parameters(base: Baseline) -> dict[str, float]:
     """The parameters of a calibrated model by name, in their units."""
     return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}
 
 
 def _leads_to(base: Baseline, known: Array) -> bool:
-    """Whether a fit from another place ends where the base lies, or finds no flow."""
-    if _same_place(base, known):
+    """Whether a fit from `known` ends where the base lies, or finds no flow."""
+    if _same_fit(base, known):
         return True
     start = linearise_from(base.model, known, base.fitted.point)
-    return start is None or _same_place(base, fit(base.model, base.noise, start).point.z)
+    return start is None or _same_fit(base, fit(base.model, base.noise, start).point.z)
 
 
-def _same_place(base: Baseline, z: Array) -> bool:
+def _same_fit(base: Baseline, z: Array) -> bool:
     away = z - base.fitted.point.z
-    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < SAME_PLACE**2)
+    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < SAME_FIT**2)
