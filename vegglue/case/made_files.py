@@ -37,6 +37,12 @@ def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> N
     write_text(config, texts[config] + HEADING + lines, advice)
 
 
+def refuse_parent(target: Path, parent: Path) -> None:
+    """Errors: InputError where a config is to be written over the one that it extends, which --force would replace."""
+    if target.resolve() == parent:
+        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
+
+
 def _refuse_to_replace(path: Path, text: str, stated: Mapping[str, str], advice: str) -> None:
     there = _text_of(path)
     if there is None or there == text or stated.get(path.name) == _short(there):

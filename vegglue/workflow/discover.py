@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vegglue.case.config import load_case
-from vegglue.case.made_files import write_made
+from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
@@ -15,7 +15,7 @@ from vegglue.discovery.discovered import Discovery, LawFound
 from vegglue.discovery.effect_file import effect_name, effect_text
 from vegglue.discovery.search import discover_laws
 from vegglue.effects.library import library
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError
 from vegglue.in_short import in_short
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
@@ -82,8 +82,7 @@ def discover(
 
 def _written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:
     """The child config and the effect file it names, read back as any other."""
-    if target.resolve() == parent.source:
-        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
+    refuse_parent(target, parent.source)
     text, names = effect_text(laws, parent.effect_file), " and ".join(map(effect_name, laws))
     tree = child_tree(parent, target, [(_candidate(one), {}) for one in laws])
     tree = {"extends": tree.pop("extends"), "effect_file": file.name, **tree}

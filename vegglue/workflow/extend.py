@@ -9,7 +9,7 @@ import pandas as pd
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.case.config import load_case
-from vegglue.case.made_files import write_made
+from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
@@ -162,13 +162,13 @@ def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, floa
 
 
 def child_path(parent: Path, added: Sequence[Candidate]) -> Path:
+    """`brook+streamlining.yaml` beside brook.yaml."""
     return parent.with_name("+".join([parent.stem, *(candidate.key for candidate in added)]) + parent.suffix)
 
 
 def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bool = False) -> Case:
     """Write the config that extends `parent`, and read it back as any other. Errors: InputError for another's file."""
-    if target.resolve() == parent.source:
-        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
+    refuse_parent(target, parent.source)
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
