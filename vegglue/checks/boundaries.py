@@ -11,7 +11,7 @@ from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.sections import section_place
 from vegglue.resistance.physical_constants import GRAVITY
-from vegglue.site.channel_geometry import entered_above, expected_depth
+from vegglue.site.channel_geometry import discharges_upstream_of, expected_depth
 from vegglue.site.grid import curvature_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import centres_within, inflow_cells
@@ -72,7 +72,7 @@ def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[st
     """Discharges [m3/s] that differ from those of ADV sections, by the rule of the case, by more than their errors."""
     rules = {(one.experiment, one.section): one.average for one in case.observations}
     for (name, section), by_rule in observations.discharge.items():
-        given = entered_above(case, case.experiments[name], section_place(observations.table, name, section))
+        given = discharges_upstream_of(case, case.experiments[name], section_place(observations.table, name, section))
         if given is None:
             continue
         parts = [prior_range(case, value) for value in given]

@@ -7,7 +7,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.importers.config_parts import loguniform_prior
 from vegglue.importers.field_site import Channel, FieldSite
 from vegglue.site.grid import Grid
-from vegglue.site.zones import beyond, slope
+from vegglue.site.zones import beyond_slope_break, slope
 
 BANK = "bank"
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
@@ -38,7 +38,7 @@ def roughness_of_banks(friction: Tree) -> Tree:
 
 def found_banks(bed: Array, grid: Grid, channel: Channel, steeper: float) -> tuple[bool, str]:
     """Whether any cell is a bank beyond such a slope [-], and what is said of them. bed: levels (nx, ny) [m]."""
-    banks = beyond(slope(bed, grid) > steeper, bed)
+    banks = beyond_slope_break(slope(bed, grid) > steeper, bed)
     if not banks.any():
         return False, f"no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
     floor, stated = float(np.mean((~banks).sum(axis=1)) * grid.dy), channel.bottom_width_m

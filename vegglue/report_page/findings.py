@@ -42,7 +42,7 @@ from vegglue.report_page.run import Run, command_about, median_plants
 from vegglue.report_page.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.site.channel_geometry import entered_above
+from vegglue.site.channel_geometry import discharges_upstream_of
 from vegglue.solver.status import STATUS_WORDS, members_with
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.
@@ -200,7 +200,7 @@ def _flagged(observations: Observations) -> Iterator[Finding]:
 
 def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
     for (experiment, section), rules in observations.discharge.items():
-        given = entered_above(
+        given = discharges_upstream_of(
             case, case.experiments[experiment], section_place(observations.table, experiment, section)
         )
         if given is None:

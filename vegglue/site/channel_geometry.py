@@ -1,4 +1,6 @@
-"""The channel as effects see it: its axis, floor and banks, and the distance of each cell from patches of plants."""
+"""The channel as effects see it: its axis, floor and banks, and the distance of each cell from patches of plants; and
+what of it is known before anything flows: discharges that have entered, and expected depths.
+"""
 
 from functools import lru_cache
 
@@ -11,7 +13,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.site.grid import Grid, cell_stretch, curvature_of, filter_width_of
 from vegglue.site.gridded_site import Site, in_experiment
-from vegglue.site.zones import BANK_SLOPE, beyond
+from vegglue.site.zones import BANK_SLOPE, beyond_slope_break
 
 # Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
 GEOMETRIES_KEPT = 8
@@ -34,7 +36,7 @@ def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
     )
 
 
-def entered_above(case: Case, experiment: Experiment, x: float) -> list[float | str] | None:
+def discharges_upstream_of(case: Case, experiment: Experiment, x: float) -> list[float | str] | None:
     """Discharges, numbers or parameters, of what has entered upstream of x [m]; None where a side inflow lets water in
     on both sides of x.
     """
@@ -92,7 +94,7 @@ def _geometry(
 
 def _section(site: Site) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Axis and half width of the floor (nx,) [m], and the cells that are floor (nx, ny)."""
-    floor = ~beyond(_side_slope(site) > BANK_SLOPE, site.bed)
+    floor = ~beyond_slope_break(_side_slope(site) > BANK_SLOPE, site.bed)
     return *_extent(floor, site.grid.y, site.grid.dy), floor
 
 

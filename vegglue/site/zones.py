@@ -63,13 +63,13 @@ def _zone_cells(zone: Zone, grid: Grid, bed: Array) -> Mask:
     if zone.steeper_than is not None:
         return slope(bed, grid) > zone.steeper_than
     if zone.beyond_slope_break is not None:
-        return beyond(slope(bed, grid) > zone.beyond_slope_break, bed)
+        return beyond_slope_break(slope(bed, grid) > zone.beyond_slope_break, bed)
     if zone.polygon is not None:
         return in_polygon(zone.polygon, grid)
     return _in_range(zone.x, zone.y, grid)
 
 
-def beyond(steep: Mask, bed: Array) -> Mask:
+def beyond_slope_break(steep: Mask, bed: Array) -> Mask:
     """Cells (nx, ny) from the first steep one outward, on both sides of the lowest cell of each cross-section.
 
     steep (nx, ny); bed: levels (nx, ny) [m]. The lowest cell is sought among those that are not steep: of an even
