@@ -17,7 +17,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import FileOfSite
 from vegglue.importers.file_words import file_words
 from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
-from vegglue.importers.measured_rows import Taken, in_the_channel, read_rows, taken_in_words
+from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import refuse_degrees
 from vegglue.site.centreline import Centreline, centreline_of
@@ -91,7 +91,7 @@ def _in_frame(shape: CentrelineShape, frame: Frame | None) -> CentrelineShape:
     return shape.model_copy(update={"start": start, "heading": round(shape.heading - frame.angle, 6)})
 
 
-def _points(path: Path, taken: Taken) -> list[tuple[float, float]]:
+def _points(path: Path, taken: MeasuredRows) -> list[tuple[float, float]]:
     """Places of the line, each once. Errors: InputError without two of them, or with too many."""
     if not {"x", "y"} <= taken.numbers.keys():
         raise InputError(
@@ -112,7 +112,7 @@ def _points(path: Path, taken: Taken) -> list[tuple[float, float]]:
     return found
 
 
-def _of_map(path: Path) -> Taken:
+def _of_map(path: Path) -> MeasuredRows:
     """The one line in a file of a map program."""
     found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path)
     if len(found) != 1:
@@ -124,7 +124,7 @@ def _of_map(path: Path) -> Taken:
     if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0:
         raise InputError(f"{shown_path(path)}: expected coordinates in m, got degrees; save it in a projected system.")
     form = (f"line of {path.suffix[1:]}",)
-    return Taken({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, form)
+    return MeasuredRows({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, form)
 
 
 def _of_geojson(path: Path) -> list[Any]:

@@ -15,14 +15,14 @@ import numpy as np
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.library_files import read_by_library, refuse_larger
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.tape_tables import last_of_each_place, on_the_tape
 
 ZIP_BEGINS = b"PK\x03\x04"
 DATA_FILE = "datafile.json"
 
 
-def read_flowtracker2(path: Path, words: FileWords) -> Taken:
+def read_flowtracker2(path: Path, words: FileWords) -> MeasuredRows:
     """Verticals at their place on the tape, which `line` lays on the map. Errors: InputError naming the file."""
     stations = _stations(path)
     try:
@@ -39,7 +39,7 @@ def read_flowtracker2(path: Path, words: FileWords) -> Taken:
     wet = np.isfinite(tape) & np.isfinite(u) & (depth > 0.0)
     columns = {"tape": "Location", "depth": "Depth", "u": "MeanVelocityInVertical.X", "u_se": "VelocityStandardError.X"}
     units = {"tape": "m", "depth": "m", "u": "m/s", "u_se": "m/s"}
-    taken = Taken({"tape": tape, "depth": depth, "u": u, "u_se": own}, {}, columns, units, ("FlowTracker2",))
+    taken = MeasuredRows({"tape": tape, "depth": depth, "u": u, "u_se": own}, {}, columns, units, ("FlowTracker2",))
     return on_the_tape(path, last_of_each_place(taken.only(wet)), words)
 
 

@@ -6,14 +6,14 @@ A discharge may also be the share of each vertical, which is none of the section
 import numpy as np
 
 from vegglue.importers.lost_places import VELOCITIES
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.in_short import so_many
 
 # Values of one discharge are alike to so much [-]: those of one are copied, not measured again.
 COPIED = 1e-6
 
 
-def whole_discharges(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
+def whole_discharges(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
     """The rows with the discharge of a section once, and without shares of it, and what is said of these.
 
     taken: rows with an experiment and a section. Several values at one y are repeats, and stay.
@@ -33,7 +33,7 @@ def whole_discharges(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
     return taken.having({"discharge": found}), (said,) if shares else ()
 
 
-def levels_once(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
+def levels_once(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
     """The rows with a level that all verticals of a section repeat once, and what is said of it.
 
     taken: rows with an experiment and a section. Gauges on both banks are two readings, even where they agree.
@@ -50,7 +50,7 @@ def levels_once(taken: Taken) -> tuple[Taken, tuple[str, ...]]:
     return taken.having({"level": found}), (said,) if repeated else ()
 
 
-def _rows_of_sections(taken: Taken, role: str) -> list[list[int]]:
+def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
     """The rows with a number of that role of each section of each experiment."""
     rows: dict[tuple[str, str], list[int]] = {}
     for row in np.flatnonzero(np.isfinite(taken.numbers[role])).tolist():

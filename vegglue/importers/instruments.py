@@ -8,7 +8,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.matlab_exports import MAT_73_BEGINS, MAT_BEGINS, read_matlab
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
 from vegglue.importers.pd0_transects import PD0_BEGINS, read_pd0
 from vegglue.importers.placed_tables import read_placed_rows
@@ -18,7 +18,7 @@ from vegglue.importers.winriver import is_winriver, read_winriver
 
 # What reads a file of measurements: its path, and what the site file says of it -> its rows in SI, by role. Errors:
 # InputError, which begins with the file.
-FileReader = Callable[[Path, FileWords], Taken]
+FileReader = Callable[[Path, FileWords], MeasuredRows]
 # Endings of files that instruments write for programs, beside those of tables.
 BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
 # How binary records of Nortek begin that no kept reader has: those of the Vectrino, and those of the Signature.

@@ -7,13 +7,13 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.importers.column_names import unit_stated, words_of
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.number_words import is_number, number_in
 
 VELOCITIES = ("u", "v", "speed")
 
 
-def refuse_lost_places(taken: Taken, file: str) -> None:
+def refuse_lost_places(taken: MeasuredRows, file: str) -> None:
     """Errors: InputError where velocities of one x differ by a length that is in no role: they are no repeats.
 
     taken: rows with an experiment, a section and x. What differs by no length, such as the time, may be repeats.
@@ -34,7 +34,7 @@ def refuse_lost_places(taken: Taken, file: str) -> None:
                 )
 
 
-def _lengths_unread(taken: Taken) -> dict[str, Array]:
+def _lengths_unread(taken: MeasuredRows) -> dict[str, Array]:
     """By heading: readings along a tape, depths of a stated unit, and columns of no role headed by a unit of length or,
     as `y/B`, by y.
     """

@@ -6,7 +6,7 @@ from typing import Any
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import loaded_matlab
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.qrev_transects import QREV_VARIABLE, stations_of_qrev
 from vegglue.importers.riversurveyor_mat import RIVERSURVEYOR_VARIABLES, stations_of_riversurveyor
 from vegglue.importers.vectrino_profiler import PROFILER_VARIABLES, rows_of_profiler
@@ -15,7 +15,7 @@ from vegglue.importers.vectrino_profiler import PROFILER_VARIABLES, rows_of_prof
 MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
 
 
-def read_matlab(path: Path, words: FileWords) -> Taken:
+def read_matlab(path: Path, words: FileWords) -> MeasuredRows:
     """What a MATLAB file of an instrument holds. Errors: InputError naming the file."""
     # MIDAS fills its names up.
     parts: dict[str, Any] = {name.strip("\0 "): part for name, part in loaded_matlab(path).items()}

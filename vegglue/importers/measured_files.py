@@ -21,7 +21,7 @@ from vegglue.importers.file_words import FileWords, file_words
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.known_experiments import EXPERIMENTS, KnownExperiments
 from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import Taken, in_the_channel, joined_rows, taken_in_words, with_experiments
+from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, joined_rows, taken_in_words, with_experiments
 from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import without_unused_depth
 from vegglue.importers.site_file import HELD_OUT, held_out_file, site_file
@@ -137,7 +137,7 @@ def named_from(file: Path, target: Path) -> str:
     return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
 
 
-def record(path: Path, taken: Taken | None, said: str) -> Tree:
+def record(path: Path, taken: MeasuredRows | None, said: str) -> Tree:
     """What a config keeps of a file that it was made from."""
     tree: Tree = {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "taken": said}
     if taken is not None:
@@ -238,7 +238,7 @@ def _brought(
     return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, told, said, strict=True)]
 
 
-def _with_own_errors(taken: Taken, words: FileWords) -> Taken:
+def _with_own_errors(taken: MeasuredRows, words: FileWords) -> MeasuredRows:
     """The rows of one file of a group with its own standard errors, NaN where neither it nor the site file has one."""
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     return taken.having({kind.error_column: errors_of_rows(taken, kind, words) for kind in kinds})

@@ -32,7 +32,7 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
 
 @dataclass(frozen=True)
-class Taken:
+class MeasuredRows:
     """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
     each role came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns
     that no role was found for, by heading; lines: the row of the file that each row stands in, none where it has none;
@@ -53,7 +53,7 @@ class Taken:
         """Number of rows."""
         return len(next(iter(self.numbers.values())))
 
-    def only(self, rows: Mask) -> "Taken":
+    def only(self, rows: Mask) -> "MeasuredRows":
         """The rows (rows,) that are true."""
         numbers = {role: values[rows] for role, values in self.numbers.items()}
         words, others = (
@@ -63,15 +63,15 @@ class Taken:
         lines = [line for line, kept in zip(self.lines, rows, strict=bool(self.lines)) if kept]
         return replace(self, numbers=numbers, words=words, others=others, lines=lines)
 
-    def having(self, numbers: Mapping[str, Array], *said: str) -> "Taken":
+    def having(self, numbers: Mapping[str, Array], *said: str) -> "MeasuredRows":
         """The rows with these numbers (rows,) in SI, in place of those of the same role, and what is said of it."""
         return replace(self, numbers={**self.numbers, **numbers}, said=(*self.said, *said))
 
-    def without(self, *roles: str) -> "Taken":
+    def without(self, *roles: str) -> "MeasuredRows":
         """The rows without some roles."""
         return replace(self, numbers={role: values for role, values in self.numbers.items() if role not in roles})
 
-    def leaving(self, *roles: str) -> "Taken":
+    def leaving(self, *roles: str) -> "MeasuredRows":
         """The rows, columns in some roles counted among those that are not read: who asked for them has no use for
         them. Of their texts the numbers in SI are left.
         """
@@ -86,7 +86,7 @@ class Taken:
         )
 
 
-def read_rows(path: Path, words: FileWords) -> Taken:
+def read_rows(path: Path, words: FileWords) -> MeasuredRows:
     """What a file of columns holds, in SI. Errors: InputError, naming file, row and column, and for words of others."""
     idle = next((key for key, what in OF_RECORDS.items() if getattr(words, key) not in (None, 0.0)), None)
     if idle is not None:
@@ -104,7 +104,7 @@ def read_rows(path: Path, words: FileWords) -> Taken:
     return taken
 
 
-def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
+def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> MeasuredRows:
     """What a table holds, in SI: columns by `words`, else by their usual names; units likewise."""
     columns = columns_of_table(path, table, words)
     numbers: dict[str, Array] = {}
@@ -134,10 +134,10 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> Taken:
     named = {role: table.headings[place] for role, place in columns.items()}
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
     others = {table.headings[place]: [row[place] for _, row in table.rows] for place in unread}
-    return Taken(numbers, texts, named, units, tuple(said), others, [line for line, _ in table.rows])
+    return MeasuredRows(numbers, texts, named, units, tuple(said), others, [line for line, _ in table.rows])
 
 
-def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
+def in_the_channel(taken: MeasuredRows, place: Placement, words: FileWords) -> MeasuredRows:
     """The rows along and across the channel: turned, shifted and flipped; a speed with its direction as components."""
     taken = _without_speed_again(_components(taken))
     if place.turned and words.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
@@ -146,7 +146,7 @@ def in_the_channel(taken: Taken, place: Placement, words: FileWords) -> Taken:
     return _from_zero(_flipped(_along_and_across(taken, place, words), words.flip), words.zero)
 
 
-def _from_zero(taken: Taken, zero: tuple[float, float] | None) -> Taken:
+def _from_zero(taken: MeasuredRows, zero: tuple[float, float] | None) -> MeasuredRows:
     """The places counted from those of the channel."""
     if zero is None:
         return taken
@@ -154,7 +154,7 @@ def _from_zero(taken: Taken, zero: tuple[float, float] | None) -> Taken:
     return taken.having(moved, f"zero at x = {zero[0]:g}, y = {zero[1]:g} m")
 
 
-def _along_and_across(taken: Taken, place: Placement, words: FileWords) -> Taken:
+def _along_and_across(taken: MeasuredRows, place: Placement, words: FileWords) -> MeasuredRows:
     """u and v of components east and north; a velocity without a second component is one along the channel."""
     pair = next((pair for pair in COMPONENTS if set(pair) <= taken.numbers.keys()), None)
     if pair is None:
@@ -172,7 +172,7 @@ def _along_and_across(taken: Taken, place: Placement, words: FileWords) -> Taken
     return taken.without(*pair).having({"u": first, "v": second}, *said)
 
 
-def _errors_turned(taken: Taken, place: Placement, along: Array) -> Taken:
+def _errors_turned(taken: MeasuredRows, place: Placement, along: Array) -> MeasuredRows:
     """se_u^2 = (cos a se_E)^2 + (sin a se_N)^2, and se_v likewise, where both are given, errors independent."""
     if not {"u_se", "v_se"} <= taken.numbers.keys():
         return taken
@@ -182,7 +182,7 @@ def _errors_turned(taken: Taken, place: Placement, along: Array) -> Taken:
     return taken.having({"u_se": np.hypot(ee * east, ne * north), "v_se": np.hypot(en * east, nn * north)})
 
 
-def with_experiments(taken: Taken, experiments: Sequence[str]) -> Taken:
+def with_experiments(taken: MeasuredRows, experiments: Sequence[str]) -> MeasuredRows:
     """The rows, their experiments read from a column, under any heading, of names of experiments and nothing else."""
     heading = next((name for name, texts in taken.others.items() if texts and set(texts) <= set(experiments)), None)
     if heading is None or "experiment" in taken.words:
@@ -192,7 +192,7 @@ def with_experiments(taken: Taken, experiments: Sequence[str]) -> Taken:
     return replace(taken, words=words, columns={"experiment": heading, **taken.columns}, others=others)
 
 
-def joined_rows(parts: Sequence[Taken]) -> Taken:
+def joined_rows(parts: Sequence[MeasuredRows]) -> MeasuredRows:
     """The rows of several files one below the other, as far as all of them have a role."""
     first = parts[0]
     numbers = {r: np.concatenate([one.numbers[r] for one in parts]) for r in first.numbers if _in_all(r, parts)}
@@ -202,11 +202,11 @@ def joined_rows(parts: Sequence[Taken]) -> Taken:
     return replace(first, numbers=numbers, words=words, others=others, lines=first.lines if len(parts) == 1 else ())
 
 
-def _in_all(role: str, parts: Sequence[Taken]) -> bool:
+def _in_all(role: str, parts: Sequence[MeasuredRows]) -> bool:
     return all(role in one.numbers for one in parts)
 
 
-def taken_in_words(taken: Taken) -> str:
+def taken_in_words(taken: MeasuredRows) -> str:
     """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma; 12 rows; not read: Pt, Remarks`."""
     units = {role: f" [{unit}]" for role, unit in taken.units.items()}
     roles = [
@@ -224,7 +224,7 @@ def _without(heading: str, unit: str | None) -> str:
     return heading.removesuffix(f"[{unit}]").removesuffix(f"({unit})").rstrip()
 
 
-def _components(taken: Taken) -> Taken:
+def _components(taken: MeasuredRows) -> MeasuredRows:
     """u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to.
 
     One error for a velocity is that of both components.
@@ -239,7 +239,7 @@ def _components(taken: Taken) -> Taken:
     return taken.having(parts, "components from speed and direction").without("speed", "direction", "speed_se")
 
 
-def _without_speed_again(taken: Taken) -> Taken:
+def _without_speed_again(taken: MeasuredRows) -> MeasuredRows:
     """The speed only where no component is: beside one it is the same reading, and would count twice."""
     numbers = taken.numbers
     known = [roles for roles in (("east_velocity", "north_velocity"), ("u",)) if set(roles) <= numbers.keys()]
@@ -250,7 +250,7 @@ def _without_speed_again(taken: Taken) -> Taken:
     return taken.having({"speed": left}, "speed not taken again beside its components") if again.any() else taken
 
 
-def _flipped(taken: Taken, axes: Sequence[str]) -> Taken:
+def _flipped(taken: MeasuredRows, axes: Sequence[str]) -> MeasuredRows:
     turned = {"x": ("x", "u"), "y": ("y", "v")}
     numbers = {name: -taken.numbers[name] for axis in axes for name in turned[axis] if name in taken.numbers}
     return taken.having(numbers, *(f"{axis} reversed" for axis in axes))

@@ -15,7 +15,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.raw_files import opened_raw
 
 # How a binary record of a Vector begins: its hardware configuration, with its serial number.
@@ -47,7 +47,7 @@ def is_nortek(path: Path, text: str) -> bool:
     return wide and path.suffix.lower() == ".dat" and _header(path) is not None
 
 
-def read_nortek(path: Path, words: FileWords) -> Taken:
+def read_nortek(path: Path, words: FileWords) -> MeasuredRows:
     """One row: the mean of an ASCII record at its `position`. Errors: InputError naming the file."""
     refuse_nowhere(path, words)
     layout, rows = _rows(path)
@@ -59,7 +59,7 @@ def read_nortek(path: Path, words: FileWords) -> Taken:
     return replace(mean, of_probe=axes == "XYZ")
 
 
-def read_vector(path: Path, words: FileWords) -> Taken:
+def read_vector(path: Path, words: FileWords) -> MeasuredRows:
     """One row of a binary record of a Vector, as the probe's axes x, y and z have it.
 
     Errors: InputError naming the file, for other axes, and without mhkit.
@@ -78,7 +78,9 @@ def read_vector(path: Path, words: FileWords) -> Taken:
     return record_mean(path, words, "Vector, binary", velocity[there], correlation[there], float(data.attrs["fs"]))
 
 
-def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correlation: Array, rate: float) -> Taken:
+def record_mean(
+    path: Path, words: FileWords, name: str, velocity: Array, correlation: Array, rate: float
+) -> MeasuredRows:
     """The mean of a record at its `position`, its standard deviation and its length.
 
     velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%]; rate: [1/s]. Samples of low correlation
@@ -99,7 +101,7 @@ def record_mean(path: Path, words: FileWords, name: str, velocity: Array, correl
     numbers["duration_s"] = np.array([trusted.sum() / rate])
     said = f"{name}, {len(velocity):,} samples at {rate:g} Hz, {len(velocity) - int(trusted.sum()):,} left out"
     device = name.partition(",")[0]
-    return Taken(numbers, {"device": [device]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
+    return MeasuredRows(numbers, {"device": [device]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
                  dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)  # fmt: skip
 
 

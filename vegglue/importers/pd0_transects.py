@@ -14,7 +14,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.raw_files import opened_raw, turned_to_earth
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 
@@ -22,7 +22,7 @@ from vegglue.importers.transects import BoatProfile, stations_of_transect
 PD0_BEGINS = b"\x7f\x7f"
 
 
-def read_pd0(path: Path, words: FileWords) -> Taken:
+def read_pd0(path: Path, words: FileWords) -> MeasuredRows:
     """Stations of a transect. The instrument hangs `draft` below the surface, else as deep as the file says.
 
     `declination` turns its compass to true north, beyond what the file says. Errors: InputError naming the file, and

@@ -7,12 +7,12 @@ import numpy as np
 
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.measured_rows import Taken, read_rows
+from vegglue.importers.measured_rows import MeasuredRows, read_rows
 from vegglue.importers.point_heights import with_heights
 from vegglue.importers.tape_tables import on_the_tape
 
 
-def read_placed_rows(path: Path, words: FileWords) -> Taken:
+def read_placed_rows(path: Path, words: FileWords) -> MeasuredRows:
     """What a table holds, with places of `line` or `x`. Errors: InputError, also where its columns say them already."""
     taken = with_heights(read_rows(path, replace(words, line=None)))
     places = [taken.columns[role] for role in ("x", "y") if role in taken.numbers]

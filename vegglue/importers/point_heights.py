@@ -9,7 +9,7 @@ from vegglue.errors import InputError
 from vegglue.importers.column_names import known_name, words_of
 from vegglue.importers.columns_of_table import NAMES_OF_BED
 from vegglue.importers.lost_places import numbers_of
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 
 # Words of headings that say how high or deep: `rel. depth`, `z/h`, `Messtiefe`.
 HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "tiefe", "profondeur", "hauteur"} | {
@@ -25,7 +25,7 @@ HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "ti
 APART = 1.5
 
 
-def vertical_role(taken: Taken) -> str | None:
+def vertical_role(taken: MeasuredRows) -> str | None:
     """What says how high each velocity was measured: above the bed there, else z; None where z is that of the bed."""
     if "height" in taken.numbers:
         return "height"
@@ -33,7 +33,7 @@ def vertical_role(taken: Taken) -> str | None:
     return "z" if "z" in taken.numbers and (known is None or known[0] not in NAMES_OF_BED) else None
 
 
-def with_heights(taken: Taken) -> Taken:
+def with_heights(taken: MeasuredRows) -> MeasuredRows:
     """Heights above the bed, depth of the water less depth of the point, where a table has both and says no other."""
     numbers = taken.numbers
     if not {"below", "depth"} <= numbers.keys() or vertical_role(taken) is not None:
@@ -42,7 +42,7 @@ def with_heights(taken: Taken) -> Taken:
     return taken.having(height, "height above the bed from both depths")
 
 
-def without_unused_depth(taken: Taken) -> Taken:
+def without_unused_depth(taken: MeasuredRows) -> MeasuredRows:
     """The rows as stations use them: a depth of the water of which no height was made counts among what is not read,
     for water is as deep as levels and the bed of the case make it.
     """
@@ -50,7 +50,7 @@ def without_unused_depth(taken: Taken) -> Taken:
     return taken if is_used else taken.leaving("depth")
 
 
-def refuse_lost_heights(taken: Taken, places: Sequence[Hashable], file: str) -> None:
+def refuse_lost_heights(taken: MeasuredRows, places: Sequence[Hashable], file: str) -> None:
     """Errors: InputError where velocities of one place differ in a depth or a height that no role tells.
 
     places (rows,): what is one where they are equal. Such velocities are points of a vertical, and no repeats.
@@ -72,7 +72,7 @@ def refuse_lost_heights(taken: Taken, places: Sequence[Hashable], file: str) -> 
                 )
 
 
-def _unread_heights(taken: Taken) -> Mapping[str, Array]:
+def _unread_heights(taken: MeasuredRows) -> Mapping[str, Array]:
     """By heading: depths, and columns of numbers in no role whose headings say how high or deep."""
     found = {taken.columns[role]: taken.numbers[role] for role in ("below", "depth") if role in taken.numbers}
     said = {name: texts for name, texts in taken.others.items() if HEIGHT_WORDS & set(words_of(name).split())}

@@ -13,7 +13,7 @@ import numpy as np
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.unit_words import si_factor
 
 STANDARD_ERRORS = 2.0  # in an uncertainty of 95 %, as QRev has it
@@ -26,7 +26,7 @@ def is_qrev_summary(text: str) -> bool:
     return "<Channel QRev" in text[:500]
 
 
-def read_qrev_summary(path: Path, words: FileWords) -> Taken:
+def read_qrev_summary(path: Path, words: FileWords) -> MeasuredRows:
     """The discharge of all transects and its standard error, at `start`. Errors: InputError naming the file."""
     if words.start is None:
         raise InputError(
@@ -38,7 +38,7 @@ def read_qrev_summary(path: Path, words: FileWords) -> Taken:
     numbers = {"x": x, "y": y, "discharge": discharge, "discharge_se": error}
     said = (f"QRev summary, standard error {error:.2g} m3/s",)
     columns, units = {"discharge": "ChannelSummary/Discharge/Total"}, {"discharge": unit}
-    return Taken({role: np.array([one]) for role, one in numbers.items()}, {}, columns, units, said)
+    return MeasuredRows({role: np.array([one]) for role, one in numbers.items()}, {}, columns, units, said)
 
 
 def _total(path: Path) -> tuple[float, float, str]:

@@ -15,14 +15,14 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.in_short import so_many
 
 QREV_VARIABLE = "meas_struct"  # the variable by which such a file is known
 
 
-def stations_of_qrev(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
+def stations_of_qrev(path: Path, parts: dict[str, Any], words: FileWords) -> MeasuredRows:
     """Stations of all transects together that QRev used for the discharge. Errors: InputError naming the file."""
     with reading_structures(path, "the transects of a measurement saved by QRev", "save it anew in QRev"):
         used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.serial_scatter import values_that_are_one
 
 # Experiment, section, x, y of a place [m]; and a value with its stated standard error, NaN where there is none.
@@ -78,7 +78,9 @@ def _times_error(values: Sequence[RepeatedValue]) -> float:
     return float(np.sqrt(np.sum(((u - u.mean()) / error) ** 2) / (u.size - 1)))
 
 
-def without_repeats(points: Taken, keys: Sequence[tuple[object, ...]], errors: Array) -> tuple[Taken, str]:
+def without_repeats(
+    points: MeasuredRows, keys: Sequence[tuple[object, ...]], errors: Array
+) -> tuple[MeasuredRows, str]:
     """Each point once, where `keys` (rows,) say which rows are one, and what is said of it; errors (rows,) [m/s].
 
     u is the mean with its error, see `means_of_repeats`; v and w are means, u_std is the root of the mean square, and

@@ -15,7 +15,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import reading_structures
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.importers.unit_words import si_factor
 
@@ -25,7 +25,7 @@ RIVERSURVEYOR_VARIABLES = ("Setup", "Summary", "System", "WaterTrack")  # the va
 EAST_NORTH_UP, OVER_GROUND, IN_TRANSECT = 2, (1, 2, 3), 3
 
 
-def stations_of_riversurveyor(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
+def stations_of_riversurveyor(path: Path, parts: dict[str, Any], words: FileWords) -> MeasuredRows:
     """Stations of a transect. Errors: InputError naming the file."""
     kind = "the structures of a MATLAB export of RiverSurveyor Live"
     with reading_structures(path, kind, "export it anew"):

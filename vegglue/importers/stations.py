@@ -15,7 +15,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.gauged_discharges import levels_once, whole_discharges
 from vegglue.importers.known_experiments import KnownExperiments
 from vegglue.importers.lost_places import refuse_lost_places
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nameless_sections import ONE_PLACE, section_at, sections_by_place
 from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
@@ -58,7 +58,7 @@ class StationTables:
 
 
 def station_tables(
-    taken: Taken, stem: str, words: FileWords, known: KnownExperiments, place: Placement, file: str
+    taken: MeasuredRows, stem: str, words: FileWords, known: KnownExperiments, place: Placement, file: str
 ) -> StationTables:
     """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
     at = [role for role in ("x", "y") if role in taken.numbers]
@@ -81,7 +81,9 @@ def station_tables(
     return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares, *once))
 
 
-def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str) -> None:
+def _refuse_unknown(
+    taken: MeasuredRows, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str
+) -> None:
     """Errors: InputError where a row that holds a value, or the entry of its file, names another experiment."""
     if words.experiment is not None and words.experiment not in known.names:
         raise InputError(f"{file}: {known.remedy(words.experiment)}; or correct `experiment` of this file.")
@@ -90,7 +92,7 @@ def _refuse_unknown(taken: Taken, columns: Sequence[str], words: FileWords, know
         known.refuse_unknown(file, measured.lines, measured.words["experiment"])
 
 
-def _lacking(taken: Taken, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
+def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
     """`2 rows left out for want of x or y`, where all or any of the roles are needed; nothing where no row is."""
     if not roles:
         return ()
@@ -98,7 +100,7 @@ def _lacking(taken: Taken, roles: Sequence[str], needed: Callable[..., Mask]) ->
     return (f"{so_many(lacking, 'row')} left out for want of {' or '.join(roles)}",) if lacking else ()
 
 
-def _without_section(taken: Taken, words: FileWords) -> tuple[str, ...]:
+def _without_section(taken: MeasuredRows, words: FileWords) -> tuple[str, ...]:
     """That names of sections are not used, where some rows have none: below a merged cell, say."""
     names = taken.words.get("section", ()) if words.section is None else ()
     unnamed = sum(not name for name in names)
@@ -106,7 +108,7 @@ def _without_section(taken: Taken, words: FileWords) -> tuple[str, ...]:
     return (f"sections told by x, as {lacking}",) if 0 < unnamed < len(names) else ()
 
 
-def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> Taken:
+def _named(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], where: str) -> MeasuredRows:
     """Every row with an experiment and a section, and with a place; rows without a place are left out."""
     place = [role for role in ("x", "y") if role in taken.numbers]
     if "x" not in place:
@@ -129,7 +131,7 @@ def _named(taken: Taken, words: FileWords, experiments: Sequence[str], where: st
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
 
 
-def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], where: str) -> list[str]:
+def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], where: str) -> list[str]:
     """The experiment of each row."""
     if words.experiment is not None:
         return [words.experiment] * taken.size
@@ -144,7 +146,7 @@ def _experiments(taken: Taken, words: FileWords, experiments: Sequence[str], whe
     )
 
 
-def _in_verticals(taken: Taken) -> bool:
+def _in_verticals(taken: MeasuredRows) -> bool:
     """Whether VERTICALS of the places have velocities at several heights: shallow ones are often measured at one."""
     role = vertical_role(taken)
     if role is None or "u" not in taken.numbers:
@@ -158,19 +160,19 @@ def _in_verticals(taken: Taken) -> bool:
     return several > 0 and several >= VERTICALS * len(heights)
 
 
-def _places(taken: Taken) -> list[PlaceKey]:
+def _places(taken: MeasuredRows) -> list[PlaceKey]:
     x, y = (np.round(taken.numbers[role] / ONE_PLACE) * ONE_PLACE for role in ("x", "y"))
     words = taken.words
     return list(zip(words["experiment"], words["section"], x.tolist(), y.tolist(), strict=True))
 
 
-def _heights(taken: Taken) -> list[tuple[object, ...]]:
+def _heights(taken: MeasuredRows) -> list[tuple[object, ...]]:
     """Each place with the height of its point."""
     z = np.round(taken.numbers[str(vertical_role(taken))] / ONE_PLACE).tolist()
     return [(*place, height) for place, height in zip(_places(taken), z, strict=True)]
 
 
-def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
+def _points(taken: MeasuredRows, stem: str, words: FileWords) -> StationTable:
     """Points in the vertical; a section is a case of the file, at the middle of its x."""
     kept, said = _at_their_heights(taken, words)
     optional = _beside_u(kept, words)
@@ -204,7 +206,7 @@ def _points(taken: Taken, stem: str, words: FileWords) -> StationTable:
     )
 
 
-def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
+def _at_their_heights(taken: MeasuredRows, words: FileWords) -> tuple[MeasuredRows, str]:
     """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
     upward = str(vertical_role(taken))
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
@@ -219,7 +221,7 @@ def _at_their_heights(taken: Taken, words: FileWords) -> tuple[Taken, str]:
     return kept, f"{said}, moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else said
 
 
-def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
+def _beside_u(points: MeasuredRows, words: FileWords) -> dict[str, Array]:
     """What else is known of points: v and w where any has it, standard errors with 0 for unknown, and what all have."""
     numbers = points.numbers
     found = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
@@ -230,7 +232,7 @@ def _beside_u(points: Taken, words: FileWords) -> dict[str, Array]:
     }
 
 
-def errors_of_rows(taken: Taken, kind: Kind, words: FileWords) -> Array:
+def errors_of_rows(taken: MeasuredRows, kind: Kind, words: FileWords) -> Array:
     """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one, or 0."""
     stated = np.full(taken.size, words.standard_error.get(kind.unit, np.nan))
     column = taken.numbers.get(kind.error_column, stated)
@@ -252,7 +254,7 @@ def _section_observation(file: str, name: str, words: FileWords, across: bool) -
     return tree | levels | ({"across": True} if across else {})
 
 
-def _stations(taken: Taken, stem: str, words: FileWords, kind: Kind, channel: Placement) -> StationTable:
+def _stations(taken: MeasuredRows, stem: str, words: FileWords, kind: Kind, channel: Placement) -> StationTable:
     """Stations of one kind; values at one place are averaged, and their scatter gives errors where none is stated.
 
     What was measured at a point stands on the map of its centreline, as a case reads it.

@@ -15,7 +15,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, readable_text
-from vegglue.importers.measured_rows import Taken, rows_of_table
+from vegglue.importers.measured_rows import MeasuredRows, rows_of_table
 from vegglue.importers.number_words import is_number
 
 # How a file of each program says what it is; its columns of place, depth and mean velocity of the vertical.
@@ -31,7 +31,7 @@ def is_tape_table(text: str) -> bool:
     return bool(FLOWTRACKER.search(text) or RIVERSURVEYOR.search(text))
 
 
-def read_tape_table(path: Path, words: FileWords) -> Taken:
+def read_tape_table(path: Path, words: FileWords) -> MeasuredRows:
     """Verticals at their place on the tape, which `line` lays on the map. Errors: InputError naming the file."""
     text = readable_text(path)
     table, units = _flowtracker(path, text) if FLOWTRACKER.search(text) else _riversurveyor(path, text)
@@ -46,7 +46,7 @@ def read_tape_table(path: Path, words: FileWords) -> Taken:
     return on_the_tape(path, last_of_each_place(taken.only(wet)), words)
 
 
-def on_the_tape(path: Path, taken: Taken, words: FileWords) -> Taken:
+def on_the_tape(path: Path, taken: MeasuredRows, words: FileWords) -> MeasuredRows:
     """Places (x, y) = a + t (b - a) / |b - a| at the reading t of a tape from a to b.
 
     The velocity measured is that square to the tape; it is taken as the one along the channel, which a tape that is off
@@ -105,7 +105,7 @@ def _riversurveyor(path: Path, text: str) -> tuple[LooseTable, dict[str, str]]:
     return LooseTable(headings, ("",) * len(headings), tuple(rows), False, "RiverSurveyor Stationary"), units
 
 
-def last_of_each_place(taken: Taken) -> Taken:
+def last_of_each_place(taken: MeasuredRows) -> MeasuredRows:
     """Of points of one vertical the last row, which has its mean; with an error where the file has no sound one."""
     place = taken.numbers["tape"]
     last = np.array([not np.any(place[i + 1 :] == place[i]) for i in range(taken.size)], dtype=bool)
@@ -113,7 +113,7 @@ def last_of_each_place(taken: Taken) -> Taken:
     return kept.having({"u_se": _errors(kept)})
 
 
-def _errors(taken: Taken) -> Array:
+def _errors(taken: MeasuredRows) -> Array:
     """se^2 = (share of the rule u)^2 + own^2; own: the instrument's, where it is below half of the velocity [m/s]."""
     u = np.abs(taken.numbers["u"])
     own = taken.numbers.get("u_se", np.full(taken.size, np.nan))

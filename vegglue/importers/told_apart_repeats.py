@@ -8,7 +8,7 @@ from scipy.special import fdtrc
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.in_short import listed
 
 DOWNSTREAM = ("u", "speed")
@@ -20,7 +20,7 @@ MOST_TEXTS = 3  # of the texts of a column
 Numbers = NDArray[np.int64]
 
 
-def refuse_told_apart(taken: Taken, places: Sequence[Hashable], file: str) -> None:
+def refuse_told_apart(taken: MeasuredRows, places: Sequence[Hashable], file: str) -> None:
     """Errors: InputError where velocities of one place differ with a column in no role, or the discharge, alike at many
     places.
 
@@ -42,7 +42,7 @@ def refuse_told_apart(taken: Taken, places: Sequence[Hashable], file: str) -> No
                 )
 
 
-def _columns(taken: Taken) -> dict[str, Sequence[str]]:
+def _columns(taken: MeasuredRows) -> dict[str, Sequence[str]]:
     """By heading: what may tell one flow or height from another."""
     discharges = taken.numbers.get("discharge")
     if discharges is None:

@@ -9,7 +9,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 
 # Exponent of the profile by which measured cells are carried on to bed and surface, the one of the maker's programs.
 PROFILE_POWER = 1.0 / 6.0
@@ -30,7 +30,7 @@ class BoatProfile:
     velocity: Array
 
 
-def stations_of_transect(path: Path, words: FileWords, profiles: Iterable[BoatProfile], form: str) -> Taken:
+def stations_of_transect(path: Path, words: FileWords, profiles: Iterable[BoatProfile], form: str) -> MeasuredRows:
     """Stations along the straight line that fits the transect, each the mean of the ensembles around it.
 
     `start` of the file, in the coordinates of the site, is where the boat started. Errors: InputError naming the file.
@@ -53,7 +53,7 @@ def stations_of_transect(path: Path, words: FileWords, profiles: Iterable[BoatPr
     said = (f"{form}, {len(means)} ensembles" + (f", {dropped} without velocities left out" if dropped else ""),)
     columns = {"x": "distance east", "y": "distance north", "east_velocity": "east", "north_velocity": "north"}
     units = dict.fromkeys(columns, "m") | {"east_velocity": "m/s", "north_velocity": "m/s"}
-    return Taken(numbers, {}, columns, units, said)
+    return MeasuredRows(numbers, {}, columns, units, said)
 
 
 def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import LEAST_CORRELATION, refuse_nowhere, trusted_samples
 
 PROFILER_VARIABLES = ("Data", "Config")  # the variables by which such a file is known
@@ -23,7 +23,7 @@ BEAMS = 2  # `coordSystem` of velocities along the beams; 1 for x, y and z
 SOUND_SHARE = 0.5  # of the samples of a cell: a mean of fewer is one of those that happen to be strong
 
 
-def rows_of_profiler(path: Path, parts: dict[str, Any], words: FileWords) -> Taken:
+def rows_of_profiler(path: Path, parts: dict[str, Any], words: FileWords) -> MeasuredRows:
     """One row for each cell, so far below the `position` of the probe, which looks down; none at the bed and below.
 
     Errors: InputError naming the file.
@@ -45,7 +45,7 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], words: FileWords) -> Tak
     return _means(words, away[kept], velocity[:, kept], trusted[:, kept], rate, said)
 
 
-def _means(words: FileWords, away: Array, velocity: Array, trusted: Mask, rate: float, said: str) -> Taken:
+def _means(words: FileWords, away: Array, velocity: Array, trusted: Mask, rate: float, said: str) -> MeasuredRows:
     x, y, z = np.asarray(words.position).tolist()
     samples = np.where(trusted[..., None], velocity, np.nan)
     mean = np.nanmean(samples, axis=0)
@@ -54,7 +54,7 @@ def _means(words: FileWords, away: Array, velocity: Array, trusted: Mask, rate: 
     numbers |= {"u_std": np.nanstd(samples[..., 0], axis=0, ddof=1), "duration_s": trusted.sum(axis=0) / rate}
     columns = {axis: f"Profiles_Vel{name}" for axis, name in zip("uvw", ("X", "Y", "Z1"), strict=True)}
     device = {"device": ["Vectrino Profiler"] * away.size}
-    return Taken(numbers, device, columns, dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)
+    return MeasuredRows(numbers, device, columns, dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)
 
 
 def _velocity(data: Any, config: Any) -> Array:

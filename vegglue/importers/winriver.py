@@ -12,7 +12,7 @@ import numpy as np
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import Taken
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 
 # What marks no velocity, in the unit of the file.
@@ -29,7 +29,7 @@ def is_winriver(text: str) -> bool:
     return all(word.lstrip("-").isdigit() for word in lines[2].split())
 
 
-def read_winriver(path: Path, words: FileWords) -> Taken:
+def read_winriver(path: Path, words: FileWords) -> MeasuredRows:
     """Stations of a transect. Errors: InputError naming the file."""
     return stations_of_transect(path, words, _ensembles(path, readable_text(path).splitlines()), "WinRiver ASCII")
 
