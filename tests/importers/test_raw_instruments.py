@@ -78,7 +78,7 @@ def test_a_binary_record_of_a_vector_is_its_mean_without_spikes(tmp_path: Path) 
     assert taken.numbers["u_std"][0] == pytest.approx(0.03, rel=0.1)
     assert taken.numbers["duration_s"][0] == pytest.approx(940 / 32, rel=0.01)
     assert "samples at 32 Hz, 20 left out" in taken.said[0]
-    assert taken.words["device"] == ["Vector"]
+    assert taken.texts["device"] == ["Vector"]
     with pytest.raises(InputError, match="expected where the probe stood"):
         read_vector(path, FileWords())
 

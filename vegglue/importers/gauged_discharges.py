@@ -54,5 +54,5 @@ def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
     """The rows with a number of that role of each section of each experiment."""
     rows: dict[tuple[str, str], list[int]] = {}
     for row in np.flatnonzero(np.isfinite(taken.numbers[role])).tolist():
-        rows.setdefault((taken.words["experiment"][row], taken.words["section"][row]), []).append(row)
+        rows.setdefault((taken.texts["experiment"][row], taken.texts["section"][row]), []).append(row)
     return list(rows.values())

@@ -22,7 +22,7 @@ def refuse_lost_places(taken: MeasuredRows, file: str) -> None:
         return
     for heading, lengths in _lengths_unread(taken).items():
         seen: dict[tuple[str, str, float], float] = {}
-        places = zip(taken.words["experiment"], taken.words["section"], taken.numbers["x"].tolist(), strict=True)
+        places = zip(taken.texts["experiment"], taken.texts["section"], taken.numbers["x"].tolist(), strict=True)
         for place, length in zip(places, lengths.tolist(), strict=True):
             if np.isfinite(length) and seen.setdefault(place, length) != length:
                 raise InputError(

@@ -33,14 +33,16 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
 @dataclass(frozen=True)
 class MeasuredRows:
-    """numbers: by role (rows,) in SI, NaN where missing; words: by role, one text a row; columns: the heading that
-    each role came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns
-    that no role was found for, by heading; lines: the row of the file that each row stands in, none where it has none;
-    of_probe: whether u and v are along the axes of a probe, which is set up in the channel and knows no map.
+    """Rows of one file.
+
+    numbers: by role (rows,) in SI, NaN where missing; texts: by role, one a row; columns: the heading that each role
+    came from; units: the unit of each; said: what was done, in short clauses; others: texts of the columns that no role
+    was found for, by heading; lines: the row of the file that each row stands in, none where it has none; of_probe:
+    whether u and v are along the axes of a probe, which is set up in the channel and knows no map.
     """
 
     numbers: Mapping[str, Array]
-    words: Mapping[str, Sequence[str]]
+    texts: Mapping[str, Sequence[str]]
     columns: Mapping[str, str]
     units: Mapping[str, str]
     said: tuple[str, ...]
@@ -56,12 +58,12 @@ class MeasuredRows:
     def only(self, rows: Mask) -> "MeasuredRows":
         """The rows (rows,) that are true."""
         numbers = {role: values[rows] for role, values in self.numbers.items()}
-        words, others = (
-            {name: [one for one, kept in zip(column, rows, strict=True) if kept] for name, column in texts.items()}
-            for texts in (self.words, self.others)
+        texts, others = (
+            {name: [one for one, kept in zip(column, rows, strict=True) if kept] for name, column in of.items()}
+            for of in (self.texts, self.others)
         )
         lines = [line for line, kept in zip(self.lines, rows, strict=bool(self.lines)) if kept]
-        return replace(self, numbers=numbers, words=words, others=others, lines=lines)
+        return replace(self, numbers=numbers, texts=texts, others=others, lines=lines)
 
     def having(self, numbers: Mapping[str, Array], *said: str) -> "MeasuredRows":
         """The rows with these numbers (rows,) in SI, in place of those of the same role, and what is said of it."""
@@ -78,11 +80,11 @@ class MeasuredRows:
         columns, units = (
             {role: one for role, one in of.items() if role not in roles} for of in (self.columns, self.units)
         )
-        texts = {role: [f"{value:g}" for value in values] for role, values in self.numbers.items()} | dict(self.words)
-        unread = {heading: texts.get(role, []) for role, heading in self.columns.items() if role in roles}
-        words = {role: one for role, one in self.words.items() if role not in roles}
+        written = {role: [f"{value:g}" for value in values] for role, values in self.numbers.items()} | dict(self.texts)
+        unread = {heading: written.get(role, []) for role, heading in self.columns.items() if role in roles}
+        texts = {role: one for role, one in self.texts.items() if role not in roles}
         return replace(
-            self.without(*roles), words=words, columns=columns, units=units, others={**self.others, **unread}
+            self.without(*roles), texts=texts, columns=columns, units=units, others={**self.others, **unread}
         )
 
 
@@ -185,21 +187,21 @@ def _errors_turned(taken: MeasuredRows, place: Placement, along: Array) -> Measu
 def with_experiments(taken: MeasuredRows, experiments: Sequence[str]) -> MeasuredRows:
     """The rows, their experiments read from a column, under any heading, of names of experiments and nothing else."""
     heading = next((name for name, texts in taken.others.items() if texts and set(texts) <= set(experiments)), None)
-    if heading is None or "experiment" in taken.words:
+    if heading is None or "experiment" in taken.texts:
         return taken
     others = {name: texts for name, texts in taken.others.items() if name != heading}
-    words = {**taken.words, "experiment": taken.others[heading]}
-    return replace(taken, words=words, columns={"experiment": heading, **taken.columns}, others=others)
+    texts = {**taken.texts, "experiment": taken.others[heading]}
+    return replace(taken, texts=texts, columns={"experiment": heading, **taken.columns}, others=others)
 
 
 def joined_rows(parts: Sequence[MeasuredRows]) -> MeasuredRows:
     """The rows of several files one below the other, as far as all of them have a role."""
     first = parts[0]
     numbers = {r: np.concatenate([one.numbers[r] for one in parts]) for r in first.numbers if _in_all(r, parts)}
-    words = {role: [text for one in parts for text in one.words[role]] for role in first.words}
+    texts = {role: [text for one in parts for text in one.texts[role]] for role in first.texts}
     shared = [name for name in first.others if all(name in one.others for one in parts)]
     others = {name: [text for one in parts for text in one.others[name]] for name in shared}
-    return replace(first, numbers=numbers, words=words, others=others, lines=first.lines if len(parts) == 1 else ())
+    return replace(first, numbers=numbers, texts=texts, others=others, lines=first.lines if len(parts) == 1 else ())
 
 
 def _in_all(role: str, parts: Sequence[MeasuredRows]) -> bool:

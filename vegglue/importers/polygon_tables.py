@@ -29,9 +29,9 @@ def polygons_of_table(path: Path) -> list[tuple[Corners, Mapping[str, str]]]:
             "`patches: [{x: [20, 24], y: [0, 1.5], stems_per_m2: 22}]`."
         )
     taken = rows_of_table(path, table, FileWords())
-    texts = {**{taken.columns[role]: words for role, words in taken.words.items()}, **taken.others}
+    texts = {**{taken.columns[role]: words for role, words in taken.texts.items()}, **taken.others}
     rows = [{heading: column[row].strip() for heading, column in texts.items()} for row in range(taken.size)]
-    named = first_heading(rows[0], NAMES) or next(iter(taken.columns[role] for role in taken.words), None)
+    named = first_heading(rows[0], NAMES) or next(iter(taken.columns[role] for role in taken.texts), None)
     places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
     found: dict[str, tuple[Corners, Mapping[str, str]]] = {}
     for line, properties, place in zip(taken.lines, rows, places.tolist(), strict=True):

@@ -89,7 +89,7 @@ def _refuse_unknown(
         raise InputError(f"{file}: {known.remedy(words.experiment)}; or correct `experiment` of this file.")
     if columns and taken.lines:
         measured = taken.only(np.any([np.isfinite(taken.numbers[column]) for column in columns], axis=0))
-        known.refuse_unknown(file, measured.lines, measured.words["experiment"])
+        known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
 
 
 def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Ma
 
 def _without_section(taken: MeasuredRows, words: FileWords) -> tuple[str, ...]:
     """That names of sections are not used, where some rows have none: below a merged cell, say."""
-    names = taken.words.get("section", ()) if words.section is None else ()
+    names = taken.texts.get("section", ()) if words.section is None else ()
     unnamed = sum(not name for name in names)
     lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
     return (f"sections told by x, as {lacking}",) if 0 < unnamed < len(names) else ()
@@ -121,12 +121,12 @@ def _named(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], wh
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
     names = _experiments(taken, words, experiments, where)
-    sections = [words.section] * taken.size if words.section is not None else taken.words.get("section")
+    sections = [words.section] * taken.size if words.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
         x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
         of_one_tape = "tape" in taken.columns and "tape" not in taken.numbers
         sections = [section_at(x)] * taken.size if of_one_tape else sections_by_place(x, y)
-    named = replace(taken, words={**taken.words, "experiment": names, "section": sections})
+    named = replace(taken, texts={**taken.texts, "experiment": names, "section": sections})
     refuse_lost_places(named, where.removesuffix(":"))
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
 
@@ -135,8 +135,8 @@ def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[st
     """The experiment of each row."""
     if words.experiment is not None:
         return [words.experiment] * taken.size
-    if "experiment" in taken.words:
-        return list(taken.words["experiment"])
+    if "experiment" in taken.texts:
+        return list(taken.texts["experiment"])
     if len(experiments) == 1:
         return [experiments[0]] * taken.size
     file = where.removesuffix(":").rpartition("/")[2]
@@ -162,8 +162,7 @@ def _in_verticals(taken: MeasuredRows) -> bool:
 
 def _places(taken: MeasuredRows) -> list[PlaceKey]:
     x, y = (np.round(taken.numbers[role] / ONE_PLACE) * ONE_PLACE for role in ("x", "y"))
-    words = taken.words
-    return list(zip(words["experiment"], words["section"], x.tolist(), y.tolist(), strict=True))
+    return list(zip(taken.texts["experiment"], taken.texts["section"], x.tolist(), y.tolist(), strict=True))
 
 
 def _heights(taken: MeasuredRows) -> list[tuple[object, ...]]:
@@ -178,9 +177,9 @@ def _points(taken: MeasuredRows, stem: str, words: FileWords) -> StationTable:
     optional = _beside_u(kept, words)
     names = [
         f"{experiment}/{section}"
-        for experiment, section in zip(kept.words["experiment"], kept.words["section"], strict=True)
+        for experiment, section in zip(kept.texts["experiment"], kept.texts["section"], strict=True)
     ]
-    devices = kept.words.get("device", ["ADV"] * kept.size)
+    devices = kept.texts.get("device", ["ADV"] * kept.size)
     upward = str(vertical_role(kept))
     places = [kept.numbers[role] for role in ("x", "y", upward)]
     columns = [
@@ -210,7 +209,7 @@ def _at_their_heights(taken: MeasuredRows, words: FileWords) -> tuple[MeasuredRo
     """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
     upward = str(vertical_role(taken))
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
-    sections = list(zip(kept.words["experiment"], kept.words["section"], strict=True))
+    sections = list(zip(kept.texts["experiment"], kept.texts["section"], strict=True))
     x = kept.numbers["x"].copy()
     for one in set(sections):
         here = np.array([section == one for section in sections])

@@ -155,7 +155,7 @@ def _points(path: Path, place: Placement, words: FileWords) -> tuple[Array, list
     if not there.any():
         raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
     said = taken_in_words(taken.leaving(*(taken.columns.keys() - ROLES_OF_BED)))
-    return points[there], list(taken.only(there).words.get("section", [])), said
+    return points[there], list(taken.only(there).texts.get("section", [])), said
 
 
 def _naming(headings: Sequence[str]) -> str:
