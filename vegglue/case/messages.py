@@ -32,8 +32,7 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     place = _place(tree, location)
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
-    expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    expected = re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
+    expected = expected_in_words(problem)
     for said, meant in (
         ("greater", "a number greater"),
         ("less", "a number less"),
@@ -44,6 +43,12 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if problem["type"] == "string_type":
         expected, advice = "a text", "; write it in quotes" if isinstance(got, int | float) else ""
     return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
+
+
+def expected_in_words(problem: Mapping[str, Any]) -> str:
+    """What one of pydantic's problems says was expected, without its opening words and the names of our types."""
+    expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
 
 def unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> Refusal | None:

@@ -1,14 +1,13 @@
 """The site file of a field team, read and checked whole."""
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from vegglue.case.config import read_tree
-from vegglue.case.messages import dotted
+from vegglue.case.messages import dotted, expected_in_words
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
@@ -113,8 +112,7 @@ def _sentence(error: ValidationError) -> str:
     place = dotted(tuple(key for key in problem["loc"] if key != "[key]")) or "site.json"
     if problem["type"] == "missing":
         return f"`{place}` is missing; add it."
-    expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    expected = re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
+    expected = expected_in_words(problem)
     for said, meant in (("valid number", "number"), ("valid string", "text in quotes")):
         expected = expected.replace(said, meant)
     return f"`{place}` expected {expected}, got {repr(problem['input'])[:80]}; correct it."
