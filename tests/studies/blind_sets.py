@@ -24,7 +24,7 @@ from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import MODEL_ERROR, VISCOSITY, VISCOSITY_FACTOR, viscosity_prior
 from vegglue.twins.hidden_effect import (
-    BAD,
+    BAD_PROBE_EXCESS,
     LARGEST_SIZE,
     TwinBase,
     VisibilityError,
@@ -232,7 +232,7 @@ def _hidden(base: TwinBase, sizing: Noise, name: str, signal: float, random: np.
 
 
 def _instrument(base: TwinBase, sizing: Noise, kind: str, signal: float, random: np.random.Generator) -> dict[str, Any]:
-    """Rows of one instrument, and by how much it is off: as visible as asked, a bad probe by BAD standard errors."""
+    """Rows of one instrument, and by how much it is off: as visible as asked, a bad probe by that of a twin."""
     station = base.model.station
     rows = np.flatnonzero((station["kind"] == ("level" if kind == "gauge" else "velocity")).to_numpy())
     one = station.iloc[int(random.choice(rows))]
@@ -240,7 +240,7 @@ def _instrument(base: TwinBase, sizing: Noise, kind: str, signal: float, random:
     chosen = np.flatnonzero(same.to_numpy()) if kind in ("position", "gauge") else np.array([int(str(one.name))])
     sign, error = float(random.choice([-1.0, 1.0])), float(one["standard_error"])
     if kind == "bad_probe":
-        return {"amplitude": sign * BAD * error, "stations": chosen.tolist()}
+        return {"amplitude": sign * BAD_PROBE_EXCESS * error, "stations": chosen.tolist()}
     trace = np.zeros(len(station))
     trace[chosen] = 1.0
     return {"amplitude": sign * signal / visible_length(base, sizing, trace), "stations": chosen.tolist()}

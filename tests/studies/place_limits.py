@@ -28,7 +28,7 @@ from vegglue.engine.interface import responses
 from vegglue.parallel import as_finished, at_most
 from vegglue.screening import score_test
 from vegglue.screening.candidates import cause_of
-from vegglue.twins.hidden_effect import candidate_of, case_knowing
+from vegglue.twins.hidden_effect import candidate_of, with_unlisted_objects
 from vegglue.twins.sealed_answer import Hidden
 
 # Places that are tried lie so far apart along and across [m]: a third of what counts as near, and two rows of cells.
@@ -51,7 +51,7 @@ def traces_at(study: str, place: int, name: str, radius: float) -> tuple[Array, 
 
 def _traces(study: str, place: int, name: str, shapes: Sequence[dict[str, float]]) -> Array:
     base, _ = place_of(study, place)
-    case = case_knowing(base.model.case, Hidden(name, 0.0, shapes[0], 0.0))
+    case = with_unlisted_objects(base.model.case, Hidden(name, 0.0, shapes[0], 0.0))
     causes = [cause_of(case, candidate_of(base.model, name), some) for some in shapes]
     parts = [causes[first : first + TOGETHER] for first in range(0, len(causes), TOGETHER)]
     return np.concatenate([responses(replace(base.model, case=case), base.here, part) for part in parts], axis=1)

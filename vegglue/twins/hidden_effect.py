@@ -27,11 +27,11 @@ from vegglue.twins.sealed_answer import ANY, BAD_PROBE, UNLISTED, Hidden
 # An effect that must be larger than this many plausible sizes to be as visible as asked is not hidden.
 LARGEST_SIZE = 4.0
 # Steps and exactness [-] of finding the size.
-SIZING_STEPS, SIZED = 6, 0.02
+SIZING_STEPS, SIZE_TOLERANCE = 6, 0.02
 # Effects and places that are tried where chance decides.
 DRAWN = 20
 # Excess of a bad probe [standard errors].
-BAD = 10.0
+BAD_PROBE_EXCESS = 10.0
 
 
 class VisibilityError(InputError):
@@ -105,7 +105,7 @@ def candidate_of(model: Model, name: str) -> Candidate:
 def case_hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
     """The case with the effect at work at its true size; one that stands in no list is read from its own file."""
     working = effect_entry(candidate, hidden.amplitude, hidden.shapes)
-    return case_knowing(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
+    return with_unlisted_objects(case, hidden).model_copy(update={"effects": {**case.effects, candidate.key: working}})
 
 
 def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
@@ -118,7 +118,9 @@ def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
         raise InputError(f"--hide {BAD_PROBE} expected a section with two velocities or more, got none; hide another.")
     station = int(errors.rows[random.choice(velocity)])
     excess = size_given(f"{BAD_PROBE}={size}", size)
-    return Hidden(BAD_PROBE, BAD * float(random.choice([-1.0, 1.0])) if excess is None else excess, {}, 0.0, station)
+    return Hidden(
+        BAD_PROBE, BAD_PROBE_EXCESS * float(random.choice([-1.0, 1.0])) if excess is None else excess, {}, 0.0, station
+    )
 
 
 def size_given(text: str, size: str) -> float | None:
@@ -129,7 +131,7 @@ def size_given(text: str, size: str) -> float | None:
         raise InputError(f"--hide: expected EFFECT or EFFECT=NUMBER, got {text!r}; e.g. --hide wind=8.") from None
 
 
-def case_knowing(case: Case, hidden: Hidden) -> Case:
+def with_unlisted_objects(case: Case, hidden: Hidden) -> Case:
     """The case with the file of the unlisted objects, if what is hidden is one of them."""
     return case if hidden.listed else case.model_copy(update={"effect_file": Path(unlisted_objects.__file__)})
 
@@ -172,19 +174,19 @@ def _sized(
         size = min(size, most)
         one = replace(hidden, amplitude=float(np.clip(amplitude.off + sign * size, amplitude.low, amplitude.high)))
         signal = _signal(base, errors, candidate, one)
-        if abs(signal / snr - 1.0) < SIZED:
+        if abs(signal / snr - 1.0) < SIZE_TOLERANCE:
             return replace(one, signal=signal)
         at_its_end = abs(one.amplitude - amplitude.off) < size or size == most
         if signal == 0.0 or (at_its_end and signal < snr):
             return None
         size *= min((snr / signal) ** (1.0 / amplitude.power), 3.0)
-    return replace(one, signal=signal) if abs(signal / snr - 1.0) < 5.0 * SIZED else None
+    return replace(one, signal=signal) if abs(signal / snr - 1.0) < 5.0 * SIZE_TOLERANCE else None
 
 
 def _first_size(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float) -> float:
     """(snr / |S_perp|)^(1/power), to first order."""
     amplitude = candidate.effect.amplitude
-    case = case_knowing(base.model.case, hidden)
+    case = with_unlisted_objects(base.model.case, hidden)
     changed = cause_of(case, candidate, hidden.shapes)
     trace = responses(replace(base.model, case=case), base.here, [changed])
     return amplitude.size(snr / max(visible_length(base, errors, trace[:, 0]), 1e-300))

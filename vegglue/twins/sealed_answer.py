@@ -28,6 +28,7 @@ class Hidden:
 
     @property
     def listed(self) -> bool:
+        """Whether it is an effect of the library: neither something unlisted nor a bad probe."""
         return not self.name.startswith(UNLISTED) and self.name != BAD_PROBE
 
 
