@@ -100,6 +100,9 @@ def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
 
 
 def _effect_in_words(found: Diagnosis, step: Step) -> str:
+    """An accepted effect by its title, with its name and size, and its likeliest rivals; 'most likely' where it has
+    any, unless a place that is likelier is told before it.
+    """
     name, likelier = step.accepted, step.likelier_place
     suspect = found.suspect(name)
     short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
