@@ -64,7 +64,7 @@ def test_a_posterior_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwh
     assert stored_hash(Path("runs/brook/posterior.h5")) == before != case_hash(case)
 
 
-def test_a_best_place_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwhile) -> None:
+def test_a_best_fit_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwhile) -> None:
     before = case_hash(case)
     meanwhile(run_folder, "calibrated_anew")
     folder = run_folder.folder_of("runs", case)

@@ -62,36 +62,36 @@ def from_prior_at(first: float, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"vegglue.workflow.run_folder.{name}", searched)
 
 
-def place(case: Case, folder: Path, known: float | None) -> float:
-    """The first z of the calibrated case, when an earlier command left that place."""
+def first_z(case: Case, folder: Path, known: float | None) -> float:
+    """The first z of the calibrated case, when an earlier command kept that one."""
     folder.mkdir()
     if known is not None:
         z = np.zeros((1, len(case.parameters)))
         z[0, 0] = known
         theta = {name: value[0] for name, value in theta_at(case, z).items()}
-        run_folder.remember_place(case, folder, theta, case_hash(case))
+        run_folder.keep_best_fit(case, folder, theta, case_hash(case))
     return float(run_folder.calibrated(case, folder, excluded_by()).fitted.point.z[0])
 
 
 @pytest.mark.parametrize(("known", "searches"), [(0.999, 2), (1.3, 2), (0.7, 2), (-0.9, 3)])
-def test_a_known_place_that_leads_no_lower_changes_nothing(
+def test_a_kept_fit_that_leads_no_lower_changes_nothing(
     known: float, searches: int, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from_prior_at(0.8, monkeypatch)
-    assert place(case, tmp_path / "with", known) == place(case, tmp_path / "without", None)
+    assert first_z(case, tmp_path / "with", known) == first_z(case, tmp_path / "without", None)
     # Only one that leads elsewhere is worth a search of its own: its errors are others.
     assert len(STARTS) == searches
 
 
-def test_a_known_place_that_leads_lower_is_taken(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kept_fit_that_leads_lower_is_taken(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from_prior_at(-0.8, monkeypatch)
-    assert place(case, tmp_path / "without", None) < -0.9
-    assert place(case, tmp_path / "with", 0.7) > 0.9
+    assert first_z(case, tmp_path / "without", None) < -0.9
+    assert first_z(case, tmp_path / "with", 0.7) > 0.9
 
 
 def test_the_same_again_gives_the_same(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from_prior_at(0.8, monkeypatch)
-    first = place(case, tmp_path / "runs", None)
+    first = first_z(case, tmp_path / "runs", None)
     again = run_folder.calibrated(case, tmp_path / "runs", excluded_by())
     assert float(again.fitted.point.z[0]) == first
 
