@@ -39,6 +39,9 @@ def test_odds_are_told_against_the_nearest_rivals() -> None:
         == "20 to 1 against a probe that is off in all experiments"
     )
     assert against_rivals(a_location(odds={})) == ""
+    assert against_rivals(a_location(odds={"bed": 0.25, "wind": 1e-6})) == (
+        "1 to over 1,000 against wind, 1 to 4.0 against bed"
+    ), "as in the verdict, and not 0.25 to 1"
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,10 @@ def where(x: float, y: float) -> str:
 
 
 def odds_in_words(odds: float) -> str:
-    """'200 to 1', two figures at most."""
-    return f"over {TOLD_ODDS:,.0f} to 1" if odds > TOLD_ODDS else f"{short(odds, 2)} to 1"
+    """'200 to 1', or '1 to 3' of what is less likely, two figures at most."""
+    larger = max(odds, 1.0 / max(odds, 1e-300))
+    told = f"over {TOLD_ODDS:,.0f}" if larger > TOLD_ODDS else short(larger, 2)
+    return f"1 to {told}" if odds < 1.0 else f"{told} to 1"
 
 
 def against_rivals(place: Location) -> str:
