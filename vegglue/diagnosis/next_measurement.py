@@ -40,9 +40,8 @@ LEVEL_POWER = 0.6
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """One measurement that could be made: its stations and their rows of the extended table, where, and its cost [h].
-
-    setting: the experiment it is made in.
+    """One measurement that could be made: its stations and their rows of the extended table, its cost [h], where [m],
+    and in which experiment.
     """
 
     name: str
@@ -51,7 +50,6 @@ class MeasurementPlan:
     hours: float
     x: float
     experiment: str
-    setting: Experiment
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,8 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
     velocity = velocity.assign(x=section_places(velocity))
     for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
         table = _stations(experiment, plan_name, x, y, kind)
-        rows, setting = np.arange(count, count + len(table)), case.experiments[experiment]
-        plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment, setting))
+        rows = np.arange(count, count + len(table))
+        plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment))
         tables.append(table)
         count += len(table)
     return replace(model, case=case, station=pd.concat(tables, ignore_index=True)), plans

@@ -29,7 +29,6 @@ class Projected:
     visible: |S_perp| / |S| of each (c,) [-]; length: |S_perp| (c,), in standard errors per unit of amplitude.
     """
 
-    basis: Array
     residual: Array
     fingerprints: Array
     length: Array
@@ -50,7 +49,7 @@ def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Pr
     seen[:rows] += fingerprints
     length = _lengths(seen)
     visible = length / np.maximum(_lengths(fingerprints), 1e-300)
-    return Projected(basis, remaining - basis @ (basis.T @ remaining), seen, length, visible)
+    return Projected(remaining - basis @ (basis.T @ remaining), seen, length, visible)
 
 
 def scores(projected: Projected, only_sign: np.ndarray) -> Array:
