@@ -11,6 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.case.parameter_space import theta_at
+from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
@@ -57,7 +58,7 @@ def _linearised(
     prediction = np.full((len(members), len(model.station)), np.nan)
     flows = {}
     for experiment in model.case.experiments:
-        problem = _problem(model, experiment, members)
+        problem = problem_at(model, experiment, members)
         state = _rested(problem, _start(problem, near, experiment), time_step, longest)
         prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
         flows[experiment] = state[..., :1].copy()
@@ -70,7 +71,7 @@ def _linearised(
 def _predicted(model: Model, points: Sequence[Point], z: Array, time_step: float, longest: float) -> Array:
     prediction = np.full((len(z), len(model.station)), np.nan)
     for experiment in model.case.experiments:
-        problem = _problem(model, experiment, z)
+        problem = problem_at(model, experiment, z)
         state = _rested(problem, _start(problem, points[0], experiment), time_step, longest)
         prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
     prediction[np.isnan(prediction).any(axis=1)] = np.nan
@@ -106,7 +107,7 @@ def _responses_to_cells(
     for water that enters, which comes without momentum, while water that leaves takes its own along.
     """
     nx, ny = model.site.bed.shape
-    one = _problem(model, experiment, point.z[None])
+    one = problem_at(model, experiment, point.z[None])
     geometry, cells = channel_geometry(model.case, model.site, experiment), np.eye(nx * ny).reshape(nx, ny, nx * ny)
     found: dict[Term, Single] = {}
     for term in terms:
@@ -123,13 +124,9 @@ def _responses_to_cells(
 
 
 def _flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
-    now = faces(_problem(model, experiment, point.z[None]), point.flows[experiment])
+    now = faces(problem_at(model, experiment, point.z[None]), point.flows[experiment])
     u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
     return CentreFlow(now.cell[..., 0], u[..., 0], v[..., 0])
-
-
-def _problem(model: Model, experiment: str, z: Array) -> Problem:
-    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
 
 
 def _start(problem: Problem, near: Point | None, experiment: str) -> Array:

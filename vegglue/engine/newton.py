@@ -9,12 +9,13 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.case_effects import stages_of
 from vegglue.case.parameter_space import theta_at
+from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.engine.newton_fields import responses_by_adjoints
 from vegglue.engine.newton_runs import predict_members
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import EMPTY, Problem, crop
-from vegglue.flow.problem_setup import build_problem, with_effects_of
+from vegglue.flow.problem_setup import with_effects_of
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import in_threads
 from vegglue.solver.chord import ChordSolution
@@ -150,11 +151,6 @@ def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
     u = 0.5 * (now.u[1:] + now.u[:-1])[..., 0]
     v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
     return CentreFlow(now.cell[..., 0], u, v)
-
-
-def problem_at(model: Model, experiment: str, z: Array) -> Problem:
-    """The flow problem of one experiment at z, (p,) or (m, p)."""
-    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
 
 
 def _at_rest(model: Model, experiment: str, z: Array, near: Point | None) -> tuple[SteadyFlow, Array] | None:

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array, Single
-from vegglue.case.parameter_space import theta_at
 from vegglue.compilation import compiled
+from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Model, Point
 from vegglue.flow.equations import cell_depths, residual
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.problem import Problem, crop
-from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import reading_weights
 from vegglue.flow.shared_inflow import (
     answer_to_discharge,
@@ -60,7 +59,7 @@ class _Change:
 def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
     """See `Engine.responses_to_cells`; in single precision, one solve for each station."""
     flow, grid, station = point.flows[experiment], model.site.grid, model.station_of(experiment)
-    problem = build_problem(model.case, model.site, experiment, theta_at(model.case, point.z[None]))
+    problem = problem_at(model, experiment, point.z[None])
     state, rows = widen(flow.state, flow.rows, flow.band), slice(*flow.band)
     part = crop(problem, *flow.band)
     geometry = rows_of(channel_geometry(model.case, model.site, experiment), *flow.band)

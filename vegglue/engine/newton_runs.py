@@ -7,10 +7,9 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import theta_at
+from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Model, Point
 from vegglue.flow.problem import Problem
-from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.parallel import side_by_side
 from vegglue.solver.batch import solve_members
@@ -67,8 +66,8 @@ def _alone(model: Model, z: Array) -> Array:
 def _read_alone(model: Model, experiment: str, z: Array) -> Array:
     numerics = model.case.numerics
     how = fall_back(numerics.march_step, numerics.march_span)
-    problem = _problem(model, experiment, z)
-    build = partial(_problem_at, model, experiment)
+    problem = problem_at(model, experiment, z)
+    build = partial(_problem_in_cube, model, experiment)
     solved = solve_members(problem, ndtr(z), build, numerics.tolerance, how=how)
     state = np.ascontiguousarray(solved.state)
     prediction = predictions_at_sensors(problem, state, model.site.grid, model.station_of(experiment))
@@ -76,10 +75,6 @@ def _read_alone(model: Model, experiment: str, z: Array) -> Array:
     return prediction
 
 
-def _problem(model: Model, experiment: str, z: Array) -> Problem:
-    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
-
-
-def _problem_at(model: Model, experiment: str, points: Array) -> Problem:
+def _problem_in_cube(model: Model, experiment: str, points: Array) -> Problem:
     """The same at points of the unit cube."""
-    return _problem(model, experiment, ndtri(points))
+    return problem_at(model, experiment, ndtri(points))
