@@ -76,5 +76,5 @@ def _read_alone(model: Model, experiment: str, z: Array) -> Array:
 
 
 def _problem_in_cube(model: Model, experiment: str, points: Array) -> Problem:
-    """The same at points of the unit cube."""
+    """The flow problem of one experiment at points (m, p) of the unit cube."""
     return problem_at(model, experiment, ndtri(points))
