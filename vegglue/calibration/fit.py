@@ -49,10 +49,13 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enoug
     """
     point, longest = start, LONGEST_FIT_STEP
     for _ in range(steps):
-        step, predicted = _step(noise, point, longest)
-        if predicted < NEGLIGIBLE_DECREASE or _promised(noise, point) > enough:
+        matrix, right = _normal_equations(noise, point)
+        step, predicted = _step(point, matrix, right, longest)
+        before = objective(noise, point)
+        # The least objective by the slopes here is F - b' H^-1 b.
+        if predicted < NEGLIGIBLE_DECREASE or before - right @ np.linalg.solve(matrix, right) > enough:
             break
-        there, before = point.z + step, objective(noise, point)
+        there = point.z + step
         # The slopes of a step that is taken back are never asked for: they are half of its work.
         moved = linearise(model, there, point, partial(_is_below, before, noise, there))
         decrease = -np.inf if moved is None else before - objective(noise, moved)
@@ -132,18 +135,15 @@ def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, flo
     return float(middle), float(low), float(high)
 
 
-def _promised(noise: Noise, point: Point) -> float:
-    """F - b' H^-1 b: the least objective by the slopes at a point [-], H = J' W' W J + I, b = J' W' W (y - f) - z."""
-    slope = noise.whiten(noise.used(point.slope))
-    right = slope.T @ noise.whiten(noise.residual(point.prediction)) - point.z
-    return objective(noise, point) - float(right @ covariance(noise, point) @ right)
-
-
-def _step(noise: Noise, point: Point, longest: float) -> tuple[Array, float]:
-    """The step (p,) (Levenberg 1944), damped until no longer than `longest`, and the predicted decrease."""
+def _normal_equations(noise: Noise, point: Point) -> tuple[Array, Array]:
+    """H = J' W' W J + I (p, p) and b = J' W' W (y - f) - z (p,)."""
     slope = noise.whiten(noise.used(point.slope))
     residual = noise.whiten(noise.residual(point.prediction))
-    matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
+    return slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
+
+
+def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, float]:
+    """The step (p,) (Levenberg 1944), damped until no longer than `longest`, and the predicted decrease."""
     # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
     held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
     matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
