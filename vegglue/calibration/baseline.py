@@ -62,28 +62,27 @@ def search_model(base: Baseline) -> SearchModel:
 
     The model itself where the coarse one has fewer than FEWEST_CELLS_ACROSS.
     """
-    point = base.fitted.point
-    if not searches_coarse_cells(base):
+    point, searched = base.fitted.point, coarse_search(base)
+    if searched is None:
         return SearchModel(base.model, base.noise, point)
-    assert base.coarse is not None
-    assert base.on_coarse is not None
-    shift = base.noise.used(point.prediction - base.on_coarse.prediction)
-    return SearchModel(base.coarse, replace(base.noise, value=base.noise.value - shift), base.on_coarse)
+    coarse, on_coarse = searched
+    shift = base.noise.used(point.prediction - on_coarse.prediction)
+    return SearchModel(coarse, replace(base.noise, value=base.noise.value - shift), on_coarse)
 
 
 def searched_by_itself(base: Baseline) -> Baseline:
     """The baseline with nothing borrowed at the point of its search: many answers are asked for there."""
-    if searches_coarse_cells(base):
-        assert base.coarse is not None
-        assert base.on_coarse is not None
-        return replace(base, on_coarse=by_itself(base.coarse, base.on_coarse))
+    searched = coarse_search(base)
+    if searched is not None:
+        return replace(base, on_coarse=by_itself(*searched))
     return replace(base, fitted=replace(base.fitted, point=by_itself(base.model, base.fitted.point)))
 
 
-def searches_coarse_cells(base: Baseline) -> bool:
-    """Whether the search for missing effects uses cells of twice the size."""
-    coarse = None if base.on_coarse is None else base.coarse
-    return coarse is not None and cells_across(coarse.site) >= FEWEST_CELLS_ACROSS
+def coarse_search(base: Baseline) -> tuple[Model, Point] | None:
+    """The model on cells of twice the size and its point; None where missing effects are searched on the case's own."""
+    if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < FEWEST_CELLS_ACROSS:
+        return None
+    return base.coarse, base.on_coarse
 
 
 def model_that_errs(base: Baseline) -> SearchModel:

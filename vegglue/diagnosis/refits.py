@@ -17,7 +17,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import (
     Baseline,
     SearchModel,
-    searches_coarse_cells,
+    coarse_search,
     with_coarse_point,
     with_error_of_grid,
     with_own_error,
@@ -135,7 +135,7 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     if start is None:
         return None
     # The error of the grid is told where the refit ended first: its flow on coarse cells is known if they are searched.
-    on_coarse = place if searches_coarse_cells(base) else base.on_coarse
+    on_coarse = base.on_coarse if coarse_search(base) is None else place
     trial = Baseline(model, base.noise, at_point(base.noise, start), _with(base.coarse, best), on_coarse)
     near = with_error_of_grid(with_coarse_point(trial))
     return with_own_error(with_error_of_grid(with_coarse_point(near)))
