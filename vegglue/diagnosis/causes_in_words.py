@@ -6,6 +6,7 @@ import numpy as np
 
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
+from vegglue.diagnosis.rivals import HARDLY
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
@@ -24,8 +25,9 @@ STATED_BELOW = 0.995
 TOLD_ERROR = 0.3
 # Terms whose size is part of what acts, in words.
 TOLD_BY_SIZE = ("bed", "inflow")
-# Odds of a place against what is known above which they are not told: the set of the likeliest ends there.
-KNOWN_TOLD_ODDS = 20.0
+# Odds of a place against what is known above which they are not told: as of a rival that is told apart whatever its
+# trace.
+KNOWN_TOLD_ODDS = 1.0 / HARDLY
 # Contenders that are told where none is surely it.
 UNDECIDED_TOLD = 3
 
