@@ -2,7 +2,8 @@
 lead.
 
 Something at a place says "none of what is known", which is vague: all places together have to lead all that is known by
-KNOWN_FIRST_ODDS. Which of the places is taken need not be sure: they say the same.
+KNOWN_FIRST_ODDS. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
+LEAST_ODDS is taken as it is: nothing is followed beside it.
 """
 
 from collections.abc import Sequence
