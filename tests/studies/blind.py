@@ -48,6 +48,7 @@ RUNS = ROOT / "runs" / "blind"
 # Records of the study as far as it was made: data sets cost hours.
 KEPT = ROOT / "data" / "blind" / "records.jsonl"
 LENGTHS, PLACE_LIMITS = KEPT.with_name("lengths.jsonl"), KEPT.with_name("place_limits.jsonl")
+OBJECT_LIMITS = KEPT.with_name("object_limits.jsonl")
 # Data sets of each kind at share 1, by whose truth it is and how large the campaign.
 SIZES: dict[tuple[str, str], dict[str, int]] = {
     ("second", "twin"): {
@@ -203,13 +204,19 @@ def main() -> None:
         sizes,
         values_by_key(LENGTHS, "truth"),
         values_by_key(PLACE_LIMITS, "near"),
+        lines_by_key(OBJECT_LIMITS),
     )
 
 
 def values_by_key(path: Path, name: str) -> dict[str, float]:
-    """One value of each data set that `blind_lengths` or `place_limits` looked into, by its key."""
+    """One value of each data set that `blind_lengths` or one of the studies of limits looked into, by its key."""
+    return {key: one[name] for key, one in lines_by_key(path).items()}
+
+
+def lines_by_key(path: Path) -> dict[str, dict[str, Any]]:
+    """What one of those studies found of each data set, by its key."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {one["key"]: one[name] for one in map(json.loads, lines)}
+    return {one["key"]: one for one in map(json.loads, lines)}
 
 
 def planned(share: float, only: list[str]) -> list[Trial]:

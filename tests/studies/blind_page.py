@@ -24,7 +24,7 @@ from blind_lines import (
     made,
     shares_that_reach,
 )
-from blind_text import AFFORDED, PAGE
+from blind_text import AFFORDED, IDEAL, PAGE
 
 from vegglue.figures.style import save
 
@@ -42,10 +42,11 @@ def write_page(
     planned: Mapping[tuple[str, str], int],
     lengths: Mapping[str, float],
     limits: Mapping[str, float],
+    ideal: Mapping[str, Mapping[str, float]],
 ) -> None:
     """blind.md with its tables, and blind-*.svg beside it; planned: data sets by truth and case. By the keys of sets
     with an object: lengths, how long it is in the flow of the stranger [standard errors]; limits, how often its place
-    could be told in a model that is right but for it [-].
+    could be told in a model that is right but for it [-]; ideal, how often it would be told there, see `object_limits`.
     """
     sets = {truth: made(records, truth) for truth in TRUTHS}
     told = {truth: chances_told(chosen) for truth, chosen in sets.items()}
@@ -53,7 +54,8 @@ def write_page(
     nothing = [one for one in sets["second"] if one["group"].startswith("null")]
     text = PAGE.format(
         lines=lines, alone=alone, reached=reached,
-        lengths=_lengths(sets["second"], lengths), limits=_limits(limits), kept=_kept(sets["second"]),
+        lengths=_lengths(sets["second"], lengths), limits=_limits(limits), ideal=_ideal(ideal),
+        kept=_kept(sets["second"]),
         sized=_case_table([one for one in sets["second"] if one.get("sized") == "truth"]),
         sizes=_sizes(records, planned), left_out=_left_out(records), afforded=AFFORDED, main=_main_table(sets),
         chances=_chances(told), distances=_distances(told), instead=_instead(sets["second"]),
@@ -101,9 +103,28 @@ def _limits(limits: Mapping[str, float]) -> str:
     return (
         f"Were the model right but for the object, and its kind and width known, the likeliest place would lie within "
         f"1.5 m of the true one in {share} of draws of the errors, over {len(limits)} objects six standard errors long "
-        "(`tests/studies/place_limits.py`). The rest is lost to another mixing and friction, and to all else that may "
-        "be missing."
+        "(`tests/studies/place_limits.py`)."
     )
+
+
+def _ideal(shares: Mapping[str, Mapping[str, float]]) -> str:
+    """How often objects would be told in a model that is right but for them, by the rules of a diagnosis."""
+    groups = {
+        group: [one for key, one in shares.items() if f"/{group}/" in key]
+        for group in ("unlisted", "listed6", "listed3")
+    }
+    if not all(groups.values()):
+        return ""
+
+    def mean(name: str, group: str = "unlisted") -> str:
+        return percent(float(np.mean([one[name] for one in groups[group]])))
+
+    return IDEAL.format(
+        objects=len(groups["unlisted"]), told=mean("told"), near=mean("near"), guessed=mean("guessed"),
+        evenly=mean("evenly"), effects=len(groups["listed6"]) + len(groups["listed3"]),
+        evenly6=mean("evenly", "listed6"), evenly3=mean("evenly", "listed3"),
+        told6=mean("told", "listed6"), told3=mean("told", "listed3"),
+    )  # fmt: skip
 
 
 def _kept(records: Sequence[Record]) -> str:

@@ -46,10 +46,10 @@ def traces_at(study: str, place: int, name: str, radius: float) -> tuple[Array, 
     x, y = np.arange(low + STEP[0], high, STEP[0]), np.arange(right + STEP[1], left, STEP[1])
     places = np.stack([each.ravel() for each in np.meshgrid(x, y)], axis=1)
     shapes = [{"x": float(along), "y": float(across), "radius": radius} for along, across in places]
-    return places, _traces(study, place, name, shapes)
+    return places, traces_of(study, place, name, shapes)
 
 
-def _traces(study: str, place: int, name: str, shapes: Sequence[dict[str, float]]) -> Array:
+def traces_of(study: str, place: int, name: str, shapes: Sequence[dict[str, float]]) -> Array:
     base, _ = place_of(study, place)
     case = with_unlisted_objects(base.model.case, Hidden(name, 0.0, shapes[0], 0.0))
     causes = [cause_of(case, candidate_of(base.model, name), some) for some in shapes]
@@ -63,7 +63,7 @@ def share_near(trial: Trial, hidden: dict[str, Any]) -> float:
     base, columns = place_of(study, place)
     places, traces = traces_at(study, place, hidden["name"], shapes["radius"])
     errors = sizing_errors(base, noise_of(base.model.station), columns)
-    every = np.column_stack([_traces(study, place, hidden["name"], [shapes]), traces])
+    every = np.column_stack([traces_of(study, place, hidden["name"], [shapes]), traces])
     white, slopes = errors.whiten(errors.used(every)), errors.whiten(errors.used(base.here.slope))
     units = score_test.project(slopes, white[:, 0], np.zeros(slopes.shape[1]), white).units
     noise = np.random.default_rng(hash_of(trial.key)).standard_normal((units.shape[0], DRAWS))

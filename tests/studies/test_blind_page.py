@@ -290,7 +290,7 @@ def test_the_page(tmp_path: Path) -> None:
         out | {"left_out": reason}, out | {"left_out": "no steady flow"},
     ]  # fmt: skip
     planned = {("second", "twin"): 9, ("second", "campaign"): 5, ("own", "twin"): 3}
-    write_page(records, tmp_path, planned, {}, {})
+    write_page(records, tmp_path, planned, {}, {}, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     line = "| Listed effect in the set, ratio 6 | at least 90 % |"
     assert f"{line} 4 | 5 | 80.0 % | 28.4 to 99.5 % | too few | 100.0 % (1) |" in page
@@ -311,7 +311,7 @@ def test_the_page(tmp_path: Path) -> None:
 def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
     objects = [pier("none-of-these" if j > 2 else "cannot-tell") | {"key": f"pier{j}"} for j in range(6)]
     lengths = {f"pier{j}": 2.0 + j for j in range(6)} | {"of no record": 1.0}
-    write_page(objects, tmp_path, {}, lengths, {"pier0": 0.9, "pier1": 0.7})
+    write_page(objects, tmp_path, {}, lengths, {"pier0": 0.9, "pier1": 0.7}, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert "2.0 to 7.0 long, 4.5 at the median of 6" in page
     assert "in 80.0 % of draws of the errors, over 2 objects" in page
@@ -319,11 +319,24 @@ def test_how_long_objects_are_is_told_by_thirds(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_limits_of_the_data_are_told_by_what_is_hidden(tmp_path: Path) -> None:
+    objects = {
+        f"second/twin/unlisted/{j}": {"told": told, "evenly": 0.9, "near": 0.4, "guessed": 0.6}
+        for j, told in enumerate((0.5, 0.7))
+    }
+    effects = {f"second/twin/listed{ratio}/0": {"told": 0.01, "evenly": 0.1 / ratio} for ratio in (3, 6)}
+    write_page([], tmp_path, {}, {}, {}, objects | effects)
+    page = (tmp_path / "blind.md").read_text(encoding="utf-8").replace("\n", " ")
+    assert "told of 2 such objects in 60.0 % of draws of the errors, and a place within 1.5 m in 40.0 %" in page
+    assert "1.7 % of listed effects of six standard errors, and of 3.3 % of those of three" in page
+
+
+@pytest.mark.slow
 def test_how_far_errors_change_is_told(tmp_path: Path) -> None:
     def kept(errors: float) -> dict[str, Any]:
         return NAMED | {"held_out": {"noise": 1.0, "before": 1.0, "after": 1.0, "parent": 1.0, "kept": errors}}
 
-    write_page([kept(0.5), kept(0.8), kept(1.1)], tmp_path, {}, {}, {})
+    write_page([kept(0.5), kept(0.8), kept(1.1)], tmp_path, {}, {}, {}, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert (
         "At the median of the 3 errors change by -20.0 %; of the 1 that rise, by 10.0 %, and by 10.0 % at most." in page
@@ -332,7 +345,7 @@ def test_how_far_errors_change_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_page_without_records(tmp_path: Path) -> None:
-    write_page([], tmp_path, {}, {}, {})
+    write_page([], tmp_path, {}, {}, {}, {})
     assert "# How often" in (tmp_path / "blind.md").read_text(encoding="utf-8")
     assert len(list(tmp_path.glob("blind-*.svg"))) == 4
 
@@ -340,6 +353,6 @@ def test_a_page_without_records(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_sets_sized_in_the_truth_stand_by_themselves(tmp_path: Path) -> None:
     sized = [pier("none-of-these") | {"sized": "truth"}, pier("cannot-tell") | {"sized": "truth"}]
-    write_page([pier("cannot-tell"), *sized], tmp_path, {}, {}, {})
+    write_page([pier("cannot-tell"), *sized], tmp_path, {}, {}, {}, {})
     table = (tmp_path / "blind.md").read_text(encoding="utf-8").partition("## As long in")[2].partition("\n## ")[0]
     assert "| Unlisted object: none of these | at least 85 % | 50.0 % (2) |" in table

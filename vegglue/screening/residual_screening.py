@@ -121,8 +121,8 @@ def screen(
         effects=family_of(projected, fingerprints.only_sign, errors, seed),
         kinds=(
             kind_of_listed(fingerprints, projected),
-            *_kinds_of_places(fingerprints, in_places),
-            *_kinds_of_instruments(base.noise, instruments, of_instruments, flagged),
+            *kinds_of_places(fingerprints, in_places),
+            *kinds_of_instruments(base.noise, instruments, of_instruments, flagged),
         ),
         instruments={str(name): some for name, some in instruments.items()},
         errors=errors,
@@ -148,9 +148,7 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
     return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)
 
 
-def _kinds_of_places(
-    fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]
-) -> list[HypothesisKind]:
+def kinds_of_places(fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]) -> list[HypothesisKind]:
     """A kind for each term: all its spots are as likely before, and all terms."""
     kinds = []
     for one in fingerprints.places:
@@ -160,7 +158,7 @@ def _kinds_of_places(
     return kinds
 
 
-def _kinds_of_instruments(
+def kinds_of_instruments(
     noise: Noise,
     instruments: Mapping[InstrumentKind, tuple[Instrument, ...]],
     projected: Mapping[InstrumentKind, score_test.Projected],
