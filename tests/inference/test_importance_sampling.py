@@ -93,6 +93,22 @@ def test_places_that_fail_weigh_nothing_and_are_kept() -> None:
     assert drawn.weights @ drawn.z[:, 0] == pytest.approx(math.sqrt(2 / math.pi), abs=4 * 0.6 / math.sqrt(500))
 
 
+def test_a_later_round_of_which_nothing_is_solved_is_no_traceback() -> None:
+    """How many draws come next was told from weights of such a round, which are no numbers."""
+    rounds = list[int]()
+
+    def predict(z: np.ndarray) -> np.ndarray:
+        rounds.append(len(z))
+        return np.full_like(z, np.nan) if len(rounds) == 2 else z
+
+    def narrow(z: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return squares(z, 5.0 * values)
+
+    drawn = sample(predict, narrow, start(2), 1000, 1)
+    assert len(rounds) > 2
+    assert np.isfinite(drawn.weights).all()
+
+
 @pytest.mark.parametrize("solved", [0, 1, 2, 5])
 def test_a_model_that_fails_almost_everywhere_is_no_traceback(solved: int) -> None:
     def almost_never(z: np.ndarray) -> np.ndarray:

@@ -88,7 +88,7 @@ def sample(
         finished(min(int(effective[-1]), wanted))
         if effective[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
             return Sample(z, values, logs, weights, tuple(drawn), tuple(effective))
-        last = effective_size(pooled_weights(parts[-1][2], new, rounds[-1:])) / size
+        last = _effective_share(parts[-1][2], new, rounds[-1:])
         emulator = emulator_of_density(z, values, density, mixture.centre[0], mixture.lower[0])
         mixture = adapt(partial(_emulated, emulator, density), mixture, seed + len(rounds))
         size = min(_next_size(wanted - effective[-1], last), GROWTH * len(z))
@@ -100,6 +100,11 @@ def _emulated(emulator: Emulator, density: LogDensity, z: Array) -> Array:
 
 def _impossible_where_nan(logs: Array) -> Array:
     return np.where(np.isnan(logs), -np.inf, logs)
+
+
+def _effective_share(logs: Array, z: Array, own: list[tuple[int, Mixture]]) -> float:
+    """Share of the draws z (m, p) of one round that is effective [-]; 0 where none of them was solved."""
+    return effective_size(pooled_weights(logs, z, own)) / len(z) if np.isfinite(logs).any() else 0.0
 
 
 def _next_size(missing: float, share: float) -> int:
