@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
-from vegglue.diagnosis.next_measurement import HOURS, _with_other_discharges, planned
+from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, _with_other_discharges, planned
 from vegglue.engine.interface import Model
+from vegglue.site.gridded_site import in_experiment
 from vegglue.workflow.run_folder import model_in
 
 
@@ -79,6 +80,22 @@ def test_other_discharges_are_thought_of_on_the_site_at_hand(model: Model) -> No
         for found in (_with_other_discharges(one, (0.5,)) for one in (model, deeper))
     ]
     assert levels[1][0] < levels[0][0]
+
+
+def test_another_discharge_flows_over_the_bed_of_the_experiment_it_is_like(model: Model) -> None:
+    """It was given the bed of the case, and its level as if that lay under the experiment, 0.3 m higher here."""
+    low, *_, high = model.case.experiments
+    scoured = model.case.experiments[low].model_copy(update={"bed": model.case.bed})
+    case = model.case.model_copy(update={"experiments": {**model.case.experiments, low: scoured}})
+    site = replace(model.site, own={low: replace(model.site, bed=model.site.bed - 0.3)})
+    wide, _ = planned(here := replace(model, case=case, site=site), _with_other_discharges(here, (0.25,)))
+    lower, higher = (name for name in wide.case.experiments if name not in case.experiments)
+
+    def depth(name: str) -> float:
+        return float(wide.case.experiments[name].level) - float(in_experiment(wide.site, name).bed[-1].min())
+
+    assert depth(lower) == pytest.approx(0.25**LEVEL_POWER * depth(low))
+    assert depth(higher) == pytest.approx(HIGHER[0] ** LEVEL_POWER * depth(high))
 
 
 def test_sections_of_one_experiment_are_two_however_near(model: Model) -> None:

@@ -26,6 +26,7 @@ from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
+from vegglue.site.gridded_site import Site, in_experiment
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
@@ -118,7 +119,14 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
         plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment))
         tables.append(table)
         count += len(table)
-    return replace(model, case=case, station=pd.concat(tables, ignore_index=True)), plans
+    return replace(model, case=case, site=_with_beds(model, case), station=pd.concat(tables, ignore_index=True)), plans
+
+
+def _with_beds(model: Model, case: Case) -> Site:
+    """The site with the bed of each further experiment: that of the one it is like, which may have its own."""
+    known = [(model.case.experiments[name].bed, there) for name, there in model.site.own.items()]
+    own = {name: there for name, one in case.experiments.items() for bed, there in known if bed == one.bed}
+    return replace(model.site, own={**own, **model.site.own})
 
 
 def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:
@@ -198,10 +206,9 @@ def _with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
         return case
     totals = {name: sum(float(q) for q in one.discharge.values()) for name, one in numbers}
     lowest, highest = min(totals, key=lambda name: totals[name]), max(totals, key=lambda name: totals[name])
-    floor = float(model.site.bed[-1].min())
     more = {}
     for name, factor in [(lowest, factor) for factor in lower] + [(highest, factor) for factor in HIGHER]:
-        one = case.experiments[name]
+        one, floor = case.experiments[name], float(in_experiment(model.site, name).bed[-1].min())
         depth = float(one.level) - floor
         level = floor + depth * factor**LEVEL_POWER
         digits = max(1 - math.floor(math.log10(depth * factor**LEVEL_POWER)), 0) if depth > 0.0 else 2
