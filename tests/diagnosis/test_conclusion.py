@@ -13,7 +13,7 @@ from verdicts import grounds
 from vegglue.calibration.noise import GRID_ERROR_SHARE, with_grid_error
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.conclusion import estimated_errors
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.screening.residual_screening import Screening
 
 
@@ -40,11 +40,13 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
         "laws_suspected": lambda *_: laws, "suspects_of": lambda one: {"wind": tested[one is first]},
         "_misfit": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
         "_place_map": lambda *_: None, "_parameters": lambda *_: None,
-        "_grounds": lambda used, *_: judged.append(used) or grounds(), "judged": lambda *_: NOTHING.verdict,
+        "_grounds": lambda used, held, *_: judged.append((used, held)) or grounds(),
+        "judged": lambda *_: NOTHING.verdict,
     }  # fmt: skip
     tested = {True: a_suspect("wind", test={"score": 0.3}), False: a_suspect("wind", test={"score": 4.0})}
     for name, stub in stubs.items():
         monkeypatch.setattr(conclusion, name, stub)
-    found = conclusion.concluded(first, last, Findings(places=(a_location(),)), {"wind": tested[False]}, None)
-    assert judged == [first]
+    held = Findings(places=(a_location(),), undecided=Undecided((), ()))
+    found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None)
+    assert judged == [(first, Findings())]  # what competed beside the place was told beside the law
     assert (found.places, found.suspects) == ((), (tested[True],))

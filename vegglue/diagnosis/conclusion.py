@@ -56,7 +56,9 @@ def concluded(
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
     laws = laws_suspected(first, last, found)
     if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
-        last, found, suspects = first, replace(found, places=(), charges=(), of_shape=0.0), suspects_of(first)
+        # What competed after the place did so in the flow with it.
+        found = replace(found, places=(), charges=(), of_shape=0.0, undecided=None)
+        last, suspects = first, suspects_of(first)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit = _misfit(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
