@@ -62,5 +62,7 @@ def test_next_asks_about_laws_where_one_stands_out(
     assert question.tells_apart == f"{SPEED} from {DEPTH}"
     next_measurement(case, between=[DEPTH], runs=tmp_path)
     assert asked[1:] == [[DEPTH]]
+    (twice,) = next_measurement(case, between=[DEPTH, DEPTH], runs=tmp_path)
+    assert twice.tells_apart == f"{DEPTH} from what calibration makes of it"  # it was to be told from itself
     with pytest.raises(InputError, match=f"--between: `wind` is not among the effects of the diagnosis: {SPEED}"):
         next_measurement(case, between=["wind"], runs=tmp_path)

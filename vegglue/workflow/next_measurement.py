@@ -56,7 +56,7 @@ def next_measurement(
     unknown = [name for name in between if name not in possible]
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(possible)}.")
-    asked = _asked(case, found, between) if between else _questions(case, found)
+    asked = _asked(case, found, list(dict.fromkeys(between))) if between else _questions(case, found)
     questions: list[Question] = []
     if asked:
         with at_most(jobs):
