@@ -16,8 +16,9 @@ from vegglue.diagnosis.excluded_stations import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.storage.kept_words import ladder_that_fits
-from vegglue.workflow import compare
+from vegglue.storage.kept_words import ladder_that_fits, write_ladder
+from vegglue.workflow import compare, set_aside
+from vegglue.workflow.run_folder import folder_of
 from vegglue.workflow.set_aside import judged_by
 
 
@@ -99,6 +100,21 @@ def test_a_ladder_keeps_the_model_that_it_begins_with(case: Case, tmp_path: Path
     kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, first, second)]
     assert [[step.name for step in one.steps] for one in kept if one] == [["brook", "a"], ["brook", "a"], ["a", "b"]]
     assert judged_by(first, runs) == {"brook": case_hash(case), "a": case_hash(first)}
+
+
+def test_a_model_is_judged_by_its_diagnosis_of_now_beside_a_ladder_of_before(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The ladder of the second began with the first as it was: what that set aside since then counted again."""
+    asked = list[tuple[str, str]]()
+    monkeypatch.setattr(set_aside, "diagnosis_that_fits", lambda path, wanted: asked.append((path.parent.name, wanted)))
+    second = case.model_copy(update={"name": "second"})
+    before = LadderStep("brook", "brook.yaml", "as it was", (), 3, *[0.1] * 5)
+    write_ladder(folder_of(tmp_path, second), Ladder((before,), 0, ""), case_hash(second))
+    for cases in ([case, second], [second, case]):
+        asked.clear()
+        assert set_aside.left_out(cases, tmp_path).empty
+        assert set(asked) == {(one.name, case_hash(one)) for one in cases} | {("brook", "as it was")}
 
 
 @pytest.mark.slow

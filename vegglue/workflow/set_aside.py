@@ -1,6 +1,6 @@
 """Which measurements the diagnoses kept in the folder of runs have set aside: no model is judged by them afterwards."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -14,12 +14,14 @@ from vegglue.storage.result_files import diagnosis_that_fits
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
     """The measurements that are set aside of any of the cases, see `set_aside_of`."""
-    return _set_aside(dict(one for case in cases for one in judged_by(case, Path(runs)).items()), Path(runs))
+    # A ladder may begin with one of the cases as it was before: of its name, but of another hash.
+    models = dict.fromkeys(one for case in cases for one in judged_by(case, Path(runs)).items())
+    return _set_aside(models, Path(runs))
 
 
 def set_aside_of(case: Case, runs: Path | str) -> pd.DataFrame:
     """Those that the diagnosis of a case has set aside, or that of the model which its ladder begins with."""
-    return _set_aside(judged_by(case, Path(runs)), Path(runs))
+    return _set_aside(judged_by(case, Path(runs)).items(), Path(runs))
 
 
 def judged_by(case: Case, runs: Path) -> dict[str, str]:
@@ -30,6 +32,6 @@ def judged_by(case: Case, runs: Path) -> dict[str, str]:
     return {**first, case.name: wanted}
 
 
-def _set_aside(hashes: dict[str, str], runs: Path) -> pd.DataFrame:
-    found = (diagnosis_that_fits(runs / name / "diagnosis.h5", wanted) for name, wanted in hashes.items())
+def _set_aside(models: Iterable[tuple[str, str]], runs: Path) -> pd.DataFrame:
+    found = (diagnosis_that_fits(runs / name / "diagnosis.h5", wanted) for name, wanted in models)
     return excluded_by(*(one for one in found if one is not None))
