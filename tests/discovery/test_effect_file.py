@@ -159,6 +159,15 @@ def test_a_law_is_doubted_where_nothing_is_measured_too(monkeypatch: pytest.Monk
     assert any("`dry summer`" in one and "on under water lie outside" in one for one in said)
 
 
+def test_a_law_is_not_doubted_where_it_does_not_act(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It was called a guess in experiments that the config keeps it out of."""
+    child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
+    assert child is not None
+    in_mid = {name: entry.model_copy(update={"experiments": ("mid",)}) for name, entry in child.effects.items()}
+    (said,) = doubts_of(child.model_copy(update={"effects": in_mid}))
+    assert "in experiment `mid`" in said
+
+
 def test_a_file_of_the_case_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     first = discovered(monkeypatch, CONFIG, tmp_path / "first.yaml", LAW)
     other = found_law(LAWS["law_floor_depth_ramp"])

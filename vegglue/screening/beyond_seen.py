@@ -20,10 +20,10 @@ SHARE_BEYOND = 0.2
 def laws_beyond_their_range(model: Model, point: Point) -> Iterator[str]:
     """One sentence for each experiment in which a law of the case is used where it was not seen; point: of its flow."""
     for key in model.case.effects:
-        effect = effect_of(model.case, key)
+        effect, only = effect_of(model.case, key), model.case.effects[key].experiments
         if effect.seen is None:
             continue
-        for experiment in model.case.experiments:
+        for experiment in (one for one in model.case.experiments if only is None or one in only):
             cells = centre_cells(model, point, experiment)
             measured = at_sections(model, cells, experiment)
             at_stations = _values(effect, effect.seen, measured)
