@@ -135,6 +135,24 @@ def test_something_unlisted_in_the_model_may_differ_from_its_spot(flowing: tuple
     assert 1 < own.shape[1] < 60, "bumps around the place, not all over the channel"
 
 
+def test_something_unlisted_differs_from_its_spot_only_where_it_acts(flowing: tuple[Model, Point]) -> None:
+    """Predictions of experiments that the config keeps it out of were allowed to be wrong by its shape."""
+    model, point = flowing
+    entry = EffectEntry(effect="unlisted_object", values={"drag": 0.2, "x": 15.0, "y": 0.2})
+    low = model.rows["low"]
+
+    def columns(*experiments: str) -> Array:
+        limited = entry.model_copy(update={"experiments": experiments or None})
+        there = replace(model, case=CASE.model_copy(update={"effects": {"thing": limited}}))
+        return model_error_columns(there, point, CASE_ALLOWS)[:, without.shape[1] :]
+
+    without = model_error_columns(model, point, CASE_ALLOWS)
+    assert columns(*CASE.experiments) == pytest.approx(columns())
+    own = columns("low")
+    assert own[low].any()
+    assert not np.delete(own, low, axis=0).any()
+
+
 def test_a_place_that_is_calibrated_errs_where_it_lies(flowing: tuple[Model, Point]) -> None:
     model, point = flowing
     prior = Parameter(distribution="uniform", low=5.0, high=25.0, unit="m")

@@ -122,12 +122,13 @@ def any_error(allowed: ModelError) -> bool:
 @dataclass(frozen=True)
 class UnlistedObject:
     """Something unlisted at a place that acts in a case: its term, its amplitude and its spot, numbers or names of
-    parameters.
+    parameters; experiments: where it acts, None for all.
     """
 
     term: Term
     amplitude: Value
     place: dict[str, Value]
+    experiments: tuple[str, ...] | None
 
 
 def unlisted_in(case: Case) -> list[UnlistedObject]:
@@ -138,7 +139,7 @@ def unlisted_in(case: Case) -> list[UnlistedObject]:
         if effect.name in TERM_OF:
             place = {shape.name: entry.values.get(shape.name, shape.default) for shape in effect.shapes}
             amplitude = entry.values.get(effect.amplitude.name, effect.amplitude.off)
-            found.append(UnlistedObject(TERM_OF[effect.name], amplitude, place))
+            found.append(UnlistedObject(TERM_OF[effect.name], amplitude, place, entry.experiments))
     return found
 
 
@@ -157,7 +158,8 @@ def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one:
     along = np.exp(-(((grid.x - place["x"]) / place["length"]) ** 2))
     across = np.exp(-(((grid.y - place["y"]) / place["width"]) ** 2))
     own = np.einsum("i,nij,j->n", along, responses.of[one.term], across)
-    return SHAPE_ERROR * size * _without(own, near, _weights_of(model))
+    acts = np.ones(len(own)) if one.experiments is None else model.station["experiment"].isin(one.experiments)
+    return SHAPE_ERROR * size * _without(own, near, _weights_of(model) * acts) * np.asarray(acts)[:, None]
 
 
 def _weights_of(model: Model) -> Array:
