@@ -37,10 +37,10 @@ def with_effects(model: Model, *names: str) -> Model:
     )
 
 
-def measured_with(hidden: dict[str, float]) -> Model:
-    """The coarse twin at measurements of what is hidden, with errors of what is stated."""
+def measured_with(hidden: dict[str, float], width: float | None = None) -> Model:
+    """The coarse twin at measurements of what is hidden, with errors of what is stated; width: of one effect."""
     model, _ = coarse_twin()
-    true = with_effects(model, *hidden)
+    true = with_effects(model, *hidden) if width is None else of_width(model, *hidden, width)
     theta = theta_at(model.case, np.zeros((1, len(model.names))))
     for name, size in hidden.items():
         theta[candidate_named(model.case, model.station, name).parameter] = np.array([size])
@@ -49,6 +49,11 @@ def measured_with(hidden: dict[str, float]) -> Model:
     error = model.station["standard_error"].to_numpy(float)
     values = point.prediction + error * np.random.default_rng(4).standard_normal(error.size)
     return replace(model, station=model.station.assign(value=values))
+
+
+def of_width(model: Model, name: str, width: float) -> Model:
+    one = candidate_named(model.case, model.station, name)
+    return replace(model, case=with_additions(model.case, [(one, {"width": width})]))
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +88,19 @@ def test_rivals_have_the_amplitudes_of_their_refits(again: Again) -> None:
     _, (step,), suspects = again
     assert all(suspects[name].amplitude.refitted for name in step.rivals)
     assert suspects[TRUE].amplitude.value == pytest.approx(HIDDEN[TRUE], rel=0.3)
+
+
+@pytest.mark.slow
+def test_an_effect_is_in_the_model_with_the_shapes_that_are_told() -> None:
+    """It stayed 1.2 m wide there, and was told, and added to the child config, with a width of 0.3 m."""
+    model = measured_with({TAKEN: 0.3}, 0.3)
+    known = suspects_of(screen(baseline(model)))
+    base, (step,), suspects = with_rivals_again(
+        baseline(of_width(model, TAKEN, 1.2)), (a_step(TAKEN),), (), known, silent
+    )
+    assert step.accepted == TAKEN
+    assert suspects[TAKEN].shapes == {"width": 0.3}
+    assert base.model.case.effects[TAKEN].values["width"] == 0.3
 
 
 @pytest.mark.parametrize("lost", ["no flow without it", "no flow with it"])

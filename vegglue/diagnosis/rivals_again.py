@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from vegglue.calibration.baseline import Baseline
+from vegglue.case.schema import Case
 from vegglue.diagnosis.competition import Contender, contenders_of
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
 from vegglue.diagnosis.rivals import step_found
 from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening.candidates import candidate_in_case
+from vegglue.screening.candidates import candidate_in_case, effect_entry
 from vegglue.screening.residual_screening import screen
 
 # The model, the steps and the suspects, as they are now.
@@ -49,7 +50,9 @@ def refitted(contenders: Sequence[Contender], suspects: Mapping[str, Suspect]) -
 def _again(
     base: Baseline, step: Step, flagged: tuple[int, ...], watch: Watch
 ) -> tuple[Baseline, Step, Sequence[Contender]]:
-    """One step and what competed; as it was where no flow is found without its effect, or with any."""
+    """One step and what competed, the best at the values of its shapes that it competed with; as it was where no flow
+    is found without its effect, or with any.
+    """
     watch(Progress(f"comparing {step.accepted} again with all else"))
     less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
     if less is None:
@@ -59,12 +62,18 @@ def _again(
     listed = [j for j, one in enumerate(contenders) if one.kind == "effect"]
     if step.accepted not in [contenders[j].name for j in listed]:
         return base, step, ()
-    best = contenders[listed[0]]
-    if best.name != step.accepted:
-        assert isinstance(best.what, Refit)
-        further = calibrated_with(less, best.what)
+    best = contenders[listed[0]].what
+    assert isinstance(best, Refit)
+    if not _is_at_work(base.model.case, best):
+        further = calibrated_with(less, best)
         if further is None:
             return base, step, ()
         base = further
     again = step_found(screening, contenders, listed[0], base, step.p_family)
     return base, replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after), contenders
+
+
+def _is_at_work(case: Case, refit: Refit) -> bool:
+    """Whether an effect acts in the case as it was refitted: at other values of its shapes it is another."""
+    one = refit.candidate
+    return case.effects.get(one.key) == effect_entry(one, one.parameter, refit.shapes)
