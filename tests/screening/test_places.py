@@ -8,7 +8,7 @@ from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, flow_at_centres, responses
 from vegglue.flow.local_changes import Term
 from vegglue.screening.candidates import cause_of, place_candidate
-from vegglue.screening.places import EFFECT_AT_PLACE, SPOT_LENGTHS, Places, places_of, plausible_size
+from vegglue.screening.places import EFFECT_AT_PLACE, SPOT_LENGTHS, Places, places_around, places_of, plausible_size
 from vegglue.site.channel_geometry import half_width
 
 
@@ -58,6 +58,15 @@ def test_spots_lie_in_the_water_and_reach_all_of_it(
         (grid.x[i][:, None] - one.x[short]) / one.length[short], (grid.y[j][:, None] - one.y[short]) / one.width[short]
     )
     assert away.min(axis=1).max() < 1.0, "no place in deep water is further than a half length from a spot"
+
+
+@pytest.mark.parametrize("end", [1.0, 31.0])
+def test_nothing_is_looked_for_outside_the_channel(flowing: tuple[Model, Point], end: float) -> None:
+    """All cells of the edge of a long spot lie under water, and water of one 10 m before the inlet left a trace."""
+    around = places_around(*flowing, "inflow", {"x": end, "y": 0.0, "length": 5.4, "width": 0.45}, 0.5)
+    low, high = CASE.grid.x
+    assert end in around.x
+    assert low - 0.5 < around.x.min() < around.x.max() < high + 0.5
 
 
 def test_a_plausible_inflow_is_a_share_of_what_flows() -> None:

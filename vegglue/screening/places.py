@@ -20,7 +20,7 @@ from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.flow.local_changes import Term
 from vegglue.flow.problem_setup import share_under_water
 from vegglue.parallel import in_threads
-from vegglue.site.grid import cell_stretch
+from vegglue.site.grid import Grid, cell_stretch
 from vegglue.site.gridded_site import in_experiment
 
 # Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
@@ -123,11 +123,18 @@ def _places_of_term(
             answers = answers / _area_under_water(model, over)
         share = over.along @ wet @ over.across.T
         within = share > LEAST_SHARE * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
-        a, b = np.nonzero(within)
+        a, b = np.nonzero(within & _in_channel(model.site.grid, over))
         size = np.full((2, a.size), [[over.length], [over.width]])
         parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
     x, y, length_of, width_of, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
     return Places(term, x, y, length_of, width_of, plausible, fingerprints)
+
+
+def _in_channel(grid: Grid, over: Bumps) -> Any:
+    """Whether the middle of each bump lies in the grid (k, j), to a cell, as places are rounded."""
+    along = (over.x >= grid.x[0] - grid.dx) & (over.x <= grid.x[-1] + grid.dx)
+    across = (over.y >= grid.y[0] - grid.dy) & (over.y <= grid.y[-1] + grid.dy)
+    return along[:, None] & across
 
 
 def _under_water(model: Model, experiment: str) -> Any:
