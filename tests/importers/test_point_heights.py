@@ -74,3 +74,12 @@ def test_a_depth_of_the_water_that_is_read_again_is_no_height(tmp_path: Path) ->
     table = "x;y;depth;u\n8;0;0.90;0.4\n8;0;0.93;0.42\n20;0;0.5;0.4\n"
     case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
     assert read_observations(case).table["value"].tolist() == [0.41, 0.4]
+
+
+def test_heights_whose_unit_nobody_stated_are_refused_with_what_came(tmp_path: Path) -> None:
+    """Heights in cm under `Height above bed`: the message named `floor` and `offset`, and neither unit nor heights."""
+    rows = "".join(f"A;20;{y};{100 * z:g};{law(z):g}\n" for y in (-1, 0, 1) for z in (0.1, 0.2, 0.4))
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv="section;x;y;Height above bed;u\n" + rows)
+    said = r"got none: at x = 20 m and y = -1 to 1 m the bed lies at .* m, the points 10 to 40 m above it; check unit"
+    with pytest.raises(InputError, match=said):
+        read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml"))

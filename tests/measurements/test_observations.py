@@ -125,7 +125,7 @@ def test_points_outside_the_water_are_kept_with_the_reason():
 
 
 def test_wrong_datum_is_refused():
-    with pytest.raises(InputError, match="check `floor`, `surface` and `offset`"):
+    with pytest.raises(InputError, match="`floor`, `surface` and `offset`"):
         read_observations(changed(CASES["d3a"], floor=0.0, surface=1.3))
 
 

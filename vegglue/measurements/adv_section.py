@@ -42,6 +42,8 @@ SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing 
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
 TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
 DURATION = 60.0  # s
+# Why a point is not used.
+BELOW_BED, ABOVE_SURFACE = "below the bed", "above the water surface"
 SECTIONS_OF_FLOOR = 50  # chosen, not measured: some in every pool and on every riffle of a reach
 
 
@@ -209,12 +211,9 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
     x, y = points["x"].iloc[0], points["y"].to_numpy()
     bed = _bed(case, observation, x, y)
     points = points if "z" in points else points.assign(z=bed + points["height"])
-    reason = np.select([points["z"] <= bed, points["z"] > surface], ["below the bed", "above the water surface"], "")
+    reason = np.select([points["z"] <= bed, points["z"] > surface], [BELOW_BED, ABOVE_SURFACE], "")
     if (reason != "").all():
-        raise InputError(
-            f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the "
-            f"water surface at z = {surface:g} m, got none; check `floor`, `surface` and `offset` of the observation."
-        )
+        raise _none_in_the_water(observation, points, bed, surface)
     return points.assign(
         experiment=observation.experiment,
         section=observation.section,
@@ -225,6 +224,23 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
         used=reason == "",
         reason=reason,
     )
+
+
+def _none_in_the_water(observation: Observation, points: pd.DataFrame, bed: Array, surface: float) -> InputError:
+    """The refusal of a section whose points all lie outside the water; bed: its level below each of them [m]."""
+    above = points["z"] - bed
+    return InputError(
+        f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the water "
+        f"surface at z = {surface:.4g} m, got none: at x = {points['x'].iloc[0]:.4g} m and y = {_span(points['y'])} m "
+        f"the bed lies at {_span(bed)} m, the points {_span(above)} m above it; check unit and sign of their heights, "
+        "their x and y, the levels of the water, and `floor`, `surface` and `offset` of the observation."
+    )
+
+
+def _span(values: Array) -> str:
+    """Lowest and highest of some values, or the one that they are."""
+    low, high = f"{np.min(values):.3g}", f"{np.max(values):.3g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _with_errors(points: pd.DataFrame) -> pd.DataFrame:
