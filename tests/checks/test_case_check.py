@@ -363,3 +363,31 @@ def test_heights_that_count_from_the_surface_are_said(tmp_path, turned, said):
     found = [one for one in odd(tmp_path, text=text, rows=adv) if "as if their heights counted from the surface" in one]
     assert bool(found) == said
     assert not said or found[0].startswith("Velocities fall from the bed to the surface in 4 of 4 verticals outside ")
+
+
+def adv_case(heights: tuple[float, ...]) -> tuple[str, str]:
+    """Config and rows of two verticals with points at these heights [m] over the bed."""
+    rows = "".join(f"s20,ADV,20,{y},{z},{0.4 + 0.1 * k},0.01\n" for y in (-1, 0.7) for k, z in enumerate(heights))
+    entry = "  - {kind: adv, file: velocities.csv, experiment: low, section: s20, case: s20, average: profile}\n"
+    text = SOUND.replace("  - {kind: velocity, file: velocities.csv}\n", entry)
+    return text, "case,device,x,y,height,u,u_se\n" + rows
+
+
+@pytest.mark.parametrize(
+    ("height", "said"),
+    [
+        (
+            -0.1,
+            "2 points of s20 in experiment low not used: below the bed, the first at x = 20, y = -1 m, -0.1 m",
+        ),
+        (
+            8.0,
+            "2 points of s20 in experiment low not used: above the water surface, the first at x = 20, y = -1",
+        ),
+    ],
+)
+def test_points_outside_the_water_are_not_left_out_in_silence(tmp_path, height, said):
+    """One height with a wrong sign was dropped from its vertical, and nothing was odd."""
+    text, rows = adv_case((0.2, 0.4, 0.6, height))
+    assert [one for one in odd(tmp_path, text, rows) if one.startswith(said)]
+    assert not [one for one in odd(tmp_path, *adv_case((0.2, 0.4, 0.6))) if "not used" in one]
