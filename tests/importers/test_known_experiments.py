@@ -12,6 +12,7 @@ from vegglue.errors import InputError
 OF_SITE = "is not in site.json: add it under `{}`, or take its rows out"
 CONVERTED = "experiment;section;x;y;u [cm/s]\nlow;A;12;0,5;45\n{};B;14;0,5;46\n"
 PLAIN = "experiment,section,x,y,u,u_se\nlow,A,12,0.5,0.45,0.01\nflood,A,14,0.5,0.46,0.01\n"
+FLOW = {"discharge_m3_s": 1.2, "downstream_level_m": 0.72}
 HELD = "experiment,section,x,y,u\nhigh,A,12,0.5,0.6\nflood,A,14,0.5,0.6\n"
 
 
@@ -49,3 +50,16 @@ def test_rows_without_a_value_may_name_any_experiment(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "brook")
     (folder / "survey.txt").write_text(CONVERTED.format("flood").replace("46", "-999"), encoding="utf-8")
     assert vegglue.import_folder(folder, tmp_path / "brook.yaml").imported is not None
+
+
+@pytest.mark.parametrize("name", ["Low", "03.06.2026"])
+def test_a_column_with_other_names_of_the_experiments_is_shown(tmp_path: Path, name: str) -> None:
+    """The column stood there, with dates or another spelling, and the message said that there is none."""
+    folder = field_folder(tmp_path / "brook", experiments=dict.fromkeys(("low", "mid"), FLOW))
+    rows = "".join(f"{name if y < 0 else 'flood'};12;{y};45\n" for y in (-1.5, -0.5, 0.5, 1.5))
+    (folder / "survey.txt").write_text("Messtermin;x;y;u [cm/s]\n" + rows, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert f"got none, but 'Messtermin' with {name}, flood (write the names of the site file there); " in str(
+        refused.value
+    )

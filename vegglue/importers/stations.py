@@ -14,7 +14,7 @@ from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.gauged_discharges import levels_once, whole_discharges
 from vegglue.importers.known_experiments import KnownExperiments
-from vegglue.importers.lost_places import refuse_lost_places
+from vegglue.importers.lost_places import numbers_of, refuse_lost_places
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nameless_sections import ONE_PLACE, section_at, sections_by_place
 from vegglue.importers.placement import Placement
@@ -29,6 +29,8 @@ from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 VERTICALS = 0.2
 # By how much verticals are moved to the line of their section before it is said [m].
 NEAR_LINE = 0.01
+# Names of a column that a message lists.
+OTHER_NAMES_SHOWN = 4
 Row = list[str]
 
 
@@ -141,9 +143,19 @@ def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[st
         return [experiments[0]] * taken.size
     file = where.removesuffix(":").rpartition("/")[2]
     raise InputError(
-        f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none; add one, or "
-        f"say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
+        f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{_alike(taken)}"
+        f"; add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
     )
+
+
+def _alike(taken: MeasuredRows) -> str:
+    """What an unread column of repeated words holds, which may be experiments by other names; else nothing."""
+    for heading, texts in taken.others.items():
+        names = list(dict.fromkeys(texts))
+        if 1 < len(names) < len(texts) and numbers_of(texts) is None:
+            shown = ", ".join([*names[:OTHER_NAMES_SHOWN], *(["..."] if len(names) > OTHER_NAMES_SHOWN else [])])
+            return f", but {heading!r} with {shown} (write the names of the site file there)"
+    return ""
 
 
 def _in_verticals(taken: MeasuredRows) -> bool:
