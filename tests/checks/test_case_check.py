@@ -70,7 +70,7 @@ def test_a_patch_on_the_map_is_told_as_that(tmp_path):
     assert any(
         "Patch p1 covers no cell centre: its corners are places on the map" in one for one in odd(tmp_path, framed)
     )
-    assert any("Patch p1 covers no cell centre: it is outside" in one for one in odd(tmp_path, on_map))
+    assert any("Patch p1 covers no cell centre: it lies outside the grid, at x" in one for one in odd(tmp_path, on_map))
 
 
 def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
@@ -86,7 +86,13 @@ def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
         ("members: 1024", "members: 64}\ninfer: {method: glue", "Only 64 members will be simulated"),
         ("members: 1024", "members: 1000", "Note: 1000 members is no power of two; .* with 1024."),
         ("y: [0, 1.5], stems", "y: [0.1, 0.2], stems", "Patch p1 covers no cell centre"),
-        ("y: [0, 1.5], stems", "y: [0.2, 1.3], stems", "Patch p1 of 4.4 m2 becomes 6 m2 of cells"),
+        ("y: [0, 1.5], stems", "y: [0.2, 1.3], stems", "Patch p1 of 4.4 m2 becomes 6 m2 of cells: take finer cells"),
+        (
+            "y: [0, 1.5], stems",
+            "y: [4, 9], stems",
+            "Patch p1 of 20 m2 becomes 4 m2 of cells: it lies partly outside the grid, at y = 4 to 9 m, where the grid "
+            "has -5 to 5 m; correct",
+        ),
         (
             "stems: 22}\ninflows",
             "stems: 22}\n    - {name: p2, stand: reed, x: [13, 20], y: [0, 1], stems: 1}\ninflows",

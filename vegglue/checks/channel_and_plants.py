@@ -40,7 +40,8 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
         if not alone.any():
             yield f"Patch {patch.name} covers no cell centre: {_why_none(case, site, corners_of(case, patch))}."
         elif abs(covered - meant) > 0.1 * meant:
-            yield f"Patch {patch.name} of {meant:.3g} m2 becomes {covered:.3g} m2 of cells: take finer cells."
+            remedy = _beyond_grid(case, corners_of(case, patch)) or "take finer cells"
+            yield f"Patch {patch.name} of {meant:.3g} m2 becomes {covered:.3g} m2 of cells: {remedy}."
         if hidden:
             yield f"Patch {patch.name} loses {hidden} cells to patches listed after it, which win where they overlap."
     unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}
@@ -56,7 +57,19 @@ def _why_none(case: Case, site: Site, corners: Array) -> str:
         along, across = case.frame.to_model(east, north)
         if x[0] <= along <= x[-1] and y[0] <= across <= y[-1]:
             return "its corners are places on the map, and a case expects them along and across the channel; turn them"
-    return "it is outside the grid, or smaller than a cell"
+    return _beyond_grid(case, corners) or "it is smaller than a cell; take finer cells"
+
+
+def _beyond_grid(case: Case, corners: Array) -> str:
+    """That a patch with these corners (k, 2) [m] is not all in the grid, with both; nothing where it is."""
+    for name, values, (low, high) in zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True):
+        if values.min() < low or values.max() > high:
+            how = "outside" if values.max() <= low or values.min() >= high else "partly outside"
+            return (
+                f"it lies {how} the grid, at {name} = {values.min():g} to {values.max():g} m, where the grid has "
+                f"{low:g} to {high:g} m; correct the patch or the grid"
+            )
+    return ""
 
 
 def remarks_on_rising_floor(case: Case) -> Iterator[str]:
