@@ -260,14 +260,24 @@ def test_a_misspelt_key_is_named_before_what_it_leaves_missing():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("- a\n- b\n", "expected keys and values"),
-        ("", "expected keys and values"),
+        ("- a\n- b\n", "expected keys and values (`name: ...`), got a list; correct the file."),
+        ("", "expected keys and values (`name: ...`), got an empty file; correct the file."),
+        ("7", "got a single value"),
         ("a: [1", "line 1"),
         ("a: \x00", "YAML"),
     ],
 )
 def test_what_is_no_mapping_is_refused(text, expected):
     assert expected in sentence(write(text))
+
+
+def test_a_folder_of_measurements_has_to_be_imported():
+    """Of a folder it said `check the path`; of its site file, that `discharge_m3_s` is not a known key."""
+    Path("brook").mkdir()
+    assert sentence(Path("brook")).endswith("it is not a file; check the path.")
+    site = write("channel: {length_m: 30}\nexperiments: {low: {discharge_m3_s: 1}}\n", "brook/site.yaml")
+    assert sentence(Path("brook")).endswith("it is not a file; `vegglue import brook` makes a config of that folder.")
+    assert "got the site file of a folder of measurements: `vegglue import brook` makes a config" in sentence(site)
 
 
 def test_missing_and_unreadable_files_are_named():

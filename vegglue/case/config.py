@@ -22,6 +22,9 @@ PATHS = ("file", "raster", "points", "effect_file")
 NAMED_PATHS = "files"
 # A mapping that names one of these is a declaration of its own: it replaces an inherited one instead of adding to it.
 DECLARING = ("law", "distribution")
+# What a folder of measurements holds, of which `import` makes a config.
+SITE_FILES = ("site.yaml", "site.json")
+KINDS_OF_YAML = {type(None): "an empty file", list: "a list", str: "a text"}
 COMPILER_SETTINGS = ".numba_config.yaml"
 
 
@@ -35,6 +38,7 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     if not trust:
         _refuse_settings_of_folder()
     layers = _layers(path, ())
+    _refuse_site_file(*layers[0])
     for file, layer in layers:
         if (refusal := unknown_without_value(layer)) is not None:
             raise _input_error([(file, layer)], refusal)
@@ -73,6 +77,15 @@ def _refuse_settings_of_folder() -> None:
         )
 
 
+def _refuse_site_file(path: Path, tree: Tree) -> None:
+    """Errors: InputError for the site file of a folder of measurements, whose keys are not those of a case."""
+    if path.name in SITE_FILES and "channel" in tree:
+        raise InputError(
+            f"{shown_path(path)}: expected a config, got the site file of a folder of measurements: "
+            f"`vegglue import {shown_path(path.parent)}` makes a config of it."
+        )
+
+
 def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
     """The file and what it extends, the most special one first."""
     path = Path(os.path.realpath(path))  # which a loop of links does not stop
@@ -93,7 +106,7 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
 
 def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Keys and values of a YAML file; above: the files whose `extends` led to it. Errors: InputError."""
-    named = f"it is named by `extends` in {shown_path(above[-1])}, check the path" if above else "check the path"
+    named = f"it is named by `extends` in {shown_path(above[-1])}, check the path" if above else _way_from(path)
     text = read_text(path, LARGEST_CONFIG, named)
     try:
         tree = safe_yaml(text)
@@ -106,8 +119,16 @@ def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     except yaml.YAMLError as error:
         raise InputError(f"{shown_path(path)} is not valid YAML: {' '.join(str(error).split())}.") from None
     if not isinstance(tree, dict):
-        raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {type(tree).__name__}.")
+        got = KINDS_OF_YAML.get(type(tree), "a single value")
+        raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {got}; correct the file.")
     return tree
+
+
+def _way_from(path: Path) -> str:
+    """What to do about a config that cannot be read: a folder of measurements has to be imported."""
+    if any((path / name).is_file() for name in SITE_FILES):
+        return f"`vegglue import {shown_path(path)}` makes a config of that folder"
+    return "check the path"
 
 
 def _with_full_paths(tree: Any, folder: Path) -> Any:
