@@ -34,6 +34,11 @@ def refused(folder: Path, text: str | bytes) -> str:
         ('section,x,u\n"A,1,2\n', "expected a CSV table, which cannot be read (unexpected end of data)"),
         (f"section,x,u\n{'A' * 200_000},1,2\n", "field larger than field limit"),
         ("", "row 1: expected the columns section, x, u"),
+        (
+            "section;x;u\nA;1;0,5\n",
+            "row 1: expected columns separated by commas, got 'section;x;u'; write commas, and dec",
+        ),
+        ("section,x\nA,1\n", "without u; rename or add what is missing."),
         ("section,x,u\n", "expected rows below the heading, got none"),
         (b"section,x,u\nA\xff,1,2\n", "is not text in UTF-8"),
         ("section,x,u\nA,1,1e999\n", "row 2: expected a number in column u, got '1e999'"),

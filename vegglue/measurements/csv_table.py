@@ -63,12 +63,22 @@ def _raw_table(path: Path) -> pd.DataFrame:
     rows = csv.reader(StringIO(read_text(path, LARGEST_DATA)), strict=True)
     try:
         heading = [name.strip() for name in next(rows, [])]
+        _refuse_other_separators(path, heading)
         fields = [_fields(path, number, row, len(heading)) for number, row in enumerate(rows, 2)]
     except csv.Error as error:
         raise InputError(
             f"{shown_path(path)}: expected a CSV table, which cannot be read ({error}); check it."
         ) from None
     return pd.DataFrame(fields, columns=heading, dtype=str)
+
+
+def _refuse_other_separators(path: Path, heading: list[str]) -> None:
+    """Errors: InputError for a heading of one column that semicolons, tabs or bars would make several."""
+    if len(heading) == 1 and any(sign in heading[0] for sign in ";\t|"):
+        raise InputError(
+            f"{shown_path(path)}, row 1: expected columns separated by commas, got {heading[0]!r}; write commas, and "
+            "decimal points, or let `vegglue import` read the file as it is."
+        )
 
 
 def _fields(path: Path, number: int, row: list[str], columns: int) -> list[str]:
