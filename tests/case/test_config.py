@@ -123,6 +123,7 @@ REFUSED = [
     ("bank_slope: 0.6667", "bank_slope: true", "(rise over run of the banks [-]) expected a valid number, got True"),
     ("bank_slope: 0.6667", "bank_slope: '0.6'", "got '0.6'; write numbers without quotes"),
     ("bank_slope: 0.6667", "bank_slope: '0,6'", "got '0,6'; write decimals with a point"),
+    ("bank_slope: 0.6667", "bank_slope: 0.6667 m/m", "got '0.6667 m/m'; write the number alone: a case is in SI units"),
     (
         "name: small",
         "name: small\nsimulate: {membrs: }",
@@ -263,6 +264,7 @@ def test_a_misspelt_key_is_named_before_what_it_leaves_missing():
         ("- a\n- b\n", "expected keys and values (`name: ...`), got a list; correct the file."),
         ("", "expected keys and values (`name: ...`), got an empty file; correct the file."),
         ("7", "got a single value"),
+        ("a:\n\tb: 1\n", "line 2, column 1: expected spaces at the beginning of the line, got a tab; correct"),
         ("a: [1", "line 1"),
         ("a: \x00", "YAML"),
     ],

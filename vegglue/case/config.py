@@ -114,7 +114,7 @@ def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
         mark = error.problem_mark
         where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         raise InputError(
-            f"{shown_path(path)}{where}: {error.problem}; correct the YAML there or just before."
+            f"{shown_path(path)}{where}: {_without_tabs(error.problem)}; correct the YAML there or just before."
         ) from None
     except yaml.YAMLError as error:
         raise InputError(f"{shown_path(path)} is not valid YAML: {' '.join(str(error).split())}.") from None
@@ -122,6 +122,11 @@ def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
         got = KINDS_OF_YAML.get(type(tree), "a single value")
         raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {got}; correct the file.")
     return tree
+
+
+def _without_tabs(problem: str | None) -> str | None:
+    """A problem of YAML in plain words where it is a tab, which looks like the spaces around it."""
+    return "expected spaces at the beginning of the line, got a tab" if "'\\t'" in (problem or "") else problem
 
 
 def _way_from(path: Path) -> str:

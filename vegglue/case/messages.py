@@ -68,6 +68,8 @@ def _how_numbers_are_written(got: str) -> str:
     """The end of a sentence about a text where a number was expected."""
     if re.fullmatch(r"[-+]?\d+,\d+.*", got):
         return "; write decimals with a point"
+    if re.fullmatch(r"[-+]?[\d.]+\s*[A-Za-z%].*", got):
+        return "; write the number alone: a case is in SI units"
     return "; write numbers without quotes" if re.fullmatch(r"[-+\d.eE]+", got) else ""
 
 
