@@ -21,7 +21,7 @@ def law(z: float) -> float:
 
 def verticals(heading: str, *columns: str) -> str:
     """Four heights at four places; `columns` from z above the bed: `below`, `share`, `water`."""
-    of = {"below": lambda z: DEPTH - z, "share": lambda z: z / DEPTH, "water": lambda z: DEPTH}
+    of = {"above": lambda z: z, "below": lambda z: DEPTH - z, "share": lambda z: z / DEPTH, "water": lambda z: DEPTH}
     rows = [
         ";".join(f"{value:.5f}" for value in (x, y, *(of[one](z) for one in columns), law(z)))
         for x in (8, 20)
@@ -38,6 +38,9 @@ def verticals(heading: str, *columns: str) -> str:
         ("Depth below surface (m)", ["below"]),
         ("Messtiefe", ["below"]),
         ("Profundidad [m]", ["below"]),
+        ("Abstand Sohle [m]", ["above"]),
+        ("Messhöhe [m]", ["above"]),
+        ("dist. to bed", ["above"]),
         ("hoogte", ["share"]),
         ("rel. depth", ["share"]),
         ("z/h", ["share"]),
@@ -83,3 +86,14 @@ def test_heights_whose_unit_nobody_stated_are_refused_with_what_came(tmp_path: P
     said = r"got none: at x = 20 m and y = -1 to 1 m the bed lies at .* m, the points 10 to 40 m above it; check unit"
     with pytest.raises(InputError, match=said):
         read_observations(vegglue.import_folder(folder, tmp_path / "brook.yaml"))
+
+
+@pytest.mark.parametrize(
+    "heading", ["Sohlabstand [m]", "Abstand von der Sohle [m]", "Höhe ü. Sohle", "hoehe ueber sohle"]
+)
+def test_heights_above_the_bed_are_known_in_german(tmp_path: Path, heading: str) -> None:
+    """A log law at four heights was four repeats at one place: `Sohlabstand` was not read."""
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=verticals(heading, "above"))
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert case.imported[0].columns["height"] == heading

@@ -11,7 +11,7 @@ from vegglue.importers.columns_of_table import NAMES_OF_BED
 from vegglue.importers.lost_places import numbers_of
 from vegglue.importers.measured_rows import MeasuredRows
 
-# Words of headings that say how high or deep: `rel. depth`, `z/h`, `Messtiefe`.
+# Words of headings that say how high or deep: `rel. depth`, `z/h`, `Messtiefe`; or where from: `dist. to bed`.
 HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "tiefe", "profondeur", "hauteur"} | {
     "profundidad",
     "diepte",
@@ -20,6 +20,16 @@ HEIGHT_WORDS = {"z", "depth", "height", "below", "above", "surface", "hohe", "ti
     "altura",
     "hoogte",
     "altezza",
+    "hoehe",
+    "messhohe",
+    "bed",
+    "bottom",
+    "sohle",
+    "grund",
+    "fond",
+    "lecho",
+    "fondo",
+    "bodem",
 }
 # Heights at one place differ by such a factor [-]; depths of the water that were read again do not.
 APART = 1.5
