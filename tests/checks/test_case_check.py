@@ -397,3 +397,13 @@ def test_points_outside_the_water_are_not_left_out_in_silence(tmp_path, height, 
     text, rows = adv_case((0.2, 0.4, 0.6, height))
     assert [one for one in odd(tmp_path, text, rows) if one.startswith(said)]
     assert not [one for one in odd(tmp_path, *adv_case((0.2, 0.4, 0.6))) if "not used" in one]
+
+
+@pytest.mark.parametrize(("x", "said"), [(12, True), (14, False)])
+def test_stations_of_two_sections_at_one_place_are_said(tmp_path, x, said):
+    """A section with the x of another, and a copied file of levels, counted twice without a word."""
+    found = [one for one in odd(tmp_path, rows=f"{ROWS}low,B,{x},-0.7,0.45,0.01\n") if "share places" in one]
+    assert bool(found) == said
+    assert not said or found[0].startswith(
+        "2 stations of velocity in experiment low share places, the first at x = 12, y = -0.7 m (of A and B), and"
+    )

@@ -27,6 +27,7 @@ from vegglue.checks.stations import (
     remarks_on_exchanged_axes,
     remarks_on_map_places,
     remarks_on_patch_edges,
+    remarks_on_shared_places,
     remarks_on_stations,
 )
 from vegglue.checks.steep_flow import remarks_on_steep_flow
@@ -61,6 +62,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_map_places(case, observations),
         remarks_on_units_of_places(case, observations),
         remarks_on_stations(case, site, observations),
+        remarks_on_shared_places(observations),
         remarks_on_heights(observations),
         remarks_on_lost_points(observations),
         remarks_on_directions(case, observations),

@@ -28,6 +28,21 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
     yield from (_land_in_words(*one) for one in _on_land(case, site, table))
 
 
+def remarks_on_shared_places(observations: Observations) -> Iterator[str]:
+    """Stations in use where another of their kind and experiment stands: a file may be a copy, or a place wrong."""
+    table = observations.table[observations.table["used"].astype(bool)]
+    table = table[np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)]
+    shared = table[table.duplicated(["experiment", "kind", "x", "y"], keep=False)]
+    for (experiment, kind), rows in shared.groupby(["experiment", "kind"], sort=False):
+        first = rows.iloc[0]
+        there = rows.loc[(rows["x"] == first["x"]) & (rows["y"] == first["y"]), "section"].unique()
+        yield (
+            f"{len(rows)} stations of {kind_of(str(kind)).words} in experiment {experiment} share places, the first at "
+            f"x = {first['x']:g}, y = {first['y']:g} m (of {_listed([str(one) for one in there])}), and "
+            "count as measured apart: see whether a file is a copy, or a place wrong."
+        )
+
+
 def remarks_on_dry_velocities(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     """Velocities of an experiment of which most stand on land: the model has no flow to hold against them."""
     yield from (_land_in_words(*one) for one in _on_land(case, site, observations.table) if one[-1])
