@@ -131,7 +131,7 @@ def _without_tabs(problem: str | None) -> str | None:
 
 def _way_from(path: Path) -> str:
     """What to do about a config that cannot be read: a folder of measurements has to be imported."""
-    if any((path / name).is_file() for name in SITE_FILES):
+    if any(os.path.isfile(path / name) for name in SITE_FILES):  # which no name is too long for
         return f"`vegglue import {shown_path(path)}` makes a config of that folder"
     return "check the path"
 
