@@ -13,6 +13,7 @@ from vegglue.cli.options import FLAG, Cluster, Config, Force, Jobs, Json, Quiet,
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
+from vegglue.in_short import so_many
 
 
 def import_command(
@@ -49,8 +50,8 @@ def import_command(
         for sentence in [*(f"{one.name}: {one.taken}." for one in case.imported or ()), *assumed]:
             print(sentence)
     print(
-        f"{target}: {len(case.experiments)} experiment(s), {len(patches)} patches, "
-        f"{len(case.parameters)} parameters with wide priors."
+        f"{target}: {so_many(len(case.experiments), 'experiment')}, {so_many(len(patches), 'patch', 'patches')}, "
+        f"{so_many(len(case.parameters), 'parameter')} with wide priors."
     )
     if not quiet:
         print(f"Next: {command_line('check', target)}, then {command_line('run', target)}")

@@ -8,6 +8,7 @@ from vegglue.case.schema import Case
 from vegglue.cli.brief_posterior import show_posterior
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
 from vegglue.errors import shown_path
+from vegglue.in_short import so_many
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -64,8 +65,8 @@ def _show_check(case: Case, found: CheckedCase) -> None:
     for sentence in found.remarks:
         print(f"- {sentence}")
     print(
-        f"{case.name}: {len(case.experiments)} experiment(s), {found.cells:,} cells, {found.used_stations} of "
-        f"{found.stations} stations in use, {len(found.remarks)} remark(s). Channel drawn in {found.picture}"
+        f"{case.name}: {so_many(len(case.experiments), 'experiment')}, {found.cells:,} cells, {found.used_stations} of "
+        f"{found.stations} stations in use, {so_many(len(found.remarks), 'remark')}. Channel drawn in {found.picture}"
     )
 
 
