@@ -1,0 +1,46 @@
+"""A case that `check` passes in silence, and what it says of one that was changed."""
+
+from pathlib import Path
+
+from vegglue.case.config import load_case
+from vegglue.checks.case_check import check_case
+from vegglue.measurements.observations import read_observations
+from vegglue.site.gridded_site import build_site
+
+SOUND = """
+name: sound
+grid: {x: [0, 40], y: [-5, 5], cell: [1.0, 0.5]}
+bed:
+  - trapezoid: {axis: 0.0, bottom_width: 4.0, bank_slope: 0.5, bed_slope: 0.001, level: 0.0}
+friction:
+  classes:
+    bed: {law: manning, n: n_b}
+    bank: {law: keulegan, k_s: 0.5}
+  default: bed
+  zones:
+    - {class: bank, beyond_slope_break: 0.2}
+plants:
+  stands:
+    reed: {phi: phi, canopy_height: 0.8, stems: 22}
+  patches:
+    - {name: p1, stand: reed, x: [10, 14], y: [0, 1.5], stems: 22}
+inflows:
+  upstream: {side: west}
+outlet: {}
+experiments:
+  low: {discharge: 2.0, level: 1.0}
+parameters:
+  n_b: {distribution: uniform, low: 0.01, high: 0.15, unit: s m^(-1/3)}
+  phi: {distribution: loguniform, low: 0.01, high: 100, unit: "-"}
+observations:
+  - {kind: velocity, file: velocities.csv}
+simulate: {members: 1024}
+"""
+ROWS = "experiment,section,x,y,u,u_se\nlow,A,12,0.7,0.3,0.01\nlow,A,12,-0.7,0.5,0.01\nlow,A,12,1.1,0.3,0.01\n"
+
+
+def odd(folder: Path, text: str = SOUND, rows: str = ROWS) -> list[str]:
+    (folder / "velocities.csv").write_text(rows)
+    (folder / "sound.yaml").write_text(text)
+    case = load_case(folder / "sound.yaml")
+    return check_case(case, build_site(case), read_observations(case))
