@@ -92,6 +92,19 @@ def test_rows_left_out_are_counted(tmp_path: Path, row: str, told: list[str]) ->
         assert words in said
 
 
+@pytest.mark.parametrize(
+    ("heading", "said"),
+    [
+        (HEADING, "no unit given of x, y and u, taken as SI, commas,"),
+        (HEADING.replace("x,y,u,", "x [m],y (m),u [m/s],"), "; commas,"),
+        (HEADING.replace("u,", "u_cm_s,", 1), "no unit given of x and y, taken as SI, commas,"),
+    ],
+)
+def test_a_unit_that_nobody_gave_is_said(tmp_path: Path, heading: str, said: str) -> None:
+    """`u from u [m/s]` was told as if the table had stated it."""
+    assert said in told_of(tmp_path / "brook", heading, *ROWS, "none")
+
+
 def test_two_titles_above_two_rows_are_no_table(tmp_path: Path) -> None:
     table = read_loosely(table_of(tmp_path, "Levels", "May", "experiment,x,level,note", "low,2.0,0.5,", "low,3.0,0.6,"))
     assert table.headings == ("experiment", "x", "level")

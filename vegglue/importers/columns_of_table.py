@@ -139,9 +139,7 @@ def unit_of_column(path: Path, table: LooseTable, columns: Mapping[str, int], ro
     heading = table.headings[place]
     if role in ("x", "y") and is_in_degrees(heading):
         raise InputError(f"{shown_path(path)}: expected lengths in column {heading!r} for {role}, got {NO_DEGREES}")
-    known = role_of(heading)
-    by_heading = (known[1] if known else None) or unit_stated(heading, quantity) or _bracketed(heading)
-    stated = table.units[place].strip("[]() ") or by_heading
+    stated = _unit_in_table(table, place, quantity)
     if not stated:
         values = next((one for one in VALUES_OF.get(role, ()) if one in columns), None)
         return unit_of_column(path, table, columns, values, words) if values else next(iter(UNITS[quantity]))
@@ -153,6 +151,24 @@ def unit_of_column(path: Path, table: LooseTable, columns: Mapping[str, int], ro
             "`columns` which column holds what."
         )
     return unit
+
+
+def taken_as_si(table: LooseTable, columns: Mapping[str, int], words: FileWords) -> list[str]:
+    """Roles of velocities, lengths and discharges whose unit nobody states: neither the site file nor the table.
+
+    Errors and scatters are left out: they go with their values.
+    """
+    measured = [role for role in columns if ROLES[role].quantity in ("velocity", "length", "discharge")]
+    open_ones = [role for role in measured if role not in words.units and role not in VALUES_OF]
+    return [role for role in open_ones if not _unit_in_table(table, columns[role], ROLES[role].quantity)]
+
+
+def _unit_in_table(table: LooseTable, place: int, quantity: str) -> str:
+    """What the row of units or the heading of a column states; '' where neither does."""
+    heading = table.headings[place]
+    known = role_of(heading)
+    by_heading = (known[1] if known else None) or unit_stated(heading, quantity) or _bracketed(heading)
+    return table.units[place].strip("[]() ") or by_heading
 
 
 def _bracketed(heading: str) -> str:

@@ -10,7 +10,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES
 from vegglue.importers.column_numbers import doubted_nines, numbers_of_column, refuse_negative
-from vegglue.importers.columns_of_table import columns_of_table, unit_of_column
+from vegglue.importers.columns_of_table import columns_of_table, taken_as_si, unit_of_column
 from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
@@ -112,7 +112,8 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> MeasuredRo
     numbers: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
     units: dict[str, str] = {}
-    said = [table.form]
+    assumed = taken_as_si(table, columns, words)
+    said = [*([f"no unit given of {listed(assumed)}, taken as SI"] if assumed else []), table.form]
     for role, place in columns.items():
         fields = [row[place] for _, row in table.rows]
         if not ROLES[role].quantity:
