@@ -198,9 +198,10 @@ A diagnosis knows neither, and all else may be missing as well. Let the model be
 effects, places of every term and size, and instruments compete to first order, by the rules of a diagnosis
 (`tests/studies/object_limits.py`). Then none of these is told of {objects} such objects in {told} of draws of the
 errors, and a place within 1.5 m in {near}. Who always names the circle of 1.5 m that most likely holds the object is
-right in {guessed}. With places twice as dense it is 72, 47 and 68 %. So 70 % within 1.5 m is more than these data hold.
-85 % told is within reach only by telling it wherever a place is likelier than not: {evenly}. Then it would be told of
-{evenly6} of listed effects of six standard errors, and of {evenly3} of those of three, instead of {told6} and {told3}
-({effects} sets). In the study it would add 13 objects of 221, one listed effect of ratio 3, and no set with nothing
-hidden: that was not done. The shares below come near these limits, on imperfect sites of another code: most of what is
-not told is not in the data."""
+right in {guessed}. With places twice as dense, tried once, it is 72, 47 and 68 %. So 70 % within 1.5 m is at most what
+always guessing gives, and out of reach for who has to be sure first. 85 % told is within reach only by telling it
+wherever a place is likelier than not: {evenly}. Then it would be told of {evenly6} of listed effects of six standard
+errors, and of {evenly3} of those of three, instead of {told6} and {told3} ({effects} sets). In the study it would add
+at least 13 objects of 221 and one listed effect of ratio 3, by the chances that their sentences tell: it was not done.
+The shares below come near these limits, on imperfect sites of another code: most of what is not told is not in the
+data."""
