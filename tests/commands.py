@@ -14,7 +14,7 @@ from reach import write_reach
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import sample_of
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import solve_chunk
+from vegglue.ensemble.solve_chunk import solve_chunk
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 

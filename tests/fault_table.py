@@ -177,10 +177,10 @@ FAULTS = (
     Fault("a worker is killed, or runs out of memory", "simulate", 3,
           "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
           "the same command again, with fewer --jobs if this repeats.", CHUNKS,
-          failing(solve_ensemble, "solve_chunk", BrokenProcessPool(), after=2), 4, ready=False),
+          failing(solve_ensemble, "solve_in_experiment", BrokenProcessPool(), after=2), 4, ready=False),
     Fault("no memory left", "simulate", 3,
           "The memory is full; what was finished is kept: run it again with fewer --jobs, or a coarser grid.", CHUNKS,
-          failing(solve_ensemble, "solve_chunk", MemoryError(), after=2), 4, ready=False),
+          failing(solve_ensemble, "solve_in_experiment", MemoryError(), after=2), 4, ready=False),
     Fault("two runs of one name", "simulate", 3, f"{RUN} is in use by ...; wait for it to end, or stop it.",
           "what the first one does", lambda folder: locked(folder / RUN / ".lock"), 4, ready=False),
     Fault("the ensemble is cut short", "infer", 3, f"{ENSEMBLE}: cannot be opened (...); {AGAIN}", OLD,

@@ -13,7 +13,7 @@ import numpy as np
 
 import vegglue
 from vegglue.case.parameter_space import sample_of
-from vegglue.ensemble.solve_ensemble import solve_chunk
+from vegglue.ensemble.solve_chunk import solve_chunk
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 

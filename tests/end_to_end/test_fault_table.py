@@ -87,13 +87,13 @@ def test_a_fault_is_told_and_loses_nothing(
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """A list that grows by one with each chunk that is solved."""
     solved: list[int] = []
-    real = solve_ensemble.solve_chunk
+    real = solve_ensemble.solve_in_experiment
 
     def solve(*arguments: Any, **more: Any) -> Any:
         solved.append(1)
         return real(*arguments, **more)
 
-    monkeypatch.setattr(solve_ensemble, "solve_chunk", solve)
+    monkeypatch.setattr(solve_ensemble, "solve_in_experiment", solve)
     return solved
 
 

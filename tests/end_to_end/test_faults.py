@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 # So many that a run is still on its way when it is stopped, on a busy machine too: some second.
 CHUNKS = 16
-CHUNK = chunk_size(4096)
+CHUNK = chunk_size(4096, 1)
 ENSEMBLE = Path("runs/brook/ensemble.h5")
 PART = Path("runs/brook/ensemble.h5.part")
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))

@@ -19,7 +19,8 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
 from vegglue.engine.model import model_of
-from vegglue.ensemble.solve_ensemble import solve_ensemble, solve_flow
+from vegglue.ensemble.solve_chunk import solve_flow
+from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.figures.channel import save_channel_figure
 from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.flow.sensor import FlowFields

@@ -16,7 +16,8 @@ from vegglue.case.parameter_space import sample_at
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.checks.case_check import check_case
-from vegglue.ensemble.solve_ensemble import solve_chunk, solve_ensemble, solve_flow
+from vegglue.ensemble.solve_chunk import solve_chunk, solve_flow
+from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
 from vegglue.flow.sensor import read_sensors
@@ -139,7 +140,7 @@ def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.M
         solved = solve(*arguments)
         return replace(solved, status=np.where(np.arange(len(solved.status)) == 1, FAILED, solved.status))
 
-    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.solve_nested", fail_second)
+    monkeypatch.setattr("vegglue.ensemble.solve_chunk.solve_nested", fail_second)
     rows = solve_chunk(case, build_site(case), read_observations(case), sample_at(case, np.full((3, 2), 0.4)))
     assert [bool(np.isfinite(fields).any()) for fields in rows["fields"]] == [True, False, True]
 

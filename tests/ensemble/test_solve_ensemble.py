@@ -1,14 +1,18 @@
 """What is stored of a member is what was solved."""
 
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.ensemble.solve_ensemble import solve_ensemble
+from vegglue.case.parameter_space import sobol_sample
+from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble, solved_members
 from vegglue.errors import InputError
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
@@ -27,7 +31,7 @@ def test_stored_parameters_are_those_solved_bit_for_bit(tmp_path: Path, monkeypa
         built.append(np.column_stack(list(given[-1].values())))
         return build_problem(*given)
 
-    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.build_problem", watched)
+    monkeypatch.setattr("vegglue.ensemble.solve_chunk.build_problem", watched)
     path = tmp_path / "ensemble.h5"
     solve_ensemble(case, read_observations(case), path, 1, lambda progress: None)
     stored = np.column_stack(list(read_ensemble(path).parameters.values()))
@@ -43,3 +47,39 @@ def test_more_predictions_than_memory_is_laid_out_for_are_refused_first(
     with pytest.raises(InputError, match=r"1,048,576 members of .* stations have .* predictions; expected"):
         solve_ensemble(case, read_observations(case), tmp_path / "ensemble.h5", 1)
     assert not list(tmp_path.glob("*.h5*"))
+
+
+@pytest.mark.parametrize(
+    ("members", "experiments", "size"), [(64, 3, 32), (256, 1, 64), (256, 3, 128), (1024, 1, 256), (5000, 3, 256)]
+)
+def test_each_of_several_experiments_is_a_task_so_that_chunks_may_be_larger(
+    members: int, experiments: int, size: int
+) -> None:
+    assert chunk_size(members, experiments) == size
+
+
+def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two experiments, alike but for the level at the outlet: each has its own predictions, whichever ends first."""
+    case = load_case(write_reach(tmp_path, COARSE))
+    ((name, one),) = case.experiments.items()
+    more = one.model_copy(update={"level": one.level + 0.05})
+    case = case.model_copy(
+        update={
+            "experiments": {name: one, "more": more},
+            "simulate": case.simulate.model_copy(update={"members": 16}),
+        }
+    )
+    alone = read_observations(case)
+    both = replace(alone, table=pd.concat([alone.table, alone.table.assign(experiment="more")], ignore_index=True))
+    sample = sobol_sample(case)
+    in_order = solved_members(case, both, sample, 1)
+
+    def backwards(work: Callable[..., Any], tasks: Iterable[Any], jobs: int) -> Iterator[Any]:
+        assert jobs == 1
+        return (work(*task) for task in reversed(list(tasks)))
+
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.as_finished", backwards)
+    np.testing.assert_array_equal(solved_members(case, both, sample, 1), in_order)
+    first, second = np.split(in_order, 2, axis=1)
+    assert np.isfinite(in_order).all()
+    assert np.abs(second - first).max() >= 0.01

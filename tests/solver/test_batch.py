@@ -13,7 +13,8 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import parameters_at, sample_at
 from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, solve_chunk, solve_ensemble, starts_and_chunks
+from vegglue.ensemble.solve_chunk import solve_chunk
+from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, solve_ensemble, starts_and_chunks
 from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations

@@ -4,7 +4,7 @@ import numpy as np
 from channels import family, river, solved
 
 from vegglue.flow.problem import Problem, take
-from vegglue.solver.chord import ChordSolution, chord, stream
+from vegglue.solver.chord import LONGEST_CORRECTION, ChordSolution, Patience, chord, stream
 from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.newton import finish
 
@@ -32,7 +32,7 @@ def test_members_pass_through_few_lanes_as_they_would_all_at_once():
             assert member not in found
             found[int(member)] = bool(ended.converged[lane]), ended.state[..., lane]
 
-    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, 25, 4, note)
+    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, Patience(25), 4, note)
     assert sorted(found) == list(range(11))
     assert sum(entered) == 11
     assert max(entered) <= 4
@@ -60,7 +60,7 @@ def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
     def note(members: np.ndarray, ended: ChordSolution) -> None:
         found.update(zip(members.tolist(), ended.converged.tolist(), strict=True))
 
-    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, 25, 3, note)
+    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, Patience(25), 3, note)
     assert found == {0: False, 1: False, 2: True, 3: True, 4: True, 5: True}
 
 
@@ -96,7 +96,7 @@ def test_one_lane_serves_all():
         lambda some: np.repeat(centre, len(some), axis=3),
         shared,
         1e-8,
-        40,
+        Patience(40),
         1,
         lambda members, end: ends.extend(members[end.converged]),
     )
@@ -114,7 +114,32 @@ def test_who_waits_alone_enters_while_others_are_at_work():
         asked.append((len(some), len(done)))
         return np.repeat(centre, len(some), axis=3)
 
-    stream(batch, np.arange(5), starts_of, shared, 1e-9, 60, 4, lambda members, end: done.extend(members))
+    stream(batch, np.arange(5), starts_of, shared, 1e-9, Patience(60), 4, lambda members, end: done.extend(members))
     assert len(set(together.iterations)) > 1, "else all end at once"
     assert asked[1][0] == 1
     assert asked[1][1] < 4
+
+
+def test_who_falls_behind_is_not_waited_for():
+    """It ends where it is, before the most steps, and other members get there as without it."""
+    batch, centre, shared = neighbours(8, 11)
+    ends: dict[float, dict[int, tuple[bool, int, float]]] = {}
+    for pace in (1.0, 0.12):
+        found = ends.setdefault(pace, {})
+
+        def note(members: np.ndarray, ended: ChordSolution, found: dict[int, tuple[bool, int, float]] = found) -> None:
+            told = zip(ended.converged.tolist(), ended.iterations.tolist(), ended.correction.tolist(), strict=True)
+            found.update(zip(members.tolist(), told, strict=True))
+
+        start = np.repeat(centre, 11, axis=3)
+        stream(
+            batch, np.arange(11), lambda some, start=start: start[..., some], shared, 1e-9, Patience(60, pace), 4, note
+        )
+    behind = [member for member, (there, _, _) in ends[0.12].items() if not there]
+    assert all(there for there, _, _ in ends[1.0].values())
+    assert 0 < len(behind) < 11
+    for member in behind:
+        _, steps, correction = ends[0.12][member]
+        assert steps < ends[1.0][member][1]
+        assert np.isfinite(correction)
+        assert correction >= 4.0 * LONGEST_CORRECTION * 0.12 ** ends[1.0][member][1]

@@ -11,7 +11,7 @@ from vegglue.case.parameter_space import parameters_at
 from vegglue.case.prior import sobol_points
 from vegglue.case.schema import Case
 from vegglue.engine.model import ever_coarser
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.solver import nested_grids
@@ -19,6 +19,7 @@ from vegglue.solver.batch import solve_members
 from vegglue.solver.march import USUAL_FALL_BACK
 from vegglue.solver.nested_grids import GridProblem, solve_nested
 from vegglue.solver.parameter_metric import metric_of_flows
+from vegglue.solver.prolongation import lifted_flows, on_grid
 from vegglue.solver.status import SOLVED_BY_NEWTON
 
 TOLERANCE = 1e-7
@@ -87,6 +88,19 @@ def test_who_stalled_begins_there_with_the_next_reference(
     assert np.abs(briefly.state - whole.state).max() < 20 * TOLERANCE
     assert moved
     assert max(moved) > TOLERANCE
+
+
+def test_a_lifted_flow_is_nearer_where_friction_is_another(
+    grids_and_points: tuple[list[GridProblem], np.ndarray],
+) -> None:
+    """Beside banks finer cells are shallower or deeper than those around them; only u changes."""
+    (*_, coarse, fine), points = grids_and_points
+    before = solve_members(coarse.problem, points, coarse.problem_of, TOLERANCE).state
+    after = solve_members(fine.problem, points, fine.problem_of, TOLERANCE).state
+    plain, lifted = on_grid(before, fine.problem.shape), lifted_flows(coarse.problem, before, fine.problem)
+    off = [np.sqrt(((state - after)[:, ALONG] ** 2).mean(axis=(0, 1))) for state in (plain, lifted)]
+    assert (off[1] < 0.8 * off[0]).mean() > 0.9
+    np.testing.assert_array_equal(lifted[:, [LEVEL, ACROSS]], plain[:, [LEVEL, ACROSS]])
 
 
 def test_a_metric_of_flows_is_longest_along_what_changes_them_most() -> None:

@@ -18,7 +18,8 @@ from joblib import Parallel, delayed
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import parameters_at, sobol_sample
 from vegglue.case.prior import sample_prior, sobol_points
-from vegglue.ensemble.solve_ensemble import linearised_medians, solve_chunk, solve_ensemble, starts_and_chunks
+from vegglue.ensemble.solve_chunk import linearised_medians, solve_chunk
+from vegglue.ensemble.solve_ensemble import solve_ensemble, starts_and_chunks
 from vegglue.flow.backwater import backwater
 from vegglue.flow.chord_equations import eased
 from vegglue.flow.equations import faces

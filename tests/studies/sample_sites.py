@@ -16,7 +16,7 @@ from instrument_files import winriver
 from scipy.interpolate import RegularGridInterpolator
 
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import solve_flow
+from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.flow.sensor import FlowFields
 from vegglue.importers.placement import Placement
 from vegglue.site.centreline import centreline_of, heading_at

@@ -23,7 +23,8 @@ from reach import COARSE, write_reach
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import sobol_sample
 from vegglue.cluster import on_cluster
-from vegglue.ensemble.solve_ensemble import solve_chunk, solve_ensemble, starts_and_chunks
+from vegglue.ensemble.solve_chunk import solve_chunk
+from vegglue.ensemble.solve_ensemble import solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 from vegglue.solver.status import FAILED, members_with

@@ -13,14 +13,8 @@ from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command_run import CommandEnd
 from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
-from vegglue.ensemble.solve_ensemble import (
-    Rows,
-    left_to_do,
-    make_header,
-    refuse_too_many,
-    section_positions,
-    solved_members,
-)
+from vegglue.ensemble.solve_chunk import Rows, section_positions
+from vegglue.ensemble.solve_ensemble import left_to_do, make_header, refuse_too_many, solved_members
 from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch, silent
 from vegglue.solver.status import FAILED, RUN_BY_COMMAND

@@ -1,40 +1,39 @@
 """config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
 
-A chunk is what one task solves: neighbours in the prior, the same set whatever the number of jobs, so that the
-results are too.
+A chunk is neighbours in the prior, the same set whatever the number of jobs, so that the results are too. What one task
+solves is a chunk in one experiment.
 """
 
 import hashlib
-import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from vegglue.case.parameter_space import PriorSample, parameters_at, refuse_without_parameters, sample_of, sobol_sample
+from vegglue.case.parameter_space import PriorSample, refuse_without_parameters, sobol_sample
 from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_PREDICTIONS
 from vegglue.engine.first_use import with_compilation
-from vegglue.engine.model import ever_coarser
+from vegglue.ensemble.solve_chunk import (
+    Rows,
+    StartFrom,
+    linearised_medians,
+    rows_of_chunk,
+    section_positions,
+    solve_in_experiment,
+)
 from vegglue.errors import InputError, shown_path
-from vegglue.flow.problem import Problem, take
-from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.sensor import FlowFields, flow_fields, read_sensors
-from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
-from vegglue.parallel import as_finished, in_threads
+from vegglue.parallel import as_finished
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.ensemble import Header
-from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
+from vegglue.results.fields import FieldWindow, excess, window_of
 from vegglue.site.gridded_site import Site, build_site
 from vegglue.site.zones import refuse_ranges_without_cells
-from vegglue.solver.batch import CLUSTER_SIZE, SolvedMembers, solve_members
-from vegglue.solver.march import FallBack, fall_back
-from vegglue.solver.nested_grids import GridProblem, solve_nested
+from vegglue.solver.batch import CLUSTER_SIZE
 from vegglue.solver.parameter_metric import clusters, parameter_metric
-from vegglue.solver.reference_member import LinearisedMember, linearised_median
 from vegglue.solver.status import FAILED, members_with
 from vegglue.storage.resume import EnsembleWriter, ensemble_writer
 from vegglue.version import VERSION
@@ -44,13 +43,9 @@ from vegglue.version import VERSION
 # fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 # Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
-# neighbours alone take (DECISIONS); more were not tried. Chunks then hold SPARSE_CHUNK at most, and half of the
-# members: smaller ones share less (with 32 in each, 128 take half as long again), larger ones leave cores idle.
+# neighbours alone take (DECISIONS); more were not tried. Chunks then hold half of the members, and at most
+# SPARSE_CHUNK, or twice as many where several experiments share the cores: larger ones share more, or leave cores idle.
 SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
-# Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
-READ_TOGETHER = 16
-Rows = dict[str, np.ndarray]
-StartFrom = dict[str, LinearisedMember | None]
 
 
 def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch = silent) -> None:
@@ -98,16 +93,16 @@ def refuse_too_many(case: Case, observations: Observations) -> None:
         )
 
 
-def chunk_size(members: int) -> int:
-    """Members solved by one task at most; it depends on nothing but the size of the ensemble."""
+def chunk_size(members: int, experiments: int) -> int:
+    """Members of a chunk at most; it depends on nothing but the size of the ensemble and the number of experiments."""
     if members <= SPARSE_MEMBERS:
-        return min(-(-members // 2), SPARSE_CHUNK)
+        return min(-(-members // 2), SPARSE_CHUNK if experiments == 1 else 2 * SPARSE_CHUNK)
     return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
 
 
 def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
     """Where members come from, and what one task solves; those that are few come from coarser cells."""
-    size = chunk_size(len(points))
+    size = chunk_size(len(points), len(case.experiments))
     start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
     slopes = [one.slopes for one in start_from.values() if one is not None]
     return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
@@ -132,141 +127,28 @@ def _solve_all(
     start_from: StartFrom,
     jobs: int,
 ) -> Iterator[tuple[int, Rows]]:
+    """The rows of each chunk as its last experiment ends: one task is a chunk in one experiment."""
     work = partial(_solve_numbered, case, site, observations, start_from)
-    yield from as_finished(work, ((index, sample.take(chunks[index])) for index in todo), jobs)
+    tasks = ((index, experiment, sample.take(chunks[index])) for index in todo for experiment in case.experiments)
+    ended: dict[int, dict[str, Rows]] = {}
+    for index, experiment, rows in as_finished(work, tasks, jobs):
+        parts = ended.setdefault(index, {})
+        parts[experiment] = rows
+        if len(parts) == len(case.experiments):
+            del ended[index]
+            yield index, rows_of_chunk(case, observations, [parts[one] for one in case.experiments])
 
 
 def _solve_numbered(
-    case: Case, site: Site, observations: Observations, start_from: StartFrom, index: int, sample: PriorSample
-) -> tuple[int, Rows]:
-    return index, solve_chunk(case, site, observations, sample, start_from)
-
-
-def linearised_medians(case: Case, site: Site) -> StartFrom:
-    """Of every experiment, the member at the medians of all priors; None where it had to be marched."""
-    parameters, tolerance = len(case.parameters), case.numerics.tolerance
-    return {
-        experiment: linearised_median(
-            partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case)
-        )
-        for experiment in case.experiments
-    }
-
-
-def solve_chunk(
-    case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
-) -> Rows:
-    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
-    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from, coarser cells
-    if not given.
-    """
-    rows = _no_rows(case, site, observations, len(sample.points))
-    coarse = [] if start_from else ever_coarser(case, site)[:-1]
-    for experiment in case.experiments:
-        began = time.perf_counter()
-        problem = build_problem(case, site, experiment, sample.theta)
-        solved = _solved_in(case, site, experiment, sample, problem, start_from, coarse)
-        _read_all(case, site, observations, experiment, problem, solved, rows)
-        rows["status"] = np.maximum(rows["status"], solved.status.astype(np.int8))
-        rows["iterations"] += solved.iterations.astype(np.int32)
-        rows["seconds"] += (time.perf_counter() - began) / len(sample.points)
-        for member, reason in enumerate(solved.reason):
-            if reason:
-                rows["reason"][member] = f"{rows['reason'][member]} {experiment}: {reason}".strip()
-    for name in ("prediction", "fields"):
-        rows[name][rows["status"] == FAILED] = np.nan
-    return rows
-
-
-def _no_rows(case: Case, site: Site, observations: Observations, members: int) -> Rows:
-    """The rows before any experiment is solved."""
-    window, experiments = window_of(case, site.grid), len(case.experiments)
-    columns = _kept_columns(window)
-    fields_shape = (members, experiments, len(QUANTITIES), columns.stop - columns.start, site.grid.y.size)
-    return {
-        "prediction": np.full((members, len(observations.table)), np.nan),
-        "section_flow": np.full((members, experiments, len(section_positions(observations))), np.nan),
-        "mass_error": np.zeros(members),
-        "status": np.zeros(members, np.int8),
-        "reason": np.full(members, "", object),
-        "iterations": np.zeros(members, np.int32),
-        "seconds": np.zeros(members),
-        "fields": np.full(fields_shape, np.nan, np.float32),
-    }
-
-
-def _kept_columns(window: FieldWindow | None) -> slice:
-    return window.columns if window else slice(0, 0)
-
-
-def _solved_in(
-    case: Case,
-    site: Site,
-    experiment: str,
-    sample: PriorSample,
-    problem: Problem,
-    start_from: StartFrom | None,
-    coarse: list[tuple[Case, Site]],
-) -> SolvedMembers:
-    """The members in one experiment, from a member they all come from, or from coarser cells, the coarsest first."""
-    build, tolerance = partial(_problem_at, case, site, experiment), case.numerics.tolerance
-    if start_from:
-        return solve_members(problem, sample.points, build, tolerance, start_from[experiment], _fall_back(case))
-    grids = [
-        GridProblem(build_problem(*place, experiment, sample.theta), partial(_problem_at, *place, experiment))
-        for place in coarse
-    ]
-    return solve_nested([*grids, GridProblem(problem, build)], sample.points, tolerance, _fall_back(case))
-
-
-def _read_all(
     case: Case,
     site: Site,
     observations: Observations,
+    start_from: StartFrom,
+    index: int,
     experiment: str,
-    problem: Problem,
-    solved: SolvedMembers,
-    rows: Rows,
-) -> None:
-    """What sensors and sections read of the members in one experiment, put into the rows."""
-    station, sections, columns = (
-        observations.table,
-        section_positions(observations),
-        _kept_columns(window_of(case, site.grid)),
-    )
-    here, number = (station["experiment"] == experiment).to_numpy(), list(case.experiments).index(experiment)
-    for first in range(0, problem.members, READ_TOGETHER):
-        few = slice(first, min(first + READ_TOGETHER, problem.members))
-        state = np.ascontiguousarray(solved.state[..., few])
-        part = take(problem, np.arange(problem.members)[few])
-        readings = read_sensors(part, state, site.grid, station[here], sections, columns)
-        rows["prediction"][few, here] = readings.prediction
-        rows["section_flow"][few, number] = readings.section_flow
-        rows["fields"][few, number] = readings.fields
-        rows["mass_error"][few] = np.maximum(rows["mass_error"][few], readings.mass_error)
-
-
-def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
-    """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
-    site = build_site(case)
-    sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
-    coarse = ever_coarser(case, site)[:-1]
-
-    def fields_of(experiment: str) -> dict[str, FlowFields]:
-        problem = build_problem(case, site, experiment, sample.theta)
-        solved = _solved_in(case, site, experiment, sample, problem, None, coarse)
-        return {} if solved.status[0] == FAILED else {experiment: flow_fields(problem, solved.state, site.grid)}
-
-    found = in_threads(fields_of, [(experiment,) for experiment in case.experiments])
-    return {experiment: fields for one in found for experiment, fields in one.items()}
-
-
-def _fall_back(case: Case) -> FallBack:
-    return fall_back(case.numerics.march_step, case.numerics.march_span)
-
-
-def _problem_at(case: Case, site: Site, experiment: str, points: np.ndarray) -> Problem:
-    return build_problem(case, site, experiment, parameters_at(case, points))
+    sample: PriorSample,
+) -> tuple[int, str, Rows]:
+    return index, experiment, solve_in_experiment(case, site, observations, start_from, experiment, sample)
 
 
 def make_header(
@@ -291,9 +173,3 @@ def make_header(
         version=VERSION,
         window=window,
     )
-
-
-def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
-    """Name and mean x [m] of every section a velocity was measured in."""
-    velocity = observations.table[velocity_rows(observations.table)]
-    return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())

@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.flow.problem import Problem, crop, take
-from vegglue.solver.chord import ChordSolution, stream
+from vegglue.solver.chord import ChordSolution, Patience, stream
 from vegglue.solver.march import USUAL_FALL_BACK, FallBack
 from vegglue.solver.member_states import blend, put_rows
 from vegglue.solver.parameter_metric import (
@@ -190,7 +190,8 @@ def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, s
     def starts_of(members: np.ndarray) -> Array:
         return _starts(batch.metric, reference, solved, members)
 
-    stream(part, queue, starts_of, reference.factors, batch.tolerance, MOST_CHORD_STEPS, MEMBER_LANES, keep)
+    patience = Patience(MOST_CHORD_STEPS)
+    stream(part, queue, starts_of, reference.factors, batch.tolerance, patience, MEMBER_LANES, keep)
 
 
 def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedMembers, members: np.ndarray) -> Array:

@@ -32,6 +32,16 @@ SHRINKING = 4.0
 
 
 @dataclass(frozen=True)
+class Patience:
+    """Who is waited for: a member of at most `most` steps, whose correction [m, m/s] in step n is below
+    4 LONGEST_CORRECTION pace^n. Who falls behind another reference may lead on.
+    """
+
+    most: int
+    pace: float = 1.0
+
+
+@dataclass(frozen=True)
 class ChordSolution:
     """States (nx, 3, ny, m), the least correction of each member [m/s, m], infinite if it strayed, iterations, and
     who converged.
@@ -66,7 +76,7 @@ class _Lanes:
     last: Array
     running: np.ndarray
 
-    def step(self, tolerance: float, most: int) -> tuple[np.ndarray, ChordSolution]:
+    def step(self, tolerance: float, patience: Patience) -> tuple[np.ndarray, ChordSolution]:
         """A chord step of all, the members that end with it, and how. They stay in their lanes until others enter."""
         step = _step(self.part, self.state, self.thin, self.shared)
         size = largest_correction(self.part, step, self.state, self.thin, self.shared.thick)
@@ -75,7 +85,8 @@ class _Lanes:
         strayed = self.running & ~(size < 4.0 * LONGEST_CORRECTION)
         self.best[strayed] = np.inf
         there = self.running & self._is_there(size, tolerance)
-        ended = strayed | there | self.running & (self.age >= most)
+        late = (self.age >= patience.most) | (size >= 4.0 * LONGEST_CORRECTION * patience.pace**self.age)
+        ended = strayed | there | self.running & late
         # Those that strayed or ended before must not spoil the arithmetic of others, nor what the lane remembers.
         step[..., ~self.running | strayed], self.state[..., strayed] = 0.0, 0.0
         self._move(step)
@@ -149,20 +160,20 @@ def stream(
     starts_of: StartsOf,
     shared: Factors,
     tolerance: float,
-    most: int,
+    patience: Patience,
     width: int,
     deliver: Deliver,
 ) -> None:
     """Members of a queue through `width` lanes with one factorisation, each handed over as it ends.
 
     starts_of: states (nx, 3, ny, m) that members enter with, asked for when they do. A member ends when it converged,
-    strayed, or took `most` steps.
+    strayed, or is no longer waited for.
     """
     if not queue.size:
         return
     lanes, waiting = _begun(problem, queue[:width], starts_of(queue[:width]), shared), queue[width:]
     while True:
-        members, ended = lanes.step(tolerance, most)
+        members, ended = lanes.step(tolerance, patience)
         if members.size:
             deliver(members, ended)
         if not lanes.running.any() and not waiting.size:
@@ -193,5 +204,5 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
         end.state[..., some], end.correction[some] = ended.state, ended.correction
         end.iterations[some], end.converged[some] = ended.iterations, ended.converged
 
-    stream(problem, members, lambda some: start[..., some], shared, tolerance, most, members.size, keep)
+    stream(problem, members, lambda some: start[..., some], shared, tolerance, Patience(most), members.size, keep)
     return end

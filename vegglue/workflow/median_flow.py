@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import solve_flow
+from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.posterior import Posterior
 from vegglue.storage.result_files import flow_that_fits, write_flow

@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name, write_text
-from vegglue.ensemble.solve_ensemble import solve_flow
+from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
 from vegglue.whole_files import failed_writes_told
