@@ -143,3 +143,33 @@ def test_who_falls_behind_is_not_waited_for():
         assert steps < ends[1.0][member][1]
         assert np.isfinite(correction)
         assert correction >= 4.0 * LONGEST_CORRECTION * 0.12 ** ends[1.0][member][1]
+
+
+def test_the_last_ones_wait_with_others_for_another_reference():
+    """Half as many as `few` did not get there: the others at work end where they are; without them they go on."""
+    batch, centre, shared = neighbours(8, 11)
+    start = np.repeat(centre, 11, axis=3)
+    for astray, given_up in ((2, True), (1, False)):
+        begin = start.copy()
+        begin[..., :astray] = np.nan
+        ends: dict[int, tuple[bool, int]] = {}
+
+        def note(members: np.ndarray, ended: ChordSolution, ends: dict[int, tuple[bool, int]] = ends) -> None:
+            assert np.isfinite(ended.state).all()
+            told = zip(ended.converged.tolist(), ended.iterations.tolist(), strict=True)
+            ends.update(zip(members.tolist(), told, strict=True))
+
+        stream(
+            batch,
+            np.arange(11),
+            lambda some, begin=begin: begin[..., some],
+            shared,
+            1e-9,
+            Patience(60, few=4),
+            11,
+            note,
+        )
+        assert sorted(ends) == list(range(11))
+        left = [member for member, (there, _) in ends.items() if not there and member >= astray]
+        assert (0 < len(left) <= 4) == given_up
+        assert all(ends[member][1] == max(steps for _, steps in ends.values()) for member in left)

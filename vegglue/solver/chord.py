@@ -34,11 +34,16 @@ SHRINKING = 4.0
 @dataclass(frozen=True)
 class Patience:
     """Who is waited for: a member of at most `most` steps, whose correction [m, m/s] in step n is below
-    4 LONGEST_CORRECTION pace^n. Who falls behind another reference may lead on.
+    4 LONGEST_CORRECTION pace^n; nobody once `few` or less are at work and half as many need another reference anyway.
     """
 
     most: int
     pace: float = 1.0
+    few: int = 0
+
+    def is_over(self, working: int, left: int) -> bool:
+        """Whether the last ones at work are left to another reference, after others were."""
+        return working <= self.few <= 2 * left
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,12 @@ class _Lanes:
             kept(self.state, np.flatnonzero(ended)), self.best[ended], self.age[ended], there[ended]
         )
         return self.member[ended], solution
+
+    def give_up(self) -> tuple[np.ndarray, ChordSolution]:
+        """Those at work, where they are."""
+        rest = np.flatnonzero(self.running)
+        nobody = np.zeros(rest.size, dtype=bool)
+        return self.member[rest], ChordSolution(kept(self.state, rest), self.best[rest], self.age[rest], nobody)
 
     def _is_there(self, size: Array, tolerance: float) -> NDArray[np.bool_]:
         """Whose correction is below the tolerance, or would be after this step if it shrank as by the last one."""
@@ -172,11 +183,16 @@ def stream(
     if not queue.size:
         return
     lanes, waiting = _begun(problem, queue[:width], starts_of(queue[:width]), shared), queue[width:]
+    left = 0
     while True:
         members, ended = lanes.step(tolerance, patience)
         if members.size:
             deliver(members, ended)
+            left += int((~ended.converged).sum())
         if not lanes.running.any() and not waiting.size:
+            return
+        if not waiting.size and patience.is_over(int(lanes.running.sum()), left):
+            deliver(*lanes.give_up())
             return
         free = np.flatnonzero(~lanes.running)
         if waiting.size and (free.size >= ENTER or not lanes.running.any()):

@@ -24,7 +24,7 @@ from vegglue.solver.batch import (
     none_solved,
     solve_members,
 )
-from vegglue.solver.chord import ChordSolution, Patience, stream
+from vegglue.solver.chord import SIDE_BY_SIDE, ChordSolution, Patience, stream
 from vegglue.solver.march import FallBack
 from vegglue.solver.newton import CLOSE
 from vegglue.solver.parameter_metric import metric_of_flows, nearest_members, squared_distances
@@ -123,7 +123,7 @@ def _solve_around(level: _Level, member: int, pending: np.ndarray, tolerance: fl
         return rows_inside(_starts(level, members), reference.band)
 
     deliver = partial(_delivered, level, part, reference.band)
-    patience = Patience(MOST_NESTED_STEPS, PACE)
+    patience = Patience(MOST_NESTED_STEPS, PACE, SIDE_BY_SIDE)
     stream(part, queue, starts_of, reference.factors, tolerance, patience, NESTED_LANES, deliver)
 
 
