@@ -1,10 +1,11 @@
 """Members that pass through a few lanes: who ends how, and that company does not matter."""
 
 import numpy as np
+import pytest
 from channels import family, river, solved
 
 from vegglue.flow.problem import Problem, take
-from vegglue.solver.chord import LONGEST_CORRECTION, ChordSolution, Patience, chord, stream
+from vegglue.solver.chord import LONGEST_CORRECTION, ChordSolution, Patience, chord, is_near_enough, stream
 from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.newton import finish
 
@@ -173,3 +174,19 @@ def test_the_last_ones_wait_with_others_for_another_reference():
         left = [member for member, (there, _) in ends.items() if not there and member >= astray]
         assert (0 < len(left) <= 4) == given_up
         assert all(ends[member][1] == max(steps for _, steps in ends.values()) for member in left)
+
+
+@pytest.mark.parametrize(
+    ("before", "last", "size", "near"),
+    [
+        (1.1e-6, 1.0e-6, 0.9e-6, False),  # below the tolerance, but nine more like it may come
+        (4.0e-6, 2.0e-6, 0.9e-6, True),
+        (3.0e-4, 3.0e-5, 3.0e-6, True),  # the step that is made takes it far below
+        (4.0e-5, 3.0e-5, 3.0e-6, False),  # one lucky step
+        (np.inf, np.inf, 0.5e-6, False),  # a first step tells nothing
+        (np.inf, np.inf, 0.1e-6, True),
+    ],
+)
+def test_a_member_is_near_enough_by_all_that_may_come(before: float, last: float, size: float, near: bool) -> None:
+    found = is_near_enough(np.array([size]), np.array([last]), np.array([before]), 1e-6)
+    assert found.tolist() == [near]
