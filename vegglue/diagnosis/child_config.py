@@ -21,6 +21,7 @@ from vegglue.results.diagnosis import Location
 from vegglue.screening.candidates import (
     Candidate,
     acting_in,
+    at_work,
     candidates_of,
     effect_entry,
     patch_candidate,
@@ -52,7 +53,7 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
         return _named_place(effect, where)
     kind = _kind_of_place(case, station, effect, name, where) if where else None
     candidate = _acting_in(case, effect, kind, where)
-    if candidate.key in case.effects:
+    if at_work(case, candidate):
         raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
     return candidate
 

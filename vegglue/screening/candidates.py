@@ -90,7 +90,23 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
             found += [patch_candidate(effect, index, case) for index in range(len(case.plants.patches))]
             continue
         found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
-    return [one for one in found if one.key not in case.effects]
+    return [one for one in found if not at_work(case, one)]
+
+
+def at_work(case: Case, candidate: Candidate) -> bool:
+    """Whether this effect acts in the case just where the candidate does, whatever its key is there.
+
+    A key of the same name counts too: the candidate would take its place.
+    """
+    if candidate.key in case.effects:
+        return True
+    return any(_acts_in(case, one) == _acts_in(case, candidate) for one in candidates_in_case(case).values())
+
+
+def _acts_in(case: Case, one: Candidate) -> tuple[object, ...]:
+    """The effect and where it acts; every experiment by its name is the same as none."""
+    experiments = frozenset(one.experiments or case.experiments)
+    return one.effect.name, one.at, experiments, frozenset(one.sections), frozenset(one.devices)
 
 
 def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
