@@ -61,6 +61,15 @@ def test_the_set_becomes_a_case(tmp_path: Path) -> None:
     assert "2 % and 0.01 m/s for velocities, 1 mm for levels" in assumptions_of(tmp_path / "set")[0]
 
 
+def test_a_second_config_that_was_edited_keeps_the_first_from_being_written(tmp_path: Path) -> None:
+    """The first config, its tables and the tables of the MATLAB files were there before the second was refused."""
+    folder = shipped_set(tmp_path / "set")
+    (tmp_path / "made-flat.yaml").write_text("name: of my own\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"made-flat\.yaml: is there, and was not made by vegglue"):
+        vegglue.import_folder(folder, tmp_path / "made.yaml")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["made-flat.yaml", "set"]
+
+
 def test_a_broken_file_is_a_sentence(tmp_path: Path) -> None:
     source = mat_folder(shipped_set(tmp_path / "set"))
     assert source is not None

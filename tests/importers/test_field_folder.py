@@ -65,6 +65,31 @@ def test_a_folder_that_says_too_little_is_refused(
     assert len(error.strip().splitlines()) == 1
 
 
+OVER_WATER = "experiment,section,x,y,z,u\nlow,A,12,0,1.2,0.4\nlow,A,12,0,1.4,0.5\n"
+IN_WATER = OVER_WATER.replace("1.2,", "0.2,").replace("1.4,", "0.4,")
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"adv.csv": OVER_WATER}, "made/site-data/adv.csv: expected points of case 'low/A' between the bed and"),
+        ({"adv.csv": IN_WATER, "adv2.csv": IN_WATER}, "expected section A of experiment low once, got two"),
+        ({"again.csv": "experiment,section,x,y,u\nlow,A,12,0.5,0.5\n"}, "expected each station once"),
+    ],
+)
+def test_a_refused_import_leaves_nothing_behind(tmp_path: Path, tables: dict[str, str], said: str) -> None:
+    """What only the reading of the finished case refuses was told when config and tables lay there already."""
+    folder = field_folder(tmp_path / "site")
+    for name, text in tables.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    done = here(tmp_path, "import", "site", "--to", "made/site.yaml", succeed=False)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Nothing was written" in done.stderr
+    assert "tmp" not in done.stderr, "the paths are those that the files would have had"
+    assert [path.name for path in tmp_path.iterdir()] == ["site"]
+
+
 def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:
     """It fitted the experiments alone, and a flow held out at 1.6 m reached its sides."""
     high = {"high": {"discharge_m3_s": 6.0, "downstream_level_m": 1.6}}

@@ -48,6 +48,7 @@ def test_an_entry_of_files_names_a_known_experiment(tmp_path: Path) -> None:
 
 def test_rows_without_a_value_may_name_any_experiment(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "brook")
+    (folder / "velocities.csv").unlink()  # which holds the same station
     (folder / "survey.txt").write_text(CONVERTED.format("flood").replace("46", "-999"), encoding="utf-8")
     assert vegglue.import_folder(folder, tmp_path / "brook.yaml").imported is not None
 

@@ -22,19 +22,25 @@ def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> N
     Errors: InputError, before anything is written, when one is there that vegglue did not write as it is, unless
     forced; StorageError, which ends with the advice.
     """
+    refuse_not_made(texts, advice, force)
     *tables, config = texts
+    for table in tables:
+        write_text(table, texts[table], advice)
+    stamped = {path.name: texts[path] for path in (config, *tables)}
+    lines = "".join(f"# sha256 {_short(text)} of {name}\n" for name, text in stamped.items())
+    write_text(config, texts[config] + HEADING + lines, advice)
+
+
+def refuse_not_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> None:
+    """Errors: InputError, as those of `write_made`, where something is there that is not to be replaced."""
+    config = list(texts)[-1]
     for path in texts:
         if (path.exists() or path.is_symlink()) and not path.is_file():  # reading a pipe would wait
             raise InputError(f"{shown_path(path)}: expected a file or nothing, got something else; {advice}.")
     if not force:
         stated = _stated_in(config)
         for path, text in texts.items():
-            _refuse_to_replace(path, text, stated, advice)
-    for table in tables:
-        write_text(table, texts[table], advice)
-    stamped = {path.name: texts[path] for path in (config, *tables)}
-    lines = "".join(f"# sha256 {_short(text)} of {name}\n" for name, text in stamped.items())
-    write_text(config, texts[config] + HEADING + lines, advice)
+            _refuse_edited(path, text, stated, advice)
 
 
 def refuse_parent(target: Path, parent: Path) -> None:
@@ -43,7 +49,7 @@ def refuse_parent(target: Path, parent: Path) -> None:
         raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
 
 
-def _refuse_to_replace(path: Path, text: str, stated: Mapping[str, str], advice: str) -> None:
+def _refuse_edited(path: Path, text: str, stated: Mapping[str, str], advice: str) -> None:
     there = _text_of(path)
     if there is None or there == text or stated.get(path.name) == _short(there):
         return

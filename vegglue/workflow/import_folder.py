@@ -3,12 +3,11 @@
 A further layout of folders is a file in `importers/` that makes the keys and values of a config, and a line here.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from vegglue.case.config import load_case
-from vegglue.case.made_files import write_made
+from vegglue.case.made_files import refuse_not_made, write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
 from vegglue.checks.channel_and_plants import remarks_on_unnamed_banks
@@ -20,6 +19,9 @@ from vegglue.importers.site_file import left_open, site_file
 from vegglue.measurements.kinds import unstated_errors
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
+from vegglue.workflow.import_trial import refuse_unreadable_import
+
+ANOTHER_FILE = "give another file by --to"
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -27,19 +29,24 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
 
     to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
     makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. force: replace files that were
-    edited or not made here, too. Errors: InputError for what is missing or cannot be read, or would be replaced.
+    edited or not made here, too. Errors: InputError for what is missing or cannot be read, or would be replaced; then
+    nothing was written.
     """
     folder = Path(folder)
     target = _default_target(folder) if to is None else Path(to)
-    if (of_matlab := mat_folder(folder)) is not None and not holds_confluence(folder):
-        folder = tables_of_mat(of_matlab, target.with_name(f"{target.stem}-data") / "tables")
-    if holds_confluence(folder):
-        tree, tables = _with_tables(folder, target)
-        _write_config(target, folder, tree, force, tables)
-        _write_config(target.with_stem(f"{target.stem}-flat"), folder, flat_bed(folder, target), force)
+    if holds_confluence(folder) or mat_folder(folder) is not None:
+        tree, texts, flat = _of_confluence(folder, target)
     else:
         made = case_from_folder(folder, target)
-        _write_config(target, folder, made.tree, force, made.texts)
+        tree, texts, flat = made.tree, dict(made.texts), None
+    refuse_unreadable_import(tree, texts, target, folder)
+    configs = [{**texts, target: _config_text(folder, tree)}]
+    if flat is not None:
+        configs.append({target.with_stem(f"{target.stem}-flat"): _config_text(folder, flat)})
+    for files in configs:
+        refuse_not_made(files, ANOTHER_FILE, force)
+    for files in configs:
+        write_made(files, ANOTHER_FILE, force)
     return load_case(target)
 
 
@@ -64,18 +71,22 @@ def unnamed_banks(case: Case) -> list[str]:
         return []
 
 
-def _write_config(path: Path, folder: Path, tree: Tree, force: bool, tables: Mapping[Path, str] | None = None) -> None:
-    text = f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
-    write_made({**(tables or {}), path: text}, "give another file by --to", force)
+def _config_text(folder: Path, tree: Tree) -> str:
+    return f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
 
 
-def _with_tables(folder: Path, target: Path) -> tuple[Tree, dict[Path, str]]:
-    """The config of the confluence set, and its tables as text, to be written when it is known that they may be."""
+def _of_confluence(folder: Path, target: Path) -> tuple[Tree, dict[Path, str], Tree]:
+    """The config of the confluence set, its tables as text, to be written when it is known that they may be, and the
+    config with a plane for the bed.
+    """
     with TemporaryDirectory() as name:
-        elsewhere = Path(name)
+        elsewhere = Path(name) / "made"
+        if not holds_confluence(folder) and (of_matlab := mat_folder(folder)) is not None:
+            folder = tables_of_mat(of_matlab, Path(name) / "tables")
         tree = case_from_confluence(folder, elsewhere / target.name)
         made = sorted(path for path in elsewhere.rglob("*") if path.is_file())
-        return tree, {target.parent / path.relative_to(elsewhere): path.read_text(encoding="utf-8") for path in made}
+        texts = {target.parent / path.relative_to(elsewhere): path.read_text(encoding="utf-8") for path in made}
+        return tree, texts, flat_bed(folder, target)
 
 
 def _default_target(folder: Path) -> Path:
