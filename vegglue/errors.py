@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 from pathlib import Path
 
 # Signs that end a line or steer a terminal; files of strangers may hold them, and sentences quote files.
@@ -31,3 +32,9 @@ class StorageError(OSError):
 def shown_path(path: Path) -> str:
     """The path as sentences name it: relative to where the user stands."""
     return os.path.relpath(path)
+
+
+def shown_command(verb: str, config: Path | None, *options: str) -> str:
+    """`vegglue VERB CONFIG` as sentences name it, to be copied; CONFIG where nobody knows which."""
+    named = "CONFIG" if config is None else shown_path(config)
+    return f"`{shlex.join(['vegglue', verb, named, *options])}`"

@@ -164,16 +164,24 @@ def test_a_mistake_in_the_config_is_one_sentence(
 
 @pytest.mark.parametrize(
     ("step", "expected"),
-    [("infer --method glue", "run `vegglue simulate CONFIG`"), ("report", "run `vegglue infer CONFIG`")],
+    [("infer --method glue", "run `vegglue simulate {}`"), ("report", "run `vegglue infer {}`")],
 )
 def test_a_step_out_of_turn_names_the_one_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], step: str, expected: str
 ) -> None:
-    config = write_reach(tmp_path)
+    """It said CONFIG, which is no file of a user."""
+    (folder := tmp_path / "my brooks").mkdir()
+    write_reach(folder)
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, *step.split(), config)
+    code, error = said_to(monkeypatch, capsys, *step.split(), "my brooks/brook.yaml")
     assert (code, error.count("\n")) == (2, 1), error
-    assert expected in error
+    assert expected.format("'my brooks/brook.yaml'") in error
+
+
+def test_no_message_names_a_config_that_is_none() -> None:
+    """Where the config is known `errors.shown_command` names it."""
+    sources = [path for path in (ROOT / "vegglue").rglob("*") if path.suffix in (".py", ".j2")]
+    assert [path.name for path in sources if re.search(r"vegglue [a-z]+ CONFIG", path.read_text("utf-8"))] == []
 
 
 @pytest.mark.parametrize("arguments", [("--members", 0), ("--members", -3), ("--members", "many"), ("--jobs", 0)])

@@ -110,7 +110,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, uninterrupted: Ensemb
     assert not (tmp_path / ENSEMBLE).exists()
     refused = here(tmp_path, "infer", config.name, succeed=False)
     assert refused.returncode == 2
-    assert "found only a part of the members; run `vegglue simulate CONFIG`" in refused.stderr
+    assert f"found only a part of the members; run `vegglue simulate {config.name}`" in refused.stderr
     said = vegglue(tmp_path, "simulate", config.name, "--jobs", 3 - jobs).stdout
     assert f"{there.size:,} of {CHUNKS * CHUNK:,} members ({there.size:,} from before)" in said
     ensemble = read_ensemble(tmp_path / ENSEMBLE)
@@ -180,7 +180,7 @@ def test_what_is_out_of_date_is_refused_with_what_to_run(tmp_path: Path, say: Sa
     code, error = say("report")
     assert code == 2
     assert "posterior.h5: expected config hash" in error
-    assert "run `vegglue infer CONFIG` again" in error
+    assert "run `vegglue infer brook.yaml` again" in error
     assert say("infer") == (0, ""), "another likelihood needs no new members"
     write_reach(tmp_path, *SIXTEEN, ("high: 0.10", "high: 0.12"))
     assert_stale_ensemble(say)
@@ -196,7 +196,7 @@ def assert_stale_ensemble(say: Say) -> None:
         code, error = say(step)
         assert code == 2
         assert f"{ENSEMBLE}: expected config hash" in error
-        assert "run `vegglue simulate CONFIG` again" in error
+        assert "run `vegglue simulate brook.yaml` again" in error
 
 
 @contextmanager

@@ -239,5 +239,5 @@ def test_an_empty_diagnosis_is_a_sentence_and_no_figure_breaks(tmp_path: Path) -
 
 
 def test_without_a_diagnosis_the_report_says_how_to_get_one(toy: tuple[Run, str]) -> None:
-    assert "<code>vegglue diagnose CONFIG</code> would tell" in toy[1]
+    assert "<code>vegglue diagnose toy.yaml</code> would tell" in toy[1]
     assert 'id="missing-' not in toy[1]

@@ -100,7 +100,9 @@ def test_a_case_has_as_many_members_as_were_solved(case: Case, tmp_path: Path, m
     """So a report, and an export, of a run with other `--members` than the config needs no such option."""
     assert run_folder.as_solved(case, tmp_path) is case
     (tmp_path / "ensemble.h5").touch()
-    monkeypatch.setattr("vegglue.workflow.run_folder.read_ensemble", lambda path: SimpleNamespace(status=np.zeros(12)))
+    monkeypatch.setattr(
+        "vegglue.workflow.run_folder.read_ensemble", lambda path, **_: SimpleNamespace(status=np.zeros(12))
+    )
     assert run_folder.as_solved(case, tmp_path).simulate.members == 12
 
 

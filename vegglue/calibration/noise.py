@@ -81,7 +81,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     """
     used = station[station["used"].to_numpy(bool)]
     if used.empty:
-        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check CONFIG` says why.")
+        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check` says why.")
     error = used["standard_error"].to_numpy(float).copy()
     for kind, value in (fallback or {}).items():
         error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value

@@ -4,12 +4,14 @@ Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305; the Gaussian li
 Berends et al. (2020), https://doi.org/10.1016/j.advwatres.2020.103675.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_command
 from vegglue.inference.likelihood import MemberFit, fit_members
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.measurements.observations import Observations
@@ -29,7 +31,7 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
     standard errors missing, sigma zero, no member above the threshold.
     """
     station = observations.table
-    check_stations(ensemble, station)
+    check_stations(ensemble, station, case.source)
     fit = fit_members(ensemble.prediction, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
     weights = member_weights(fit, case.infer.likelihood, threshold)
@@ -59,7 +61,7 @@ def _weighted_sample(ensemble: Ensemble, case: Case, fit: MemberFit, weights: Ar
     )
 
 
-def check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
+def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | None = None) -> None:
     """Errors: InputError when the stations are not those that were simulated, or none is used."""
     same = len(station) == len(ensemble.station) and all(
         np.array_equal(station[column].to_numpy(), ensemble.station[column].to_numpy())
@@ -68,10 +70,11 @@ def check_stations(ensemble: Ensemble, station: pd.DataFrame) -> None:
     if not same:
         raise InputError(
             f"observations: the {len(station)} stations are not the {len(ensemble.station)} that were simulated; "
-            "run `vegglue simulate CONFIG` again."
+            f"run {shown_command('simulate', config)} again."
         )
     if not station["used"].any():
-        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check CONFIG` says why.")
+        command = shown_command("check", config)
+        raise InputError(f"observations: no station is used, nothing can be inferred; {command} says why.")
 
 
 def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:

@@ -17,7 +17,7 @@ from vegglue.calibration.fit import MapEstimate, determined, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_command
 from vegglue.inference.likelihood import fit_members, sizes_as_stated
 from vegglue.inference.tried_members import TriedMembers, grids_of
 from vegglue.parallel import in_threads, side_by_side
@@ -62,7 +62,8 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch = s
     if not ends:
         raise InputError(
             f"{model.case.name}: no steady flow was found from the best members; solve some by "
-            "`vegglue simulate CONFIG` and weigh them by `vegglue infer CONFIG --method glue`."
+            f"{shown_command('simulate', model.case.source)} and weigh them by "
+            f"{shown_command('infer', model.case.source, '--method', 'glue')}."
         )
     return FoundModes(tuple(ends), len(starts), tuple(before))
 

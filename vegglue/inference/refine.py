@@ -56,7 +56,7 @@ def refine(
         watch(Progress("trying points of the prior"))
         tried = points_of_prior(model)
     else:
-        check_stations(ensemble, observations.table)
+        check_stations(ensemble, observations.table, case.source)
         tried = members_of(ensemble, model)
     base = modes_and_errors(model, tried, case.infer.sigma, watch)
     run = partial(predict, solved_for(base.model, base.noise), [one.point for one in base.fits])

@@ -10,7 +10,7 @@ from vegglue.report_page.findings import findings
 from vegglue.report_page.key_numbers import key_numbers, verdict_of
 from vegglue.report_page.page_file import rendered, write_page
 from vegglue.report_page.pictures import pictures
-from vegglue.report_page.run import Run, is_synthetic
+from vegglue.report_page.run import Run, command_about, is_synthetic
 from vegglue.report_page.tables import (
     failure_reasons,
     fit_rows,
@@ -57,4 +57,5 @@ def render(run: Run) -> str:
         health_words=health_in_words(run),
         provenance=list(provenance(run)),
         config=resolved_yaml(run.case),
+        to_diagnose=command_about(run, "diagnose"),
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from vegglue.errors import InputError, StorageError
+from vegglue.errors import InputError, StorageError, shown_command
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from, diagnosis_groups
@@ -24,23 +24,24 @@ POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglu
 Result = TypeVar("Result")
 
 
-def read_ensemble(path: Path, expected_hash: str | None = None) -> Ensemble:
-    """Read a finished ensemble.
+def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | None = None) -> Ensemble:
+    """Read a finished ensemble. config: the file of the case, for the command that a refusal names.
 
     Errors: InputError when there is none, or it was made from another config than the one with `expected_hash`;
     StorageError when the file is broken.
     """
     if not path.exists() and part_file(path).exists():
-        raise InputError(f"{path}: found only a part of the members; run `vegglue simulate CONFIG` to solve the rest.")
-    return _read(path, expected_hash, "simulate", ensemble_from)
+        command = shown_command("simulate", config)
+        raise InputError(f"{path}: found only a part of the members; run {command} to solve the rest.")
+    return _read(path, expected_hash, shown_command("simulate", config), ensemble_from)
 
 
 def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
     """Read the fields of a finished ensemble, whole; errors as those of read_ensemble."""
     if not path.exists():
-        remedy = "say in `simulate.fields` where they are to be kept and run `vegglue simulate CONFIG`"
+        remedy = f"say in `simulate.fields` where they are to be kept and run {shown_command('simulate', None)}"
         raise InputError(f"{path}: expected fields of the members, found no file; {remedy}.")
-    return _read(path, expected_hash, "simulate", fields_from)
+    return _read(path, expected_hash, shown_command("simulate", None), fields_from)
 
 
 def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: str) -> None:
@@ -52,9 +53,9 @@ def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: 
     write_whole(path, posterior_groups(posterior), posterior_attributes(posterior) | own)
 
 
-def read_posterior(path: Path, expected_hash: str | None = None) -> Posterior:
-    """Read a posterior; errors as those of read_ensemble, for `vegglue infer CONFIG`."""
-    return _read(path, expected_hash, "infer", posterior_from)
+def read_posterior(path: Path, expected_hash: str | None = None, config: Path | None = None) -> Posterior:
+    """Read a posterior; errors as those of read_ensemble, for `vegglue infer`."""
+    return _read(path, expected_hash, shown_command("infer", config), posterior_from)
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: str) -> None:
@@ -64,8 +65,8 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: 
 
 
 def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
-    """Read a diagnosis; errors as those of read_ensemble, for `vegglue diagnose CONFIG`."""
-    return _read(path, expected_hash, "diagnose", diagnosis_from)
+    """Read a diagnosis; errors as those of read_ensemble, for `vegglue diagnose`."""
+    return _read(path, expected_hash, shown_command("diagnose", None), diagnosis_from)
 
 
 def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
@@ -99,8 +100,8 @@ def stored_hash(path: Path) -> str | None:
     return stored_attribute(path, "config_hash")
 
 
-def _read(path: Path, expected_hash: str | None, step: str, understand: Callable[..., Result]) -> Result:
-    remedy = f"run `vegglue {step} CONFIG`"
+def _read(path: Path, expected_hash: str | None, command: str, understand: Callable[..., Result]) -> Result:
+    remedy = f"run {command}"
     if not path.exists():
         raise InputError(f"{path}: expected the result of an earlier step, found no file; {remedy}.")
     with open_hdf5(path, "r") as file:

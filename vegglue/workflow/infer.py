@@ -10,7 +10,7 @@ from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_ha
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.model import model_of
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_command
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
 from vegglue.measurements.observations import read_observations
@@ -58,7 +58,8 @@ def infer(
     observations = replace(observations, table=without_stations(observations.table, aside))
     if not observations.table["used"].any():
         raise InputError(
-            f"{case.name}: expected a station in use, got none: nothing can be inferred; `vegglue check` says why."
+            f"{case.name}: expected a station in use, got none: nothing can be inferred; "
+            f"{shown_command('check', case.source)} says why."
         )
     folder, chosen = folder_of(runs, case), chosen_method(case, method)
     ensemble = _own_ensemble(case, ensemble, folder, members is not None or needs_ensemble(case, chosen))
@@ -92,7 +93,7 @@ def _own_ensemble(case: Case, given: Ensemble | None, folder: Path, needed: bool
     if given is None:
         there = needed or begun_or_finished(folder / "ensemble.h5")
         _refuse_another_size(case, folder)
-        return read_ensemble(folder / "ensemble.h5", simulation_hash(case)) if there else None
+        return read_ensemble(folder / "ensemble.h5", simulation_hash(case), case.source) if there else None
     if given.config_hash != simulation_hash(case):
         raise InputError(f"{case.name}: expected its own ensemble, got one of another state of it; simulate it again.")
     return given

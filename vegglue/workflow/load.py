@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import pandas as pd
 
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_command
 from vegglue.in_short import in_short, so_many
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.storage.labelled_arrays import read_inference_data, read_labelled
@@ -67,7 +67,7 @@ def load(folder: Path | str) -> LoadedRun:
     if not there:
         raise InputError(
             f"{folder}: expected results of a run ({', '.join(FILES)}), found none; check the folder, or run "
-            "`vegglue simulate CONFIG`."
+            f"{shown_command('simulate', None)}."
         )
 
     def read(name: str, how: Callable[..., Read], *groups: str) -> Read | None:

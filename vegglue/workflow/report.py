@@ -1,6 +1,5 @@
 """case -> page: everything known of a run as one HTML file, and its figures beside it."""
 
-import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import without_stations
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
@@ -53,13 +52,13 @@ def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = 
     folder = folder_of(runs, case)
     path, ensemble = folder / "ensemble.h5", None
     if begun_or_finished(path):
-        ensemble = read_ensemble(path, simulation_hash(sized))
+        ensemble = read_ensemble(path, simulation_hash(sized), case.source)
     if not (folder / "posterior.h5").exists():
         _refuse_if_the_run_went_on(case, runs)
-    posterior = read_posterior(folder / "posterior.h5", case_hash(sized))
+    posterior = read_posterior(folder / "posterior.h5", case_hash(sized), case.source)
     observations, since = _as_inferred(observations, posterior, set_aside_of(case, runs))
     if ensemble is None and posterior.settings.ensemble_hash:
-        read_ensemble(path)  # says that it is gone
+        read_ensemble(path, config=case.source)  # says that it is gone
     survey = rigid_cylinder(read_survey(case.survey.file), case.survey) if case.survey else None
     diagnosis = diagnosis_that_fits(folder / "diagnosis.h5", case_hash(case))
     loop = loop_results_of(case, runs, above)
@@ -82,7 +81,7 @@ def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
     if last != case.name and page.exists():
         raise InputError(
             f"{shown_path(case.source)}: the run went on to {last}, whose report is {shown_path(page)}; for one of "
-            f"{case.name} itself run `vegglue infer {shlex.quote(shown_path(case.source))}` first."
+            f"{case.name} itself run {shown_command('infer', case.source)} first."
         )
 
 

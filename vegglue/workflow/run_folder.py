@@ -60,7 +60,7 @@ def as_solved(case: Case, folder: Path) -> Case:
     Errors: StorageError.
     """
     path = folder / "ensemble.h5"
-    return of_size(case, len(read_ensemble(path).status)) if path.exists() else case
+    return of_size(case, len(read_ensemble(path, config=case.source).status)) if path.exists() else case
 
 
 def other_size(case: Case, folder: Path) -> int | None:
@@ -69,7 +69,7 @@ def other_size(case: Case, folder: Path) -> int | None:
     stored = stored_hash(path)
     if stored in (None, simulation_hash(case)):
         return None
-    members = len(read_ensemble(path).status)
+    members = len(read_ensemble(path, config=case.source).status)
     return members if stored == simulation_hash(of_size(case, members)) else None
 
 

@@ -1,6 +1,5 @@
 """case -> twin: measurements with a hidden effect and a sealed answer; and how well its diagnosis guessed."""
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +7,7 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
+from vegglue.errors import shown_command
 from vegglue.parallel import one_thread
 from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.twins.reveal import guess_in_words
@@ -56,7 +56,5 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
     lines = guess_in_words(answer, diagnosis)
     if diagnosis is None:
-        lines.append(
-            f"No diagnosis of it in {there}: `vegglue diagnose {shlex.quote(str(config_in(folder)))}` makes one."
-        )
+        lines.append(f"No diagnosis of it in {there}: {shown_command('diagnose', config_in(folder))} makes one.")
     return lines
