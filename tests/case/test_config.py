@@ -105,7 +105,12 @@ REFUSED = [
     ),
     ("bottom_width", "botom_width", "`bed[0].trapezoid.botom_width` is not a known key: did you mean `bottom_width`?"),
     ("steeper_than: 0.2", "slope: 0.2", "`friction.zones[0].slope` is not a known key: known here are class"),
-    ("name: small\n", "", "`name` is missing (lower-case letters, digits, _ and -): add it"),
+    (
+        "name: small",
+        "name: Größe {1}",
+        "`name` expected lower-case letters a to z, digits, _ and - alone, got 'Größe {1}'; write grosse-1.",
+    ),
+    ("name: small\n", "", "`name` is missing (lower-case letters a to z, digits, _ and -): add it"),
     ("level: 0.9", "plants: true", "`experiments.low.level` is missing (water level at the outlet"),
     ("name: small", "name: Small Case", "got 'Small Case'"),
     (

@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin
 
 from vegglue.case.parts import Part
 from vegglue.case.schema import Case
+from vegglue.case.text_files import case_name
 
 MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
 KeyPath = tuple[str | int, ...]
@@ -33,14 +34,12 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = expected_in_words(problem)
-    for said, meant in (
-        ("greater", "a number greater"),
-        ("less", "a number less"),
-        ("String should match pattern", "text like"),
-    ):
+    for said, meant in (("greater", "a number greater"), ("less", "a number less")):
         expected = expected.replace(said, meant)
     advice = _how_numbers_are_written(got) if isinstance(got, str) and "number" in expected else ""
-    if problem["type"] == "string_type":
+    if kind == "string_pattern_mismatch":  # of the name of a case, which is that of a folder
+        return Refusal(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
+    if kind == "string_type":
         expected, advice = "a text", "; write it in quotes" if isinstance(got, int | float) else ""
     return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
 

@@ -203,7 +203,7 @@ class Case(Part):
     """Everything one run depends on. Results go to runs/<name>/."""
 
     source: Path = Field(exclude=True, description="file the case was read from")
-    name: str = Field(pattern=r"^[a-z0-9_-]+$", description="lower-case letters, digits, _ and -")
+    name: str = Field(pattern=r"^[a-z0-9_-]+$", description="lower-case letters a to z, digits, _ and -")
     title: str = Field(default="", description="title of the report")
     grid: GridExtent = Field(description="regular grid of the model")
     bed: tuple[BedLayer, ...] = Field(min_length=1, description="layers, later ones win where they have data")
