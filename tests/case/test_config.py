@@ -210,7 +210,7 @@ REFUSED = [
     ("name: small", "name: small\ntitle: 5", "expected a text, got 5; write it in quotes"),
     ("stand: reed", "stand: true", "expected a text, got True; write it in quotes"),
     ("name: small", "name: small\nname: smaller", "the key `name` stands twice"),
-    ("name: small", "name: small\n\tx: 1", "correct the YAML there or just before"),
+    ("name: small", "name: small\n\tx: 1", "expected spaces, got a tab; write spaces instead."),
 ]
 
 
@@ -269,9 +269,9 @@ def test_a_misspelt_key_is_named_before_what_it_leaves_missing():
         ("- a\n- b\n", "expected keys and values (`name: ...`), got a list; correct the file."),
         ("", "expected keys and values (`name: ...`), got an empty file; correct the file."),
         ("7", "got a single value"),
-        ("a:\n\tb: 1\n", "line 2, column 1: expected spaces at the beginning of the line, got a tab; correct"),
+        ("a:\n\tb: 1\n", "line 2, column 1: expected spaces, got a tab; write"),
         ("a: [1", "line 1"),
-        ("a: \x00", "YAML"),
+        ("a: \x00", "line 1: expected text, got the sign"),
     ],
 )
 def test_what_is_no_mapping_is_refused(text, expected):

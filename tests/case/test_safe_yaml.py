@@ -56,7 +56,7 @@ def refused(text: str) -> str:
         ('a: "\\ud800"', "a text holds the sign '\\ud800'"),
         ('a: "x\\0y"', "a text holds the sign '\\x00'"),
         ('"\\u202e": 1', "a text holds the sign '\\u202e'"),
-        ("a: *b", "undefined alias"),
+        ("a: *b", "a reference to nothing"),
         ("? {a: 1}\n: 2", "unhashable key"),
     ],
     ids=lambda text: text[:24],

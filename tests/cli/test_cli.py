@@ -146,7 +146,7 @@ def yaml_part(key: str) -> str:
         ("level: 0.95", "level: deep", "names the parameter `deep`, which is not declared"),
         ("discharge: 2.0", "discharge: -2.0", "expected a number above 0, got -2"),
         ("file: velocities.csv", "file: elsewhere.csv", "expected an existing file, got elsewhere.csv"),
-        ("title: A short", "title: [A short", "correct the YAML there or just before"),
+        ("title: A short", "title: [A short", "expected a comma or the `]` that closes the `[` of line 3"),
     ],
 )
 def test_a_mistake_in_the_config_is_one_sentence(

@@ -14,6 +14,7 @@ from vegglue.case.safe_yaml import safe_yaml
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import LARGEST_CONFIG, LONGEST_CHAIN
 from vegglue.case.text_files import read_text
+from vegglue.case.yaml_problems import yaml_problem
 from vegglue.errors import InputError, shown_path
 
 # Keys whose value is a path, relative to the file it is written in.
@@ -110,23 +111,12 @@ def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     text = read_text(path, LARGEST_CONFIG, named)
     try:
         tree = safe_yaml(text)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        raise InputError(
-            f"{shown_path(path)}{where}: {_without_tabs(error.problem)}; correct the YAML there or just before."
-        ) from None
     except yaml.YAMLError as error:
-        raise InputError(f"{shown_path(path)} is not valid YAML: {' '.join(str(error).split())}.") from None
+        raise InputError(f"{shown_path(path)}{yaml_problem(error, text)}.") from None
     if not isinstance(tree, dict):
         got = KINDS_OF_YAML.get(type(tree), "a single value")
         raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {got}; correct the file.")
     return tree
-
-
-def _without_tabs(problem: str | None) -> str | None:
-    """A problem of YAML in plain words where it is a tab, which looks like the spaces around it."""
-    return "expected spaces at the beginning of the line, got a tab" if "'\\t'" in (problem or "") else problem
 
 
 def _way_from(path: Path) -> str:
