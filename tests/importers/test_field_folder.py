@@ -65,6 +65,23 @@ def test_a_folder_that_says_too_little_is_refused(
     assert len(error.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("name", ["measured.csv", "holdout.csv"])
+def test_a_folder_without_a_measurement_says_which_columns_it_has_and_which_are_known(
+    tmp_path: Path, name: str
+) -> None:
+    """Known columns were not named; and where nothing held out was a measurement, nothing was held out, unsaid."""
+    folder = field_folder(tmp_path / "site")
+    for file in ("velocities.csv", "levels.csv") if name == "measured.csv" else ():
+        (folder / file).unlink()
+    (folder / name).write_text("x,section,Tempo\n10,A,0.3\n", encoding="utf-8")
+    done = here(tmp_path, "import", "site", "--to", "site.yaml", succeed=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"{name}: no measurement, left out: x from x [m], section from section" in done.stderr
+    assert "not read: Tempo" in done.stderr
+    assert "understood, among them velocity as u, vx, ux, u mean; velocity across as v, vy" in done.stderr
+    assert ("site: of what is held out, expected columns of" in done.stderr) == (name == "holdout.csv")
+
+
 OVER_WATER = "experiment,section,x,y,z,u\nlow,A,12,0,1.2,0.4\nlow,A,12,0,1.4,0.5\n"
 IN_WATER = OVER_WATER.replace("1.2,", "0.2,").replace("1.4,", "0.4,")
 

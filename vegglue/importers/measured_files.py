@@ -15,6 +15,7 @@ from pathlib import Path
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import unused
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import ROLES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.field_site import FieldSite
 from vegglue.importers.file_words import FileWords, file_words
@@ -36,6 +37,8 @@ ENDINGS = (*TEXT_ENDINGS, ".xlsx", ".xlsm", *BINARY_ENDINGS)
 OTHERS = ("answer.json", "readme.txt")
 # How names of files begin that programs leave beside a table: locks of workbooks, and what a Mac keeps of every file.
 OF_PROGRAMS = (".", "~$")
+# Headings that a message lists of each kind of measurement: the commonest stand first.
+HEADINGS_SHOWN = 4
 # What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
 KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": kind_of(STREAMWISE)}
 
@@ -69,9 +72,13 @@ def _nothing_measured(found: MeasuredFiles) -> str:
     if found.imported:
         held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
         kinds = ", ".join(kind.words for kind in KINDS.values())
+        headings = "; ".join(
+            f"{kind.words} as {', '.join(ROLES[kind.column].names[:HEADINGS_SHOWN])}" for kind in KINDS.values()
+        )
         return (
-            f"expected columns of {kinds}, got none that is known. {held} Name "
-            "the column by what it holds, such as `columns: {u: ...}` of its file in `files` of the site file."
+            f"expected columns of {kinds}, got none that is known. {held} Name the column by what it holds, such as "
+            "`columns: {u: ...}` of its file in `files` of the site file, or give it a heading that is understood, "
+            f"among them {headings}."
         )
     files = ", ".join(kind.file for kind in KINDS.values())
     return f"expected one of {files}, or other tables of measurements, got none; put what was measured there."
@@ -80,11 +87,14 @@ def _nothing_measured(found: MeasuredFiles) -> str:
 def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
     """What is held out, read as all measurements are; nothing where no experiment is held out.
 
-    Errors: InputError where a file cannot be read.
+    Errors: InputError where the file cannot be read, or nothing in it is a measurement.
     """
     paths = [path for path in (held_out_file(folder),) if path is not None and site.holdout]
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
-    return _read(paths, _entries(folder, site), target, place, known)
+    found = _read(paths, _entries(folder, site), target, place, known)
+    if paths and not found.observations:
+        raise InputError(f"{shown_path(folder)}: of what is held out, {_nothing_measured(found)}")
+    return found
 
 
 def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, str]:
