@@ -115,6 +115,22 @@ def test_heights_that_count_from_the_surface_are_said(tmp_path, turned, said):
     assert not said or found[0].startswith("Velocities fall from the bed to the surface in 4 of 4 verticals outside ")
 
 
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_heights_and_velocities_that_are_exchanged_are_said(tmp_path, monkeypatch, exchanged):
+    """Only the discharge was said to be another: 5.1 m3/s instead of 1.6."""
+    monkeypatch.chdir(tmp_path)
+    law = [(z, 0.08 * np.log(600.0 * z)) for z in (0.05, 0.2, 0.4, 0.6, 0.8)]
+    pairs = [(y, *((u, z) if exchanged else (z, u))) for y in (-1, -0.5, 0, 0.7) for z, u in law]
+    rows = "".join(f"s30,ADV,30,{y},{z:.4f},{u:.4f},0.01\n" for y, z, u in pairs)
+    entry = "  - {kind: adv, file: velocities.csv, experiment: low, section: s30, case: s30, average: profile}\n"
+    text = SOUND.replace("  - {kind: velocity, file: velocities.csv}\n", entry)
+    said = [one for one in odd(tmp_path, text, "case,device,x,y,z,u,u_se\n" + rows) if "look exchanged" in one]
+    assert bool(said) == exchanged
+    if exchanged:
+        assert said[0].startswith("velocities.csv: the columns `z` and `u` look exchanged: in 4 of 4 verticals outside")
+        assert "exchange the two headings, or say which column is which by `columns: {z: ..., u: ...}`" in said[0]
+
+
 def adv_case(heights: tuple[float, ...]) -> tuple[str, str]:
     """Config and rows of two verticals with points at these heights [m] over the bed."""
     rows = "".join(f"s20,ADV,20,{y},{z},{0.4 + 0.1 * k},0.01\n" for y in (-1, 0.7) for k, z in enumerate(heights))

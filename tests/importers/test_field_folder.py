@@ -107,6 +107,17 @@ def test_a_refused_import_leaves_nothing_behind(tmp_path: Path, tables: dict[str
     assert [path.name for path in tmp_path.iterdir()] == ["site"]
 
 
+@pytest.mark.parametrize(("u", "said"), [(0.4, True), (2.4, False)])
+def test_points_over_the_water_whose_velocities_would_lie_in_it_may_be_exchanged(
+    tmp_path: Path, u: float, said: bool
+) -> None:
+    folder = field_folder(tmp_path / "site")
+    (folder / "adv.csv").write_text(OVER_WATER.replace("0.4\n", f"{u}\n"), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        import_folder(folder, tmp_path / "site.yaml")
+    assert ("whether they and `u`, whose numbers would lie in the water, are exchanged" in str(refused.value)) == said
+
+
 def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:
     """It fitted the experiments alone, and a flow held out at 1.6 m reached its sides."""
     high = {"high": {"discharge_m3_s": 6.0, "downstream_level_m": 1.6}}

@@ -32,7 +32,7 @@ from vegglue.checks.stations import (
 )
 from vegglue.checks.steep_flow import remarks_on_steep_flow
 from vegglue.checks.units_of_places import remarks_on_units_of_places
-from vegglue.checks.verticals import remarks_on_heights, remarks_on_lost_points
+from vegglue.checks.verticals import remarks_on_exchanged_heights, remarks_on_heights, remarks_on_lost_points
 from vegglue.measurements.observations import Observations
 from vegglue.site.gridded_site import Site
 
@@ -50,6 +50,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_map_places(case, observations),
         *remarks_on_units_of_places(case, observations),
         *remarks_on_dry_velocities(case, site, observations),
+        *remarks_on_exchanged_heights(case, observations),
         *remarks_on_directions(case, observations),
     ]
 
@@ -63,6 +64,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_units_of_places(case, observations),
         remarks_on_stations(case, site, observations),
         remarks_on_shared_places(observations),
+        remarks_on_exchanged_heights(case, observations),
         remarks_on_heights(observations),
         remarks_on_lost_points(observations),
         remarks_on_directions(case, observations),

@@ -1,6 +1,7 @@
 """ADV points of one section: placed in the channel, judged, averaged over the depth and summed to the discharge."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -92,8 +93,7 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 def _read_points(observation: Observation) -> pd.DataFrame:
     """Rows of the observed case, upwards in each vertical, in the coordinates of the grid; with z, else with height."""
     path, wanted = observation.file, observation.case
-    there = headings_of(path)
-    upward = "height" if "height" in there and "z" not in there else "z"
+    upward = upward_column(path)
     optional = ("v", "w", "u_se", "u_std", "duration_s")
     rows = read_table(path, ("case", "device"), ("x", "y", upward, "u"), optional, gaps=("v", "w"))
     if "u_se" in rows:
@@ -110,6 +110,12 @@ def _read_points(observation: Observation) -> pd.DataFrame:
     refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
     moved = chosen.assign(x=chosen["x"] + observation.offset.x, y=chosen["y"] + observation.offset.y)
     return moved.drop(columns="case").sort_values(["y", upward]).reset_index(drop=True)
+
+
+def upward_column(path: Path) -> str:
+    """What says how high each point is: `z`, a level, else `height` above the bed. Errors: as `headings_of`."""
+    there = headings_of(path)
+    return "height" if "height" in there and "z" not in there else "z"
 
 
 def _across(case: Case) -> Array:
@@ -229,11 +235,13 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
 def _none_in_the_water(observation: Observation, points: pd.DataFrame, bed: Array, surface: float) -> InputError:
     """The refusal of a section whose points all lie outside the water; bed: its level below each of them [m]."""
     above = points["z"] - bed
+    fits = bool(((points["u"] > bed) & (points["u"] <= surface)).all())
+    exchanged = "whether they and `u`, whose numbers would lie in the water, are exchanged, " if fits else ""
     return InputError(
         f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the water "
         f"surface at z = {surface:.4g} m, got none: at x = {points['x'].iloc[0]:.4g} m and y = {_span(points['y'])} m "
         f"the bed lies at {_span(bed)} m, the points {_span(above)} m above it; check unit and sign of their heights, "
-        "their x and y, the levels of the water, and `floor`, `surface` and `offset` of the observation."
+        f"{exchanged}their x and y, the levels of the water, and `floor`, `surface` and `offset` of the observation."
     )
 
 
