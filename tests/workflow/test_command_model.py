@@ -16,12 +16,12 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command_runs import command_runs
 from vegglue.engine.corrected import corrected, correction_at
-from vegglue.engine.interface import Model, linearise, predict, responses
+from vegglue.engine.interface import Model, Point, linearise, predict, responses
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of, with_effect
-from vegglue.workflow.command_model import _kept_place, command_tried, with_command
+from vegglue.workflow.command_model import _beside_what_was_reckoned, _kept_place, command_tried, with_command
 from vegglue.workflow.run_folder import validation_of
 
 SMALL = ("members: 1024", "members: 8")
@@ -225,3 +225,21 @@ def test_velocities_of_another_unit_or_sign_are_said(tmp_path: Path, times: str,
                              f"{{{times}0.2 / n**0.5 - 0.05 * phi**0.2 + float(row['x']) / 1000)!r}}")  # fmt: skip
     case = commanded(tmp_path, program, "", COARSE, SMALL, WITH_ERROR)
     assert command_tried(model_of(case, read_observations(case)), tmp_path).removesuffix(".").endswith(said)
+
+
+def test_what_cannot_be_compared_is_said_with_its_reason() -> None:
+    """Without a flow of the built-in engine it was `nothing to compare ()`."""
+    error = np.array([0.1, np.nan])
+    point = Point(np.zeros(1), np.array([0.4, 0.4]), np.zeros((2, 1)), {})
+    assert _beside_what_was_reckoned(np.array([0.5, 9.0]), "", point, error) == (
+        "it differs from what was reckoned with by 1.00 errors; take sizes and chances with care",
+        pytest.approx(1.0),
+    )
+    for failure, reckoned, said in (
+        ("it ended with code 1.", point, "the command failed, so that nothing tells how far it is from"),
+        ("", None, "the built-in engine finds no steady flow, so that nothing tells how far the command is from"),
+    ):
+        words, off = _beside_what_was_reckoned(np.full(2, np.nan), failure, reckoned, error)
+        assert words.startswith(said)
+        assert words.endswith(failure.removesuffix(".") or "with care")
+        assert off == 0.0

@@ -17,7 +17,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.engine.command_runs import command_predictions, command_runs, ended_runs
 from vegglue.engine.corrected import corrected, correction_at, without_effects
-from vegglue.engine.interface import Model, linearise
+from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
@@ -74,15 +74,8 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
         "or a place would change, and how the flow bends away from these slopes, is what the built-in engine says "
         "of the same site."
     ]
-    off = 0.0
-    if reasons[0] or reckoned is None:
-        said.append(f"At the parameters found last the command gives nothing to compare ({reasons[0]}).")
-    else:
-        error = found.predictions.error
-        used = np.isfinite(error)
-        off = root_mean_square((there[0] - reckoned.prediction)[used] / error[used])
-        doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
-        said.append(f"At the parameters found last it differs from what was reckoned with by {off:.2f} errors{doubt}.")
+    compared, off = _beside_what_was_reckoned(there[0], reasons[0], reckoned, found.predictions.error)
+    said.append(f"At the parameters found last {compared}.")
     if place.rough:
         said.append(f"{_noisy(place)}: {TO_CALM}.")
     if not place.settled:
@@ -90,6 +83,25 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
     doubt = _reason_not_to_believe(place, off)
     told = found.verdict if not doubt else _disbelieved(found.verdict, doubt)
     return replace(found, verdict=replace(told, remarks=(" ".join(said), *told.remarks)))
+
+
+def _beside_what_was_reckoned(there: Array, failure: str, reckoned: Point | None, error: Array) -> tuple[str, float]:
+    """How far the command is from what was reckoned with, in words and in errors; 0 where nobody can tell.
+
+    failure: why the command gave nothing, '' where it did; error: of each station, NaN where it does not count.
+    """
+    if failure:
+        why = failure.removesuffix(".")
+        return f"the command failed, so that nothing tells how far it is from what was reckoned with: {why}", 0.0
+    if reckoned is None:
+        return (
+            "the built-in engine finds no steady flow, so that nothing tells how far the command is from what was "
+            "reckoned with; take sizes and chances with care"
+        ), 0.0
+    used = np.isfinite(error)
+    off = root_mean_square((there - reckoned.prediction)[used] / error[used])
+    doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
+    return f"it differs from what was reckoned with by {off:.2f} errors{doubt}", off
 
 
 def _noisy(place: CommandPlace) -> str:
