@@ -324,6 +324,23 @@ def test_what_looks_like_a_parameter_is_untestable_for_that_reason() -> None:
     assert "wind (looks like a change of k_s)" in said(grounds(), [hidden])[2]
 
 
+def test_many_untestable_effects_are_told_in_groups() -> None:
+    """Some fifty names stood in one line, each with the same words behind it."""
+    parts = {"k_s": (20, -0.9), "n_b": (5, 0.9), "phi": (1, 0.2)}
+    hidden = [
+        a_suspect(f"of_{name}{k}", detectability={"testable": False, "confounder": name, "cosine": cosine})
+        for name, (count, cosine) in parts.items()
+        for k in range(count)
+    ]
+    told = (
+        "neither present nor absent: 26 effects: "
+        "of_k_s0, of_k_s1, of_k_s2 and 17 more (look like a change of k_s); "
+        "of_n_b0, of_n_b1, of_n_b2 and 2 more (look like a change of n_b); of_phi0. "
+        "The table of effects on the page of the run (`vegglue report`) lists all."
+    )
+    assert told in said(grounds(), hidden)[2]
+
+
 def test_what_was_found_is_not_called_untestable() -> None:
     hidden = [a_suspect(name, detectability={"testable": False}) for name in ("wind", "elder")]
     assert "neither present nor absent: elder." in said(grounds(step("wind")), hidden)[2]

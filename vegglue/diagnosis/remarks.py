@@ -12,6 +12,8 @@ from vegglue.screening.places import LEAST_DEPTH
 IMPLAUSIBLE = 3.0
 # Names that a remark holds at most.
 NAMES_SHOWN = 8
+# Names that it holds of each group, where they are more.
+NAMES_OF_GROUP = 3
 TOO_SHALLOW = (
     "Nothing was looked for at a place, and no law was tried: nowhere is the water deeper than "
     f"{100 * LEAST_DEPTH:g} cm."
@@ -53,9 +55,8 @@ def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement
     told = {name for group in grounds.not_excluded for name in group} | {*effects}
     hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
     if hidden:
-        names = ", ".join(_untestable(suspect) for suspect in hidden)
         also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
-        remarks.append(f"Untestable with these data{also}, neither present nor absent: {names}.")
+        remarks.append(f"Untestable with these data{also}, neither present nor absent: {_untestable(hidden)}.")
     return remarks
 
 
@@ -87,6 +88,21 @@ def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str
     ]
 
 
-def _untestable(suspect: Suspect) -> str:
-    alike = suspect.detectability.looks_like
-    return f"{suspect.name} (looks like a change of {alike})" if alike else suspect.name
+def _untestable(hidden: Sequence[Suspect]) -> str:
+    """The effects by what they look like; of many their number, and a few names of the largest groups."""
+    alike: dict[str, list[str]] = {}
+    for one in hidden:
+        alike.setdefault(one.detectability.looks_like, []).append(one.name)
+    groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
+    if len(hidden) <= NAMES_SHOWN:
+        return "; ".join(_group(names, parameter, len(hidden)) for parameter, names in groups)
+    shown = "; ".join(_group(names, parameter, NAMES_OF_GROUP) for parameter, names in groups)
+    return f"{len(hidden)} effects: {shown}. The table of effects on the page of the run (`vegglue report`) lists all"
+
+
+def _group(names: Sequence[str], parameter: str, most: int) -> str:
+    """`wind, steep_bank and 12 more (look like a change of n_b)`."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    verb = "look" if len(names) > 1 else "looks"
+    why = f" ({verb} like a change of {parameter})" if parameter else ""
+    return f"{', '.join(names[:most])}{more}{why}"
