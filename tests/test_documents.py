@@ -104,6 +104,30 @@ def lines_of_shell(page: Path) -> list[str]:
     return [line for line in [*shown, *spoken] if line.startswith("vegglue ")]
 
 
+def table_of_options() -> dict[str, set[str]]:
+    """Options of each command as the table of docs/commands.md has them."""
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8").partition("### Which command takes which")[2]
+    heading, _, *rows = ([cell.strip() for cell in row[1:-1].split("|")] for row in re.findall(r"^\|.*\|$", text, re.M))
+    shared = [cell.strip("`") for cell in heading[1:-1]]
+    found = {}
+    for command, *marks, own in rows[: next(i for i, row in enumerate(rows) if row[0] == "exit code")]:
+        marked = {option for option, mark in zip(shared, marks, strict=True) if mark == "x"}
+        found[command.strip("`")] = marked | set(re.findall(r"--[a-z]+", own))
+    return found
+
+
+def test_the_table_of_options_is_true() -> None:
+    """Every option of every command, by the shell itself; two that all take stand above the table."""
+    commands = typer.main.get_group(app).commands
+    everywhere = {"--quiet", "--json"}
+    options = {
+        name: {option for parameter in command.params for option in parameter.opts if option.startswith("--")}
+        for name, command in commands.items()
+    }
+    assert {name for name, own in options.items() if not everywhere <= own} == {"version"}
+    assert table_of_options() == {name: own - everywhere for name, own in options.items() if name != "version"}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_and_options_that_are_shown_exist(page: Path) -> None:
     commands = typer.main.get_group(app).commands
