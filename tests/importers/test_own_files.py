@@ -381,6 +381,7 @@ def test_import_says_which_measurements_lack_errors(
     folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv="x;y;Vx (cm/s)\n8;0;21\n")
     code, told = said_to(monkeypatch, capsys, "import", "brook", "--quiet")
     assert code == 0
+    assert told.startswith("`infer`, `diagnose` and `run` will refuse this: "), "as `check` says"
     assert "no standard error is stated for 1 of velocity, the first at x = 8, y = 0 m: add a column `u_se`" in told
     assert "`files: {NAME.csv: {standard_error: 5 mm}}`" in told
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from vegglue.case.case_effects import effect_of
 from vegglue.case.consistency import values
@@ -42,14 +43,19 @@ def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]
     used = table[table["used"].astype(bool)]
     if len(used) < len(case.parameters):
         yield f"{len(used)} used observations cannot settle {len(case.parameters)} parameters."
-    if (unstated := unstated_errors(table)) is not None:
-        refusing = "`infer`, `diagnose` and `run`" if case.infer.sigma == "known" else "`diagnose` and `run`"
-        yield f"{refusing} will refuse this: {unstated}"
+    yield from refused_for_errors(case, table)
     for name in case.experiments:
         if not (used["experiment"] == name).any():
             yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."
     for row in table[~table["used"].astype(bool) & (table["reason"] != OUTSIDE)].to_dict("records"):
         yield f"The {station_in_words(row)} is not used: {row['reason']}."
+
+
+def refused_for_errors(case: Case, table: pd.DataFrame) -> Iterator[str]:
+    """Which commands refuse stations whose standard errors nobody states; nothing where all are stated."""
+    if (unstated := unstated_errors(table)) is not None:
+        refusing = "`infer`, `diagnose` and `run`" if case.infer.sigma == "known" else "`diagnose` and `run`"
+        yield f"{refusing} will refuse this: {unstated}"
 
 
 def remarks_on_kept_fields(case: Case, site: Site) -> Iterator[str]:

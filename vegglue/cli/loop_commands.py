@@ -40,8 +40,8 @@ def import_command(
     from vegglue.workflow.import_folder import assumptions_of, unnamed_banks, without_errors
 
     assumed, unstated = [*assumptions_of(folder), *unnamed_banks(case)], without_errors(case)
-    if unstated is not None:
-        print(f"`diagnose` and `run` will refuse this: {unstated}", file=sys.stderr)
+    for sentence in unstated:
+        print(sentence, file=sys.stderr)
     if as_object:
         names = {"experiments": list(case.experiments), "patches": patches, "parameters": list(case.parameters)}
         print_object({"config": target, "case": case.name, **names, "imported": imported, "assumed": assumed})

@@ -11,12 +11,12 @@ from vegglue.case.made_files import refuse_not_made, write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
 from vegglue.checks.channel_and_plants import remarks_on_unnamed_banks
+from vegglue.checks.ensemble_and_priors import refused_for_errors
 from vegglue.errors import InputError
 from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
-from vegglue.measurements.kinds import unstated_errors
 from vegglue.measurements.observations import read_observations
 from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_trial import refuse_unreadable_import
@@ -58,9 +58,9 @@ def assumptions_of(folder: Path | str) -> list[str]:
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 
-def without_errors(case: Case) -> str | None:
-    """Which measurements state no standard error, which the loop needs; None where all do."""
-    return unstated_errors(read_observations(case).table)
+def without_errors(case: Case) -> list[str]:
+    """Which measurements state no standard error, and who refuses them; nothing where all do."""
+    return list(refused_for_errors(case, read_observations(case).table))
 
 
 def unnamed_banks(case: Case) -> list[str]:
