@@ -136,6 +136,17 @@ def test_a_wrong_outlet_or_discharge_is_said(tmp_path: Path) -> None:
     assert [sentence.split(":")[0][:20] for sentence in litres] == ["15 values of velocit", "The discharge 2.03 m"]
 
 
+def test_errors_are_not_held_against_a_discharge_that_is_in_doubt(tmp_path: Path) -> None:
+    """Velocities across share the section of those along x, and so what is said of it."""
+
+    def across(table: pd.DataFrame) -> pd.DataFrame:
+        along = table[table["kind"] == "velocity"]
+        return pd.concat([table, along.assign(kind="velocity_across", value=0.01)], ignore_index=True)
+
+    litres = said_of(tmp_path, across, ("discharge: 2.0", "discharge: 2000"))
+    assert [sentence.split(":")[0][:20] for sentence in litres] == ["15 values of velocit", "The discharge 2.03 m"]
+
+
 def test_an_uncertain_discharge_is_taken_at_its_bounds(tmp_path: Path) -> None:
     """3.3 times the stated discharge looks like feet, unless so much is within the prior."""
     wide = "  q: {distribution: loguniform, low: 0.5, high: 9, unit: m3/s}\n  phi:"

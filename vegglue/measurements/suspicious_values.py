@@ -11,7 +11,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
-from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of
+from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.plausible_flow import PlausibleFlow, plausible_flow
 from vegglue.measurements.suspicion_in_words import outlet_in_words, suspicions_in_words
 from vegglue.site.gridded_site import Site, in_experiment
@@ -69,10 +69,12 @@ def absurd_values(case: Case, site: Site, station: pd.DataFrame) -> list[str]:
         if flow.depth > DEEPEST_CHANNEL * flow.width or flow.fastest[-1] < STANDING_WATER:
             sentences.append(outlet_in_words(str(name), flow))
             continue
-        for (kind, _), group in rows.groupby(["kind", "section"], sort=False):
-            wrong = _with_verdicts(group, _values_judge(str(kind))(flow, group)).assign(depth=flow.depth)
-            sound = group[~group.index.isin(wrong.index)]  # elsewhere the scale of the errors is in doubt
-            judged += [wrong, _with_verdicts(sound, _errors_judged(flow, sound))]
+        groups = [(str(kind), group) for (kind, _), group in rows.groupby(["kind", "section"], sort=False)]
+        wrong = pd.concat([_with_verdicts(group, _values_judge(kind)(flow, group)) for kind, group in groups])
+        judged.append(wrong.assign(depth=flow.depth))
+        doubted = _of_doubted_scale(rows, wrong)
+        sound = [group[~group.index.isin(doubted)] for _, group in groups]
+        judged += [_with_verdicts(group, _errors_judged(flow, group)) for group in sound]
     return sentences + (suspicions_in_words(_of_one_datum(pd.concat(judged)), used) if judged else [])
 
 
@@ -80,6 +82,15 @@ def _with_verdicts(group: pd.DataFrame, verdicts: list[Judged]) -> pd.DataFrame:
     problem, times = [problem for problem, _ in verdicts], [times for _, times in verdicts]
     table = group.assign(problem=problem, times=times)
     return table[table["problem"] != ""]
+
+
+def _of_doubted_scale(rows: pd.DataFrame, wrong: pd.DataFrame) -> pd.Index:
+    """Rows of an experiment against which errors are not held: those that are wrong themselves, and every velocity of
+    a section whose velocities do not go with the discharge.
+    """
+    off = wrong[wrong["problem"].str.match("fast|slow")]
+    same = velocity_rows(rows) & rows["section"].isin(off["section"]).to_numpy(bool)
+    return wrong.index.union(rows.index[same])
 
 
 def _values_judge(kind: str) -> Callable[[PlausibleFlow, pd.DataFrame], list[Judged]]:
