@@ -10,6 +10,7 @@ import pytest
 from vegglue.case.config import load_case
 from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, _with_other_discharges, planned
 from vegglue.engine.interface import Model
+from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.gridded_site import in_experiment
 from vegglue.workflow.run_folder import model_in
 
@@ -96,6 +97,26 @@ def test_another_discharge_flows_over_the_bed_of_the_experiment_it_is_like(model
 
     assert depth(lower) == pytest.approx(0.25**LEVEL_POWER * depth(low))
     assert depth(higher) == pytest.approx(HIGHER[0] ** LEVEL_POWER * depth(high))
+
+
+def test_no_vertical_is_planned_where_a_lower_discharge_leaves_it_dry(model: Model) -> None:
+    """A section was planned, and its hours counted, as at the highest discharge, beside the water too."""
+    wide, plans = planned(model, _with_other_discharges(model, (0.25,)))
+    lower, higher = (
+        [plan for plan in plans if "the section" in plan.name and plan.experiment == name]
+        for name in wide.case.experiments
+        if name not in model.case.experiments
+    )
+    assert 0 < len(lower) == len(higher)
+    grid = wide.site.grid
+    for plan, full in zip(lower, higher, strict=True):
+        site = in_experiment(wide.site, plan.experiment)
+        depth = expected_depth(wide.case, site, wide.case.experiments[plan.experiment])
+        at = abs(grid.x - plan.x).argmin(), [abs(grid.y - y).argmin() for y in plan.stations["y"]]
+        assert (depth[at] > 0).all()
+        assert 0 < len(plan.stations) <= len(full.stations)
+        assert plan.hours == pytest.approx(full.hours - HOURS["vertical"] * (len(full.rows) - len(plan.rows)))
+    assert sum(len(plan.rows) for plan in lower) < sum(len(full.rows) for full in higher)
 
 
 def test_sections_of_one_experiment_are_two_however_near(model: Model) -> None:

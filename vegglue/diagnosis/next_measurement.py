@@ -26,6 +26,7 @@ from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
+from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.gridded_site import Site, in_experiment
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
@@ -113,13 +114,14 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
     tables, plans, count = [model.station], [], len(model.station)
     velocity = model.station[velocity_rows(model.station) & model.station["used"]]
     velocity = velocity.assign(x=section_places(velocity))
-    for plan_name, experiment, x, y, kind, hours in _ideas(model, case, velocity):
+    wide = replace(model, case=case, site=_with_beds(model, case))
+    for plan_name, experiment, x, y, kind, hours in _ideas(wide, list(model.case.experiments), velocity):
         table = _stations(experiment, plan_name, x, y, kind)
         rows = np.arange(count, count + len(table))
         plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment))
         tables.append(table)
         count += len(table)
-    return replace(model, case=case, site=_with_beds(model, case), station=pd.concat(tables, ignore_index=True)), plans
+    return replace(wide, station=pd.concat(tables, ignore_index=True)), plans
 
 
 def _with_beds(model: Model, case: Case) -> Site:
@@ -129,29 +131,41 @@ def _with_beds(model: Model, case: Case) -> Site:
     return replace(model.site, own={**own, **model.site.own})
 
 
-def _ideas(model: Model, case: Case, velocity: pd.DataFrame) -> list[tuple[str, str, float, Array, str, float]]:
+def _ideas(
+    model: Model, at_hand: Sequence[str], velocity: pd.DataFrame
+) -> list[tuple[str, str, float, Array, str, float]]:
     """Name, experiment, x, y, kind and hours of every measurement worth a thought; sections as those that were
-    measured, none where no velocity was.
+    measured, as far as water reaches, none where no velocity was. model: with further experiments behind those at hand.
     """
-    usual, y = next(reversed(model.case.experiments)), _verticals(velocity)
+    usual, y = at_hand[-1], _verticals(velocity)
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(places[1] - places[0])
-    taken = _measured_sections(velocity, list(model.case.experiments), near)
+    taken = _measured_sections(velocity, at_hand, near)
     new = [float(x) for x in places if taken and min(abs(x - there) for there, _ in taken) > near]
-    ideas = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, STREAMWISE, _hours(y)) for x in new]
+    sections = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, 0.0) for x in new]
+    for x, here in taken:
+        at = f"the section at x = {round(x, 2):g} m"
+        sections.append((f"{at} again ({usual})", usual, x, here, 0.0))
+        others = [name for name in model.case.experiments if name not in at_hand]
+        sections += [(f"{at} {experiment}", experiment, x, here, HOURS["discharge"]) for experiment in others]
+    ideas = [
+        (name, experiment, x, wet, STREAMWISE, _hours(wet) + more)
+        for name, experiment, x, y, more in sections
+        if (wet := _in_water(model, experiment, x, y)).size
+    ]
     middle = np.array([_middle(y if y.size else np.array(model.case.grid.y))])
-    ideas += [
+    return ideas + [
         (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, HOURS["gauge"])
         for x in places[::2]
     ]
-    others = [name for name in case.experiments if name not in model.case.experiments]
-    for x, here in taken:
-        at = f"the section at x = {round(x, 2):g} m"
-        ideas.append((f"{at} again ({usual})", usual, x, here, STREAMWISE, _hours(here)))
-        more = _hours(here) + HOURS["discharge"]
-        ideas += [(f"{at} {experiment}", experiment, x, here, STREAMWISE, more) for experiment in others]
-    return ideas
+
+
+def _in_water(model: Model, experiment: str, x: float, y: Array) -> Array:
+    """Those of the verticals at y that the water of an experiment covers at x [m], as `expected_depth` has it."""
+    site, grid = in_experiment(model.site, experiment), model.site.grid
+    depth = expected_depth(model.case, site, model.case.experiments[experiment])[np.abs(grid.x - x).argmin()]
+    return y[depth[np.abs(grid.y[:, None] - y).argmin(axis=0)] > model.case.numerics.film_depth]
 
 
 def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near: float) -> list[tuple[float, Array]]:
