@@ -58,6 +58,27 @@ def test_each_of_several_experiments_is_a_task_so_that_chunks_may_be_larger(
     assert chunk_size(members, experiments) == size
 
 
+RISEN = (
+    ("  phi: {dist", "  rise: {distribution: normal, mean: 0, sd: 0.1, low: -0.3, high: 0.3, unit: m}\n  phi: {dist"),
+    ("simulate:", "effects: {floor_level_error: {values: {rise: rise}}}\nsimulate:"),
+)
+
+
+@pytest.mark.parametrize("sparse", [0, 256])
+def test_members_may_have_beds_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sparse: int) -> None:
+    """It was a traceback: the beds of all were held against the levels of those that were done. From a member they all
+    come from, and from coarser cells.
+    """
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.SPARSE_MEMBERS", sparse)
+    case = load_case(write_reach(tmp_path, COARSE, *RISEN, ("members: 1024", "members: 24")))
+    observations, sample = read_observations(case), sobol_sample(case)
+    found = solved_members(case, observations, sample, 1)
+    assert np.ptp(sample.theta["rise"]) > 0.2
+    for member in (3, 17):
+        alone = solved_members(case, observations, sample.take(np.array([member])), 1)
+        np.testing.assert_allclose(found[member], alone[0], atol=1e-4)
+
+
 def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two experiments, alike but for the level at the outlet: each has its own predictions, whichever ends first."""
     case = load_case(write_reach(tmp_path, COARSE))

@@ -183,7 +183,7 @@ def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, s
 
     def keep(members: np.ndarray, ended: ChordSolution) -> None:
         solved.iterations[members] += ended.iterations
-        good = ended.converged & ~overflows(part, ended.state, band, ny)
+        good = ended.converged & ~overflows(take(part, members), ended.state, band, ny)
         solved.status[members[good]] = SOLVED_BY_NEWTON
         put_rows(np.moveaxis(solved.state, -1, 0), members, good, ended.state, *band)
 

@@ -131,7 +131,7 @@ def _delivered(level: _Level, part: Problem, band: tuple[int, int], members: np.
     """Members kept that converged within the band."""
     level.solved.iterations[members] += ended.iterations
     rows = level.problem.shape[1]
-    good = ended.converged & ~overflows(part, ended.state, band, rows)
+    good = ended.converged & ~overflows(take(part, members), ended.state, band, rows)
     if good.any():
         level.keep(members[good], widen(ended.state[..., good], rows, band))
     for lane in np.flatnonzero(~good & (ended.correction < CLOSE)):

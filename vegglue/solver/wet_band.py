@@ -32,7 +32,10 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
 
 
 def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np.ndarray:
-    """Whether water stands in an outermost row of the band, where a wall is that the problem does not have (m,)."""
+    """Whether water stands in an outermost row of the band, where a wall is that the problem does not have (m,).
+
+    part: of the members whose states are given.
+    """
     above = above_bed(part, state[:, LEVEL])
     south = (above[:, 0].max(axis=0) > 0.0) & (band[0] > 0)
     north = (above[:, -1].max(axis=0) > 0.0) & (band[1] < ny)
