@@ -70,6 +70,13 @@ def test_words_tell_scores_before_and_after() -> None:
     assert diagnosis_section(a_diagnosis()).flagged[0].measured == "0.500"
 
 
+def test_what_leaves_no_trace_is_never_detected() -> None:
+    """The page said: from 4.9·10³⁰⁰ m."""
+    found = a_diagnosis((a_suspect("bank_trend", detectability={"smallest": 4.9e300, "testable": False}),))
+    (row,) = diagnosis_section(found).suspects
+    assert row.detectable == "never"
+
+
 def test_what_a_later_step_accepts_has_its_chance() -> None:
     second = Step("mixing[D3]", ("mixing[D3]",), (1.0,), (("mixing[D3]",),), 9.0, 1.0, 0.0)
     found = replace(a_diagnosis(), steps=(*a_diagnosis().steps, second))

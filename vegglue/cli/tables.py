@@ -15,8 +15,6 @@ from vegglue.workflow.compare import Comparison
 
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
-# An amplitude that no data show, see `detectability`: its trace has no length.
-NEVER = 1e100
 
 
 def show_diagnosis(found: Diagnosis) -> None:
@@ -55,7 +53,7 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
         " -> ".join(f"{score:+.1f}" for score in scores if np.isfinite(score)),
         "" if np.isnan(p) else f"< {p:.1g}" if p < 5e-4 else f"{p:.2g}",
         f"{detectability.visibility:.2f}",
-        f"{detectability.smallest:.2g}" if detectability.smallest < NEVER else "never",
+        f"{detectability.smallest:.2g}" if detectability.ever else "never",
     )
 
 

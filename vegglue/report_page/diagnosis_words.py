@@ -132,7 +132,7 @@ def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
         p_family=p_value_html(diagnosis.p_of_score(suspect)),
         score=" → ".join(fixed(score, 1) for score in scores if np.isfinite(score)),
         visibility=fixed(detectability.visibility, 2),
-        detectable=short(detectability.smallest, 2) + unit,
+        detectable=short(detectability.smallest, 2) + unit if detectability.ever else "never",
         looks_like=html.escape(alike) if alike in diagnosis.parameters.first else "",
     )
 

@@ -7,6 +7,8 @@ import numpy as np
 # |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
 # its trace (cos^2 = 0.64).
 LOOKS_LIKE_FROM = 0.8
+# A smallest size from which on no data show an effect, see `Detectability`.
+NEVER = 1e100
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,11 @@ class Detectability:
     testable: bool
     confounder: str
     cosine: float
+
+    @property
+    def ever(self) -> bool:
+        """Whether any size of it shows: a trace without length has a smallest size of some 1e300."""
+        return self.smallest < NEVER
 
     @property
     def looks_like(self) -> str:
