@@ -383,7 +383,7 @@ def test_import_says_which_measurements_lack_errors(
     assert code == 0
     assert told.startswith("`infer`, `diagnose` and `run` will refuse this: "), "as `check` says"
     assert "no standard error is stated for 1 of velocity, the first at x = 8, y = 0 m: add a column `u_se`" in told
-    assert "`files: {NAME.csv: {standard_error: 5 mm}}`" in told
+    assert "`files: {NAME.csv: {standard_error: 0.015 m/s}}`" in told, "in a unit of what lacks them"
 
 
 @pytest.mark.parametrize(("slope", "beyond"), [(1.0, 0.2), (0.5, 0.2), (0.15, 0.075)])

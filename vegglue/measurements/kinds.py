@@ -111,10 +111,12 @@ def unstated_errors(station: pd.DataFrame) -> str | None:
     if bare.empty:
         return None
     kinds = [(kind_of(str(name)), int(count)) for name, count in bare.groupby("kind", sort=False).size().items()]
+    one = kinds[0][0]
     first = f"x = {bare['x'].iloc[0]:g}, y = {bare['y'].iloc[0]:g} m"
     return (
         f"no standard error is stated for {listed([f'{count} of {kind.words}' for kind, count in kinds])}, "
         f"the first at {first}: add "
         f"{listed([f'a column `{kind.error_column}`' for kind, _ in kinds])}, or say it in the site "
-        "file, `files: {NAME.csv: {standard_error: 5 mm}}`; in a config, as `standard_error` of the observation."
+        f"file, as in `files: {{NAME.csv: {{standard_error: {one.usual_error:g} {one.unit}}}}}`; in a config, as "
+        "`standard_error` of the observation."
     )
