@@ -14,7 +14,7 @@ from vegglue.case.parameter_space import parameters_at, sample_at
 from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.case.schema import Case
 from vegglue.ensemble.solve_chunk import solve_chunk
-from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, solve_ensemble, starts_and_chunks
+from vegglue.ensemble.solve_ensemble import LARGEST_CHUNK, solve_ensemble, solved_members, starts_and_chunks
 from vegglue.flow.problem import Problem
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
@@ -24,7 +24,7 @@ from vegglue.solver.block_elimination import minimise
 from vegglue.solver.chord import ChordSolution, stream
 from vegglue.solver.jacobian import eliminate
 from vegglue.solver.member_states import blend, put_rows
-from vegglue.solver.parameter_metric import clusters, principal_axes
+from vegglue.solver.parameter_metric import clusters, principal_axes, spline_weights
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import widen
 from vegglue.storage.result_files import read_ensemble
@@ -58,6 +58,25 @@ def test_clusters_hold_every_member_once_and_evenly(members: int, size: int) -> 
     assert max(sizes) <= size
     assert len(cut) == -(-members // size)
     assert max(sizes) - min(sizes) <= max(2, 0.2 * size)
+
+
+@pytest.mark.parametrize("sparse", [0, 256])
+def test_members_at_an_end_of_a_prior_are_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sparse: int) -> None:
+    """It was a traceback: no spline leads through members of which one parameter is the same."""
+    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.SPARSE_MEMBERS", sparse)
+    case, _, observations = reach_at(tmp_path)
+    points = points_of(case, 40)
+    points[:, 0] = 1.0
+    found = solved_members(case, observations, sample_at(case, points), 1)
+    assert np.isfinite(found).all()
+
+
+def test_splines_are_left_out_where_members_coincide() -> None:
+    known = np.random.default_rng(2).random((20, 3))
+    weights = spline_weights(known, known[:2] + 0.01, "cubic", 1)
+    assert weights is not None
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    assert spline_weights(np.vstack([known, known[:1]]), known[:2], "cubic", 1) is None
 
 
 def test_clusters_cope_with_members_at_one_place() -> None:

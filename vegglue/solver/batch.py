@@ -18,6 +18,7 @@ from vegglue.solver.parameter_metric import (
     farthest_first,
     nearest_members,
     parameter_metric,
+    spline_weights,
     squared_distances,
 )
 from vegglue.solver.reference_member import (
@@ -195,20 +196,19 @@ def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, s
 
 
 def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedMembers, members: np.ndarray) -> Array:
-    """Cubic splines through the solved members nearest to the reference, its tangents while there are too few; in its
-    band.
+    """Cubic splines through the solved members nearest to the reference, its tangents while there are too few, or
+    these lie in a plane; in its band.
     """
     assert reference.linearised is not None
     coordinates = metric.coordinates
     by_newton = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
     near = nearest_members(coordinates, by_newton, reference.linearised.point @ metric.axes, SPLINE_MEMBERS)
-    if near.size < 3 * (coordinates.shape[1] + 1):
+    weights = None
+    if near.size >= 3 * (coordinates.shape[1] + 1):
+        weights = spline_weights(coordinates[near], coordinates[members], "cubic", 1)
+    if weights is None:
         return rows_inside(reference.linearised.predict(metric.points[members]), reference.band)
-    from scipy.interpolate import RBFInterpolator  # late: what only looks at a solved run need not wait for it
-
-    spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel="cubic", degree=1)
-    blended = blend(np.moveaxis(solved.state, -1, 0), near, spline(coordinates[members]), *reference.band)
-    return walled(blended)
+    return walled(blend(np.moveaxis(solved.state, -1, 0), near, weights, *reference.band))
 
 
 def _reached_by_strides(

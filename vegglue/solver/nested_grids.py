@@ -27,7 +27,7 @@ from vegglue.solver.batch import (
 from vegglue.solver.chord import SIDE_BY_SIDE, ChordSolution, Patience, stream
 from vegglue.solver.march import FallBack
 from vegglue.solver.newton import CLOSE
-from vegglue.solver.parameter_metric import metric_of_flows, nearest_members, squared_distances
+from vegglue.solver.parameter_metric import metric_of_flows, nearest_members, spline_weights, squared_distances
 from vegglue.solver.prolongation import lifted_flows
 from vegglue.solver.reference_member import ProblemOf, solve_alone
 from vegglue.solver.status import FAILED, SOLVED_BY_NEWTON
@@ -139,18 +139,16 @@ def _delivered(level: _Level, part: Problem, band: tuple[int, int], members: np.
 
 
 def _estimates(level: _Level, members: np.ndarray) -> Array:
-    """P x_c + d of some members (nx, 3, ny, n), d from splines through the solved members nearest to them."""
+    """P x_c + d of some members (nx, 3, ny, n), d from splines through the solved members nearest to them, if any."""
     start = np.ascontiguousarray(level.lifted[..., members])
     done = np.flatnonzero((level.solved.status == SOLVED_BY_NEWTON) & level.known)
     if not done.size:
         return start
-    from scipy.interpolate import RBFInterpolator  # late: what only looks at a solved run need not wait for it
-
     coordinates = level.coordinates
     near = nearest_members(coordinates, done, coordinates[members].mean(axis=0), SPLINE_MEMBERS)
     kernel, degree = ("cubic", 1) if near.size >= 3 * (coordinates.shape[1] + 1) else ("linear", 0)
-    spline = RBFInterpolator(coordinates[near], np.eye(near.size), kernel=kernel, degree=degree)
-    return start + blend(level.changed, near, spline(coordinates[members]), 0, start.shape[2])
+    weights = spline_weights(coordinates[near], coordinates[members], kernel, degree)
+    return start if weights is None else start + blend(level.changed, near, weights, 0, start.shape[2])
 
 
 def _starts(level: _Level, members: np.ndarray) -> Array:

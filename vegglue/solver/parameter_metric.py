@@ -15,6 +15,8 @@ from vegglue.arrays import Array
 # The shortest axis over the longest [-]: no parameter is left out of account. Chosen, not measured: with less a cluster
 # holds members that differ much in what changes flows little.
 SHORTEST_AXIS = 0.1
+# Weights of a spline [-], which add up to 1, that tell of known members all but at one place: chosen, not measured.
+LARGEST_WEIGHT = 1e3
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,19 @@ def farthest_first(coordinates: Array, pending: np.ndarray, centre: Array) -> np
 def nearest_members(coordinates: Array, some: np.ndarray, centre: Array, most: int) -> np.ndarray:
     """Of some members, those nearest to one of these coordinates, the nearest first."""
     return some[np.argsort(squared_distances(coordinates[some], centre), kind="stable")[:most]]
+
+
+def spline_weights(known: Array, wanted: Array, kernel: str, degree: int) -> Array | None:
+    """Weights (n, k) that take values at known coordinates (k, d) to wanted ones (n, d); None where no spline is worth
+    it: known ones coincide, or lie in a plane, as at an end of a prior.
+    """
+    from scipy.interpolate import RBFInterpolator  # late: what only looks at a solved run need not wait for it
+
+    try:
+        weights = np.asarray(RBFInterpolator(known, np.eye(len(known)), kernel=kernel, degree=degree)(wanted))
+    except np.linalg.LinAlgError:
+        return None
+    return weights if np.abs(weights).max() < LARGEST_WEIGHT else None
 
 
 def squared_distances(coordinates: Array, centre: Array) -> Array:
