@@ -16,7 +16,7 @@ from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
-from vegglue.results.diagnosis import Diagnosis, Step
+from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import ProposedMeasurement, Question
 
@@ -170,6 +170,17 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
     assert any("vegglue extend toy.yaml --auto" in step for step in asked)
     assert any("vegglue next toy.yaml" in step for step in asked)
+
+
+def test_no_field_work_is_proposed_before_wrong_measurements_are_mended(toy: Run) -> None:
+    """Of velocities in cm/s read as m/s the page said to measure another section for six hours."""
+    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    question = Question("eddies from a change of k_s", (GAUGE,))
+    steps = [
+        plain(step) for step in next_steps(replace(toy, diagnosis=doubted, loop=LoopResults(questions=(question,))))
+    ]
+    assert "Mend the measurements first. vegglue check toy.yaml says all that is odd of them." in steps
+    assert not any("field work" in step for step in steps)
 
 
 def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:

@@ -1,13 +1,16 @@
 """Of three rivals and more, what tells one from all others is proposed where nothing tells all apart."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from diagnoses import a_diagnosis
 
 from vegglue.diagnosis.next_measurement import MeasurementWorth, _least
-from vegglue.workflow.next_measurement import _answers
+from vegglue.results.diagnosis import BEFORE_ALL_ELSE
+from vegglue.workflow.next_measurement import _answers, _questions
 
 
 def rival(name: str) -> Any:
@@ -21,6 +24,12 @@ def worth(name: str, then: list[float], hours: float = 2.0) -> MeasurementWorth:
 
 THREE = [rival("depth"), rival("even"), rival("trend")]
 FAR, SHALLOW = worth("a section far off", [0.2, 0.2, 9.0]), worth("a lower discharge", [5.0, 0.3, 0.3], hours=8.0)
+
+
+def test_nothing_is_asked_of_data_that_are_in_doubt() -> None:
+    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    case: Any = SimpleNamespace()
+    assert _questions(case, replace(doubted, steps=a_diagnosis().steps)) == []
 
 
 def test_what_tells_one_rival_from_all_others_is_proposed_for_it() -> None:

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
 from vegglue.in_short import so_many
+
+if TYPE_CHECKING:
+    from vegglue.results.diagnosis import Diagnosis
 
 
 def import_command(
@@ -72,9 +75,16 @@ def diagnose_command(
         found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
     tell(case, runs, found, as_object)
     if not (quiet or as_object):
-        found_something = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
-        following = ("discover", config) if found.verdict.tells_laws else found_something
-        print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
+        print(f"Next: {_after(found, config, runs, trust)}")
+
+
+def _after(found: "Diagnosis", config: Path, runs: Path, trust: bool) -> str:
+    """The command that goes on from a diagnosis, or what is to be done before."""
+    if found.verdict.doubts_the_data:
+        return f"mend these measurements; {command_line('check', config)} says all that is odd"
+    found_something = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
+    following = ("discover", config) if found.verdict.tells_laws else found_something
+    return command_line(*following, runs=runs, trust=trust)
 
 
 def discover_command(

@@ -108,6 +108,6 @@ def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
 def show_questions(name: str, found: Sequence[Question]) -> None:
     """For each question about a model the four best measurements, or why none would do."""
     if not found:
-        console().print(f"{name}: nothing is left to be told apart; no further measurement is proposed.")
+        console().print(f"{name}: no measurement is proposed; its diagnosis leaves no rivals to be told apart.")
     for question in found:
         console().print(repr(question))

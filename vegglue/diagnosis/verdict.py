@@ -22,7 +22,7 @@ from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.results.causes import LawsSuspected
-from vegglue.results.diagnosis import Misfit, Suspect, Verdict, VerdictKind
+from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -61,7 +61,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
 def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     found, misfit = grounds.findings, grounds.misfit
     if found.absurd:
-        return Statement("cannot-tell", f"Before anything can be said of the model: {found.absurd[0]}")
+        return Statement("cannot-tell", BEFORE_ALL_ELSE + found.absurd[0])
     doubt = _doubt(grounds, suspects)
     named = causes_in_words(found, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)

@@ -53,6 +53,9 @@ def _page_of(run: Run, step: LadderStep) -> str:
 def _measurements(run: Run) -> Iterator[str]:
     """What to measure, and what no single measurement would settle."""
     questions = run.loop.questions
+    if run.behind is not None and run.behind.verdict.doubts_the_data:
+        yield f"Mend the measurements first. {command_about(run, 'check')} says all that is odd of them."
+        return
     if questions is None:
         yield f"{command_about(run, 'next')} says what to measure next."
         return

@@ -61,6 +61,10 @@ class Step:
         return best if best and self.others[best] > max(groups) else ""
 
 
+# How a sentence begins that tells of measurements which no flow of the case can show.
+BEFORE_ALL_ELSE = "Before anything can be said of the model: "
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What was concluded. location: of something that no listed effect explains, None without; not_excluded: groups
@@ -76,6 +80,11 @@ class Verdict:
     not_excluded: tuple[tuple[str, ...], ...]
     clears_the_model: bool
     tells_laws: bool
+
+    @property
+    def doubts_the_data(self) -> bool:
+        """Whether measurements that no flow of the case can show stand before all else."""
+        return self.sentence.startswith(BEFORE_ALL_ELSE)
 
 
 @dataclass(frozen=True)

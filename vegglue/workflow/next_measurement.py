@@ -112,7 +112,9 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
 
 
 def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
-    """What the diagnosis leaves open, in words, and the rivals of each question."""
+    """What the diagnosis leaves open, in words, and the rivals of each question; nothing of data that it doubts."""
+    if found.verdict.doubts_the_data:
+        return []
     if found.steps:
         return [
             _between_rivals(case, found, step) for step in found.steps if len(step.rivals) > 1 or step.likelier_place
