@@ -16,6 +16,7 @@ from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
 from vegglue.report_page.section_pictures import safe_json
+from vegglue.report_page.tables import station_rows
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import ProposedMeasurement, Question
@@ -242,6 +243,16 @@ def test_the_answer_stands_before_all_else(toy: Run, tmp_path: Path) -> None:
     assert number is not None
     assert int(number[1]) == caveats.count('class="doubt"')
     assert a_diagnosis().verdict.remarks[0] in caveats
+
+
+def test_stations_are_told_as_well_as_they_were_measured(toy: Run) -> None:
+    """A point gauge read to half a millimetre was told to err by one, and no unit was told."""
+    table = toy.observations.table.assign(value=0.09718, standard_error=0.0005, kind="level", x=4.25)
+    row = station_rows(replace(toy, observations=replace(toy.observations, table=table)))[0]
+    assert row.measured.replace("\u202f", " ") == "0.09718 ± 0.00050 m"
+    assert row.x == "4.25"
+    unknown = replace(toy.observations, table=table.assign(standard_error=float("nan")))
+    assert station_rows(replace(toy, observations=unknown))[0].measured.startswith("0.097 ± –")
 
 
 def test_words_of_users_close_no_script() -> None:

@@ -130,7 +130,7 @@ def test_a_station_that_does_not_count_is_found_by_its_place(tmp_path: Path) -> 
     table.loc[9, ["used", "reason"]] = [False, SET_ASIDE]  # a gauge of the first experiment
     text = written(replace(toy, observations=replace(toy.observations, table=table)))
     assert "2 of 22 stations do not count" in text
-    assert f"<li>with, x = 5.0 m, y = 5.00 m: {SET_ASIDE}.</li>" in text
+    assert f"<li>with, x = 5.00 m, y = 5.00 m: {SET_ASIDE}.</li>" in text
     assert "quality control" not in text, "the diagnosis is none"
 
 

@@ -1,6 +1,7 @@
 """The tables of the page: parameters with reference values, stations, health of the run, how it was made."""
 
 import html
+import math
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ from vegglue.solver.status import FAILED, RUN_BY_COMMAND, STATUS_WORDS, members_
 
 # Answers of the column "Identified"; that there are too few members to tell is said in full.
 YES_NO = {"identified": "yes", "not identified": "no"}
+# Decimals of what was measured: 1 mm/s and 1 mm, or as many as a better instrument tells.
+FEWEST_DECIMALS, MOST_DECIMALS = 3, 5
 
 
 @dataclass(frozen=True)
@@ -195,20 +198,28 @@ def station_rows(run: Run) -> list[StationRow]:
 def _station_row(run: Run, index: int, row: pd.Series) -> StationRow:
     posterior = run.posterior
     low, middle, high = posterior.predicted.model_band[[0, 2, -1], index]
-    measured = f"{fixed(row['value'], 3)} ± {fixed(row['standard_error'], 3)}"
+    kind, places = kind_of(row["kind"]), _places_of(float(row["standard_error"]))
+    measured = f"{fixed(row['value'], places)} ± {fixed(row['standard_error'], places)}"
     return StationRow(
         str(row["experiment"]),
         str(row["section"]) or "–",
-        kind_of(row["kind"]).words,
-        fixed(row["x"], 1),
+        kind.words,
+        fixed(row["x"], 2),
         fixed(row["y"], 2),
         str(row["zone"]),
-        measured,
-        f"{fixed(middle, 3)} ({fixed(low, 3)} to {fixed(high, 3)})",
-        fixed(posterior.fit.residual[index], 3),
+        f"{measured}{NARROW}{kind.unit.replace('3', '³')}",
+        f"{fixed(middle, places)} ({fixed(low, places)} to {fixed(high, places)})",
+        fixed(posterior.fit.residual[index], places),
         fixed(posterior.fit.residual[index] / posterior.fit.noise[index], 1),
         str(row["reason"]),
     )
+
+
+def _places_of(error: float) -> int:
+    """Decimals that show two figures of an error, within these bounds; the fewest where it is unknown."""
+    if not error > 0.0:
+        return FEWEST_DECIMALS
+    return min(max(FEWEST_DECIMALS, 1 - math.floor(math.log10(error))), MOST_DECIMALS)
 
 
 def member_counts(ensemble: Ensemble) -> list[tuple[str, int, str]]:
