@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from vegglue.flow.sensor import FlowFields
+from vegglue.report_page.flow_pictures import channel_caption, scale_in_words
 from vegglue.report_page.pictures import range_of_figure
 
 
@@ -22,3 +24,21 @@ def test_a_figure_ends_where_values_do_or_at_the_bounds_they_come_near(
 
 def test_one_value_is_drawn_between_the_bounds() -> None:
     assert range_of_figure(np.array([2.0, 2.0]), (1.0, 5.0), False) == (1.0, 5.0)
+
+
+def test_a_plan_is_at_true_scale_where_its_words_would_say_once() -> None:
+    """The page said: y stretched 1 times."""
+    assert [scale_in_words(stretch) for stretch in (1.0, 1.02, 1.52)] == [
+        "at true scale", "at true scale", "y stretched 1.5 times"
+    ]  # fmt: skip
+
+
+def test_the_water_of_a_flume_falls_by_millimetres() -> None:
+    """The page said: by 0.01 m, and the depth from 0.10 to 0.10 m."""
+    x, y = np.linspace(0.1, 7.9, 40), np.linspace(-0.35, 0.35, 8)
+    bed = np.repeat(-0.001 * x[:, None], 8, axis=1)
+    level = np.repeat(np.linspace(0.0978, 0.0920, 40)[:, None], 8, axis=1)
+    flow = FlowFields(x, y, bed, level - bed, level, 0.3 + 0 * bed, 0 * bed)
+    caption = channel_caption(flow, "low", "")
+    assert "the water level falls 0.0058 m over 7.80 m" in caption
+    assert "the greatest depth goes from 0.0979 to 0.0999 m." in caption

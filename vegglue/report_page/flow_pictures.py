@@ -9,7 +9,7 @@ import pandas as pd
 from vegglue.case.text_files import told_apart
 from vegglue.figures.plan_view import Gauges, Outline, PlanWindow, draw_plan, draw_reach, stretch_of, wet_window
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import fixed, short
+from vegglue.figures.typography import short
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report_page.run import Run, file_name, planted_cells, published_svg, stamp
@@ -37,7 +37,7 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
     drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
     alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
-    caption = _channel_caption(flow, experiment, _of_engine(run))
+    caption = channel_caption(flow, experiment, _of_engine(run))
     yield published_svg(run, drawn, f"channel-{called}", caption, alt)
 
 
@@ -58,8 +58,7 @@ def _reach_caption(run: Run, experiment: str, window: PlanWindow) -> str:
         moves = (
             f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
         )
-    stretch = stretch_of(window)
-    scale = "at true scale" if stretch == 1.0 else f"y stretched {stretch:.2g} times"
+    scale = scale_in_words(stretch_of(window))
     return (
         f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, {scale}, "
         f"median parameters{_of_engine(run)}.{moves} Between two streamlines flows a tenth of the discharge; dots are "
@@ -67,18 +66,24 @@ def _reach_caption(run: Run, experiment: str, window: PlanWindow) -> str:
     )
 
 
+def scale_in_words(stretch: float) -> str:
+    """How a plan is drawn that is so many times wider than at true scale [-]."""
+    times = f"{stretch:.2g}"
+    return "at true scale" if times == "1" else f"y stretched {times} times"
+
+
 def _of_engine(run: Run) -> str:
     """Whose flow is drawn, where it is not that of the predictions: a command leaves none to draw."""
     return "" if run.case.engine is None else ", by the built-in engine"
 
 
-def _channel_caption(flow: FlowFields, experiment: str, engine: str) -> str:
+def channel_caption(flow: FlowFields, experiment: str, engine: str) -> str:
     wet = np.isfinite(flow.depth).any(axis=1)
     level, depth = np.nanmean(flow.level[wet], axis=1), np.nanmax(flow.depth[wet], axis=1)
     return (
         f"<b>The whole channel, experiment {html.escape(experiment)}</b> (y stretched{engine}): the water level falls "
-        f"{fixed(level[0] - level[-1], 2)} m over {np.ptp(flow.x[wet]):.0f} m, the greatest depth goes from "
-        f"{fixed(depth[0], 2)} to {fixed(depth[-1], 2)} m."
+        f"{short(level[0] - level[-1], 2)} m over {short(np.ptp(flow.x[wet]))} m, the greatest depth goes from "
+        f"{short(depth[0])} to {short(depth[-1])} m."
     )
 
 
