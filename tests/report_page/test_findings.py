@@ -17,7 +17,7 @@ from vegglue.report_page.measured_pictures import residuals
 from vegglue.report_page.posterior_words import parameter_in_words, weights_in_words
 from vegglue.report_page.prior_words import off_its_prior
 from vegglue.report_page.run import Run
-from vegglue.report_page.tables import fit_rows, parameter_rows
+from vegglue.report_page.tables import fit_rows, health_facts, parameter_rows
 from vegglue.results.posterior import Transfer
 
 pytestmark = pytest.mark.slow  # whole pages
@@ -161,6 +161,13 @@ def test_an_experiment_without_a_fit_of_its_own_is_said_to_have_none() -> None:
     )  # fmt: skip
     said = " ".join(homogeneity_in_words(changed(a_posterior(False), theta={"n_b": one}), found, {}))
     assert "15 together and not found alone over 15 stations (July)" in said
+
+
+def test_the_time_of_members_is_not_told_as_that_of_processors(toy: tuple[Run, str]) -> None:
+    """It goes by the clock, loops compiled and other work on the machine included."""
+    facts = dict(health_facts(toy[0]))
+    assert "time of all processes together" in facts
+    assert not any("processor" in name for name in facts)
 
 
 def test_a_tail_that_nobody_knows_has_no_index() -> None:

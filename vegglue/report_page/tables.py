@@ -268,7 +268,7 @@ def _work_done(ensemble: Ensemble) -> Iterator[tuple[str, str]]:
         yield "iterations of a solved member", f"{np.median(of_solved):.0f} (most {ensemble.iterations.max()})"
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
     yield (
-        "time of the runs" if ensemble.by_command else "processor time",
+        "time of the runs" if ensemble.by_command else "time of all processes together",
         f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
     )
 
