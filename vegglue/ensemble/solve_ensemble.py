@@ -101,7 +101,7 @@ def chunk_size(members: int, experiments: int) -> int:
 
 
 def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
-    """Where members come from, and what one task solves; those that are few come from coarser cells."""
+    """Where members come from, and the members of each chunk; those that are few come from coarser cells."""
     size = chunk_size(len(points), len(case.experiments))
     start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
     slopes = [one.slopes for one in start_from.values() if one is not None]

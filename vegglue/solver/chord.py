@@ -36,6 +36,7 @@ FASTEST_SHRINKING, SLOWEST_SHRINKING = 0.2, 0.9
 class Patience:
     """Who is waited for: a member of at most `most` steps, whose correction [m, m/s] in step n is below
     4 LONGEST_CORRECTION pace^n; nobody once `few` or less are at work and half as many need another reference anyway.
+    Who is not waited for is left to another reference.
     """
 
     most: int
