@@ -25,6 +25,8 @@ FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.0
 LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
 LADDER = Ladder((FIRST, LAST), 0, "Added: eddies.")
 STEP = Step("eddies", ("eddies",), (0.3,), (("eddies",),), 9.0, 5.0, 1e-3, {"p": 0.6}, {"p": a_location()})
+INSTRUMENTS = replace(STEP, chances=(0.55,), others={"reading": 0.3, "probe": 0.15}, places={})
+NO_EFFECT = a_diagnosis(steps=(INSTRUMENTS,), verdict={"kind": "one-of"})
 LIKELIER = a_diagnosis(steps=(STEP,), verdict={"kind": "one-of"})
 GAUGE = ProposedMeasurement("a gauge at x = 5 m", "June", 5.0, 1, 0.5, 0.2, 9.0)
 
@@ -51,6 +53,8 @@ def off(cleared: bool) -> Diagnosis:
         (a_diagnosis(verdict={"kind": "one-of"}), "most likely (70 %) störung – größer als 0 (eddies, size 0.300 m2/s"),
         (LIKELIER, "(60 %) more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m, which is in no list, or else (30 %)"),
         (LIKELIER, "Something is missing from this model: most likely (60 %)"),
+        (NO_EFFECT, "Something is missing from this model: most likely (55 %) störung"),
+        (NO_EFFECT, ", or no listed effect (45 %)"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "Something is missing from this model that is in"),
         (replace(a_diagnosis(steps=()), places=(a_location(amplitude=-0.56, x_error=6.7),),
                  verdict=replace(NOTHING.verdict, kind="none-of-these")),

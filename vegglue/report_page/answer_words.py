@@ -90,7 +90,7 @@ def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
         many = NUMBERS[min(len(effects), 6)]
         plural = f"{many} physical effects {'are' if tense == 'is' else 'were'}"
         subject = plural if len(effects) > 1 else f"{many} physical effect {tense}"
-        if any(step.likelier_place for step in found.steps):  # which may be no effect at all
+        if any(step.others for step in found.steps):  # which may be no effect at all
             subject = f"Something {tense}"
         parts.append(f"{subject} missing from {model}: {', and '.join(effects)}")
     if places:
@@ -100,18 +100,20 @@ def _what_is_missing(found: Diagnosis, model: str, tense: str) -> str:
 
 
 def _effect_in_words(found: Diagnosis, step: Step) -> str:
-    """An accepted effect by its title, with its name and size, and its likeliest rivals; 'most likely' where it has
-    any, unless a place that is likelier is told before it.
+    """An accepted effect by its title, with its name and size, its likeliest rivals, and how likely it is none of the
+    listed; 'most likely' where there are any, unless a place that is likelier is told before it.
     """
     name, likelier = step.accepted, step.likelier_place
     suspect = found.suspect(name)
     short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
-    chance = f"({percent(found.chances[name])}) " if likelier or len(step.rivals) > 1 else ""
+    chance = f"({percent(found.chances[name])}) " if step.others or len(step.rivals) > 1 else ""
     doubt = f"most likely {chance}" if chance and not likelier else chance
     explained = f", {more}" if more else ""
     size = f", {_amplitude_in_words(suspect.amplitude)}"
     others = sorted((one for one in step.rivals if one != name), key=lambda one: -step.chance[one])[:RIVALS_NAMED]
     or_else = "".join(f", or <code>{html.escape(one)}</code> ({percent(step.chance[one])})" for one in others)
+    left = sum(chance for one, chance in step.others.items() if one != likelier)
+    or_else += f", or no listed effect ({percent(left)})" if left else ""
     return (
         f"{doubt}<b>{short_title[:1].lower()}{short_title[1:]}</b> (<code>{html.escape(name)}</code>{explained}{size})"
         f"{or_else}"
