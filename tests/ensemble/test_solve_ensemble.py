@@ -12,11 +12,12 @@ from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import sobol_sample
+from vegglue.case.schema import Case
 from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble, solved_members
 from vegglue.errors import InputError
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.measurements.observations import read_observations
+from vegglue.measurements.observations import Observations, read_observations
 from vegglue.storage.result_files import read_ensemble
 
 FEW = 16  # members of the problems that tangents and strides are made with, at most
@@ -79,9 +80,9 @@ def test_members_may_have_beds_of_their_own(tmp_path: Path, monkeypatch: pytest.
         np.testing.assert_allclose(found[member], alone[0], atol=1e-4)
 
 
-def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two experiments, alike but for the level at the outlet: each has its own predictions, whichever ends first."""
-    case = load_case(write_reach(tmp_path, COARSE))
+def two_experiments(folder: Path) -> tuple[Case, Observations]:
+    """16 members of a reach, and its experiment twice, alike but for the level at the outlet."""
+    case = load_case(write_reach(folder, COARSE))
     ((name, one),) = case.experiments.items()
     more = one.model_copy(update={"level": one.level + 0.05})
     case = case.model_copy(
@@ -92,6 +93,12 @@ def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monk
     )
     alone = read_observations(case)
     both = replace(alone, table=pd.concat([alone.table, alone.table.assign(experiment="more")], ignore_index=True))
+    return case, both
+
+
+def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has its own predictions, whichever ends first."""
+    case, both = two_experiments(tmp_path)
     sample = sobol_sample(case)
     in_order = solved_members(case, both, sample, 1)
 
@@ -104,3 +111,10 @@ def test_the_order_in_which_experiments_end_changes_nothing(tmp_path: Path, monk
     first, second = np.split(in_order, 2, axis=1)
     assert np.isfinite(in_order).all()
     assert np.abs(second - first).max() >= 0.01
+
+
+def test_a_chunk_is_on_its_way_when_one_of_its_experiments_has_ended(tmp_path: Path) -> None:
+    case, both = two_experiments(tmp_path)
+    told: list[int | None] = []
+    solve_ensemble(case, both, tmp_path / "ensemble.h5", 1, lambda progress: told.append(progress.done))
+    assert told == [0, 4, 8, 12, 16]

@@ -66,13 +66,15 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     with ensemble_writer(path, header) as writer:
         todo = left_to_do(writer, case, chunks, watch)
         resumed = sum(chunks[index].size for index in writer.done)
-        solved, failed, phase = resumed, 0, f"solving {case.name}"
-        watch(Progress(with_compilation(phase), solved, header.members, "members", failed, resumed))
+        flows, failed, phase = resumed * len(case.experiments), 0, f"solving {case.name}"
+        watch(Progress(with_compilation(phase), resumed, header.members, "members", failed, resumed))
         for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
-            fields = rows.pop("fields")
-            writer.append(index, chunks[index], rows, fields)
-            solved, failed = solved + chunks[index].size, failed + members_with(rows["status"], FAILED)
-            watch(Progress(phase, solved, header.members, "members", failed, resumed))
+            flows += chunks[index].size
+            if rows is not None:
+                failed += members_with(rows["status"], FAILED)
+                fields = rows.pop("fields")
+                writer.append(index, chunks[index], rows, fields)
+            watch(Progress(phase, flows // len(case.experiments), header.members, "members", failed, resumed))
 
 
 def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
@@ -113,7 +115,8 @@ def solved_members(case: Case, observations: Observations, sample: PriorSample, 
     site, found = build_site(case), np.full((len(sample.points), len(observations.table)), np.nan)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     for index, rows in _solve_all(case, site, observations, sample, chunks, [*range(len(chunks))], start_from, jobs):
-        found[chunks[index]] = rows["prediction"]
+        if rows is not None:
+            found[chunks[index]] = rows["prediction"]
     return found
 
 
@@ -126,17 +129,19 @@ def _solve_all(
     todo: list[int],
     start_from: StartFrom,
     jobs: int,
-) -> Iterator[tuple[int, Rows]]:
-    """The rows of each chunk as its last experiment ends: one task is a chunk in one experiment."""
+) -> Iterator[tuple[int, Rows | None]]:
+    """A chunk as it ends in each experiment, which is one task, and its rows as the last one ends; None before."""
     work = partial(_solve_numbered, case, site, observations, start_from)
     tasks = ((index, experiment, sample.take(chunks[index])) for index in todo for experiment in case.experiments)
     ended: dict[int, dict[str, Rows]] = {}
     for index, experiment, rows in as_finished(work, tasks, jobs):
         parts = ended.setdefault(index, {})
         parts[experiment] = rows
-        if len(parts) == len(case.experiments):
-            del ended[index]
+        if len(parts) < len(case.experiments):
+            yield index, None
+        else:
             yield index, rows_of_chunk(case, observations, [parts[one] for one in case.experiments])
+            del ended[index]
 
 
 def _solve_numbered(
