@@ -107,16 +107,30 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         return with_own_error(Baseline(model, noise, fit(model, noise, _found(model, start)), None, None))
     near = _near(coarse, noise, known)
     if near is not None and cells_across(coarse.site) >= FEWEST_CELLS_ACROSS:
-        noise = with_model_error(noise, model_error_columns(coarse, near, coarse.case.model_error))
+        noise = with_own_error_at(noise, coarse, near)
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
     start = None if z is None else linearise_from(model, z, near)
-    first = with_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
-    base = with_error_of_grid(with_coarse_point(first))
-    if _told_on_coarse_cells(base) and near is not None and _is_near(base, near.z):
+    base = under_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
+    return with_own_error(base) if near is None else with_own_error_again(base, near.z)
+
+
+def under_error_of_grid(trial: Baseline) -> Baseline:
+    """The model calibrated on its own cells from a trial, the error of its grid told where that ends."""
+    return with_error_of_grid(with_coarse_point(with_error_of_grid(trial)))
+
+
+def with_own_error_again(base: Baseline, z: Array) -> Baseline:
+    """`with_own_error`, unless coarse cells told it at a place z (p,) that is near enough."""
+    if _told_on_coarse_cells(base) and _is_near(base, z):
         return with_coarse_point(base)
     # The model's own error moves the best place, and is another there.
     return with_own_error(base)
+
+
+def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
+    """The noise with the model's own error as coarse cells tell it at a point."""
+    return with_model_error(noise, model_error_columns(coarse, point, coarse.case.model_error))
 
 
 def with_coarse_point(base: Baseline) -> Baseline:

@@ -18,14 +18,17 @@ from vegglue.calibration.baseline import (
     Baseline,
     SearchModel,
     coarse_search,
+    search_model,
+    under_error_of_grid,
     with_coarse_point,
-    with_error_of_grid,
     with_own_error,
+    with_own_error_again,
+    with_own_error_at,
 )
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Model, linearise, linearise_from
+from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
@@ -127,18 +130,26 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     """The model with an accepted hypothesis as the next baseline, the error of its grid and its own looked at again;
     None where it finds no flow.
     """
-    place = best.fitted.point
-    model = _with(base.model, best)
+    place, model = best.fitted.point, _with(base.model, best)
     if base.coarse is None:
         return with_own_error(Baseline(model, base.noise, best.fitted, None, None))
-    start = linearise_from(model, place.z, place)
+    coarse = _with(base.coarse, best)
+    if coarse_search(base) is None:
+        trial = with_coarse_point(Baseline(model, base.noise, best.fitted, coarse, base.on_coarse))
+        return with_own_error(under_error_of_grid(trial))
+    start = _on_own_cells(base, model, place)
     if start is None:
         return None
-    # The error of the grid is told where the refit ended first: its flow on coarse cells is known if they are searched.
-    on_coarse = base.on_coarse if coarse_search(base) is None else place
-    trial = Baseline(model, base.noise, at_point(base.noise, start), _with(base.coarse, best), on_coarse)
-    near = with_error_of_grid(with_coarse_point(trial))
-    return with_own_error(with_error_of_grid(with_coarse_point(near)))
+    # Errors of the grid and of the model are told where the refit ended first: its flow on coarse cells is known.
+    noise = with_own_error_at(base.noise, coarse, place)
+    trial = Baseline(model, noise, at_point(noise, start), coarse, place)
+    return with_own_error_again(under_error_of_grid(trial), place.z)
+
+
+def _on_own_cells(base: Baseline, model: Model, place: Point) -> Point | None:
+    """A model, which may differ from the base by one effect, at a place on the cells of the search."""
+    searched = coarse_search(base)
+    return place if searched is None else linearise_as_coarse(model, base.fitted.point, searched[1], place)
 
 
 def _with(model: Model, tried: RefitTrial | Refit) -> Model:
@@ -177,10 +188,15 @@ def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
         parameters = {name: prior for name, prior in case.parameters.items() if name != one.parameter}
         return replace(model, case=case.model_copy(update={"effects": effects, "parameters": parameters}))
 
+    search = search_model(base)
     kept = np.array([name != one.parameter for name in base.model.names])
-    start = linearise(less(base.model), base.fitted.point.z[kept], base.fitted.point)
+    near = linearise(less(search.model), search.point.z[kept], search.point)
+    if near is None:
+        return None
+    place, model = fit(less(search.model), search.noise, near).point, less(base.model)
+    start = _on_own_cells(base, model, place)
     if start is None:
         return None
     coarse = None if base.coarse is None else less(base.coarse)
-    fitted = fit(less(base.model), base.noise, start)
-    return with_coarse_point(Baseline(less(base.model), base.noise, fitted, coarse, base.on_coarse))
+    on_coarse = base.on_coarse if coarse_search(base) is None else place
+    return with_coarse_point(Baseline(model, base.noise, fit(model, base.noise, start), coarse, on_coarse))

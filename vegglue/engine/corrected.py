@@ -64,6 +64,7 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) 
         responses_to_cells=NEWTON.responses_to_cells,
         flow_at_centres=NEWTON.flow_at_centres,
         by_itself=NEWTON.by_itself,
+        with_coarse_correction=NEWTON.with_coarse_correction,
     )
 
 

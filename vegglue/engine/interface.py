@@ -78,6 +78,8 @@ class Engine:
     flow_at_centres(model, point, experiment): depth and velocities of a point.
     by_itself(model, point): the point with nothing borrowed from a flow nearby, where `responses_to_cells` is to be
         exact to a per cent.
+    with_coarse_correction(point, before, after): a point to start from, moved as the flow on cells of twice the size
+        moved from one point to another; the point itself where an engine has no use for it.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Engine:
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Single]]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
     by_itself: Callable[["Model", Point], Point]
+    with_coarse_correction: Callable[[Point, Point, Point], Point]
 
 
 @dataclass(frozen=True)
@@ -148,6 +151,15 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
 def by_itself(model: Model, point: Point) -> Point:
     """The point with nothing borrowed from a flow nearby: its responses to cells are then exact to a per cent."""
     return model.engine.by_itself(model, point)
+
+
+def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point) -> Point | None:
+    """`linearise` at the z of `after`, a point on cells of twice the size, from a point whose own on these is `before`.
+
+    The case may have an effect more or less at `after`.
+    """
+    start = model.engine.with_coarse_correction(point, before, after)
+    return linearise(model, after.z, start) or linearise_from(model, after.z, after)
 
 
 def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:

@@ -46,6 +46,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
         responses_to_cells=partial(_responses_to_cells, time_step=time_step, longest=longest),
         flow_at_centres=_flow_at_centres,
         by_itself=lambda model, point: point,
+        with_coarse_correction=lambda point, before, after: point,
     )
 
 

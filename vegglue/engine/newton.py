@@ -144,6 +144,24 @@ def with_own_factors(model: Model, point: Point) -> Point:
     return replace(point, flows=flows)
 
 
+def with_coarse_correction(point: Point, before: Point, after: Point) -> Point:
+    """u + S dz + P (U_after - U_before - S_c dz): slopes of the point, and what they leave out on coarse cells.
+
+    u, U: states of the point and on cells of twice the size; S, S_c: their slopes; P: prolongation. See
+    `Engine.with_coarse_correction`. Source: coarse-grid correction of the full approximation scheme (Brandt 1977,
+    doi:10.1090/S0025-5718-1977-0431719-X; not checked against it).
+    """
+    flows, step = dict(point.flows), _step_of_known(point.z, after.z)
+    for experiment in point.flows.keys() & before.flows.keys() & after.flows.keys():
+        flow, first, last = (one.flows[experiment] for one in (point, before, after))
+        left = _whole(last) - _moved_along_slopes(first, step)
+        fine = _moved_along_slopes(flow, step) + on_grid(left, (flow.state.shape[0], flow.rows))
+        state = rows_inside(fine, flow.band)
+        moved = flow.moved + float(np.abs(state - flow.state).max())
+        flows[experiment] = replace(flow, state=state, moved=moved)
+    return replace(point, z=after.z[: point.z.size], flows=flows)
+
+
 def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
     """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
     flow = point.flows[experiment]
@@ -207,10 +225,22 @@ def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> 
 
     Where an effect was added since, its amplitude is the last of z.
     """
-    warm, known = widen(before.state, before.rows, before.band), before.slopes.shape[3]
-    if known <= z.size:
-        warm = warm + widen(before.slopes @ (z[:known] - near.z)[:, None], before.rows, before.band)
-    return on_grid(warm, shape)
+    return on_grid(_moved_along_slopes(before, _step_of_known(near.z, z)), shape)
+
+
+def _step_of_known(known: Array, z: Array) -> Array:
+    """z - z_known, to take along slopes known at one point; none where an effect was taken away since."""
+    return z[: known.size] - known if known.size <= z.size else np.zeros(0)
+
+
+def _moved_along_slopes(flow: SteadyFlow, step: Array) -> Array:
+    """State (nx, 3, ny, 1) of all rows after a step (q,) in the first q parameters."""
+    return _whole(flow) + widen(flow.slopes[..., : step.size] @ step[:, None], flow.rows, flow.band)
+
+
+def _whole(flow: SteadyFlow) -> Array:
+    """Its state (nx, 3, ny, 1) with the rows beside its band."""
+    return widen(flow.state, flow.rows, flow.band)
 
 
 def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
@@ -227,4 +257,5 @@ NEWTON = Engine(
     responses_to_cells=responses_by_adjoints,
     flow_at_centres=centre_flow,
     by_itself=with_own_factors,
+    with_coarse_correction=with_coarse_correction,
 )
