@@ -13,9 +13,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
 from functools import lru_cache
+from importlib import import_module
 from itertools import count
 from multiprocessing import resource_tracker
 from threading import Semaphore
@@ -182,6 +183,16 @@ def one_thread() -> Iterator[None]:
 def one_thread_for_good() -> None:
     """The same for the rest of this process: its threads may work on several tasks at once, and none may undo it."""
     _libraries(len(sys.modules)).limit(limits=1)
+
+
+def import_beside(module: str) -> None:
+    """Import a module in a thread beside, for who asks for it later and is then told what went wrong, if anything."""
+
+    def quietly() -> None:
+        with suppress(ImportError):
+            import_module(module)
+
+    threading.Thread(target=quietly).start()
 
 
 def keep_folder_out() -> None:

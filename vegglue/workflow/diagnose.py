@@ -11,7 +11,7 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.effects.definition import Effect
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import responses
-from vegglue.parallel import at_most, one_thread
+from vegglue.parallel import at_most, import_beside, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, cause_of
@@ -34,6 +34,7 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     kept = diagnosis_that_fits(path, wanted)
     if kept is not None:
         return kept
+    import_beside("vegglue.report_page.diagnosis_pictures")  # drawing takes a third of a second to import
     with at_most(jobs):
         model = with_command(model_in(case), folder, watch)
         found = diagnose_model(model, watch, validation_of(case, folder, watch))
