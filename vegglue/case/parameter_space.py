@@ -95,3 +95,9 @@ def prior_range(case: Case, value: Value) -> Bounds:
         low, high = quantile(case.parameters[value], [0.025, 0.975])
         return float(low), float(high)
     return value, value
+
+
+def shown_bounds(bounds: Bounds) -> str:
+    """`low to high`, or one number where both are the same."""
+    low, high = bounds
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"

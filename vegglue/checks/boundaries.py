@@ -5,13 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import middle_value, prior_range
+from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
-from vegglue.checks.ensemble_and_priors import shown_bounds
+from vegglue.measurements.carried_in_words import carried_in_words, carried_otherwise
 from vegglue.measurements.observations import Observations
-from vegglue.measurements.sections import section_place
 from vegglue.resistance.physical_constants import GRAVITY
-from vegglue.site.channel_geometry import discharges_upstream_of, expected_depth
+from vegglue.site.channel_geometry import expected_depth
 from vegglue.site.grid import curvature_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import centres_within, inflow_cells
@@ -68,20 +67,6 @@ def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> f
     return discharge / (area * float(np.sqrt(GRAVITY * area / top)))
 
 
-def remarks_on_discharges(case: Case, observations: Observations) -> Iterator[str]:
-    """Discharges [m3/s] that differ from those of ADV sections, by the rule of the case, by more than their errors."""
-    rules = {(one.experiment, one.section): one.average for one in case.observations}
-    for (name, section), by_rule in observations.discharge.items():
-        given = discharges_upstream_of(case, case.experiments[name], section_place(observations.table, name, section))
-        if given is None:
-            continue
-        parts = [prior_range(case, value) for value in given]
-        total = (sum(low for low, _ in parts), sum(high for _, high in parts))
-        for rule, measured in by_rule.items():
-            if rules.get((name, section), rule) != rule:
-                continue
-            off = max(total[0] - measured.value, measured.value - total[1])
-            if off > max(2.0 * measured.standard_error, 0.03 * measured.value):
-                found = f"{measured.value:.3g} ± {measured.standard_error:.2g} m3/s by the rule `{rule}`"
-                said = f"the case says {shown_bounds(total)} m3/s"
-                yield f"The ADV of {section} in experiment {name} gives {found}, {said}."
+def remarks_on_discharges(case: Case, site: Site, observations: Observations) -> Iterator[str]:
+    """Sections whose velocities clearly carry another discharge than stated; of each experiment in one sentence."""
+    yield from carried_in_words(carried_otherwise(case, site, observations.table))

@@ -38,7 +38,8 @@ from vegglue.site.gridded_site import Site
 
 
 def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
-    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values.
+    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values, and
+    sections that carry another discharge than stated.
 
     Nothing where none of them is in use: every command refuses that, with the reason of the first.
     """
@@ -52,6 +53,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_dry_velocities(case, site, observations),
         *remarks_on_exchanged_heights(case, observations),
         *remarks_on_directions(case, observations),
+        *remarks_on_discharges(case, site, observations),
     ]
 
 
@@ -82,6 +84,6 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_canopies(case, site, observations),
         remarks_on_bank_law(case, site),
         remarks_on_patch_edges(case, observations),
-        remarks_on_discharges(case, observations),
+        remarks_on_discharges(case, site, observations),
     )
     return [sentence for about in remarks for sentence in about]

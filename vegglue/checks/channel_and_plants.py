@@ -5,11 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import Bounds, prior_range
+from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds
 from vegglue.case.parts import Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case, Experiment
-from vegglue.checks.ensemble_and_priors import shown_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment

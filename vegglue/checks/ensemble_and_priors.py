@@ -8,7 +8,6 @@ import pandas as pd
 from vegglue.case.case_effects import effect_of
 from vegglue.case.consistency import values
 from vegglue.case.messages import KeyPath
-from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.checks.stations import station_in_words
 from vegglue.measurements.kinds import unstated_errors
@@ -19,12 +18,6 @@ from vegglue.site.gridded_site import Site
 
 # Fewer members leave two or three in each tail of 2.5 %. Draws around the best of them need no more than a start.
 FEW_MEMBERS = 100
-
-
-def shown_bounds(bounds: Bounds) -> str:
-    """`low to high`, or one number where both are the same."""
-    low, high = bounds
-    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
 
 
 def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]:

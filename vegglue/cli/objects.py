@@ -8,6 +8,7 @@ from typing import Any
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.discovery.discovered import LawFound
+from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
@@ -87,6 +88,16 @@ def _checked(case: Case, found: CheckedCase) -> Told:
     return {
         "case": case.name, "experiments": list(case.experiments), "cells": found.cells, "stations": found.stations,
         "used_stations": found.used_stations, "remarks": found.remarks, "picture": found.picture,
+        "sections": [_carried(one) for one in found.carried],
+    }  # fmt: skip
+
+
+def _carried(one: CarriedDischarge) -> Told:
+    """Discharges [m3/s]; stated: both ends of its priors, null where it is not known."""
+    return {
+        "experiment": one.experiment, "section": one.section, "x": one.x, "carried": one.value,
+        "interval95": one.interval95, "stated": one.stated, "share_of_width": one.share, "verticals": one.verticals,
+        "gauged": one.gauged, "clearly_off": one.clearly_off,
     }  # fmt: skip
 
 

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
+from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import Question
@@ -54,6 +56,30 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
         "" if np.isnan(p) else f"< {p:.1g}" if p < 5e-4 else f"{p:.2g}",
         f"{detectability.visibility:.2f}",
         f"{detectability.smallest:.2g}" if detectability.ever else "never",
+    )
+
+
+def show_carried(sections: Sequence[CarriedDischarge]) -> None:
+    """What the velocities of each section carry beside the stated discharge; nothing without sections."""
+    if not sections:
+        return
+    console().print("Discharges [m3/s] that the measured velocities carry, and 95 % of what they may be:")
+    headings = "experiment", "section", "x [m]", "carries", "95 %", "stated", "ratio", "width measured", "level"
+    print_table(headings, [_carried_cells(one) for one in sections], headings[1:7])
+
+
+def _carried_cells(one: CarriedDischarge) -> tuple[str, ...]:
+    low, high = one.interval95
+    return (
+        one.experiment,
+        one.section,
+        f"{one.x:g}",
+        f"{one.value:.3g}",
+        f"{low:.3g} to {high:.3g}",
+        shown_bounds(one.stated) if one.stated else "-",
+        _error(one.ratio, ".2f"),
+        f"{one.share:.0%}",
+        "measured" if one.gauged else "estimated",
     )
 
 

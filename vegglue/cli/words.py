@@ -6,7 +6,7 @@ from typing import Any
 
 from vegglue.case.schema import Case
 from vegglue.cli.brief_posterior import show_posterior
-from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
+from vegglue.cli.tables import show_carried, show_diagnosis, show_ladder, show_questions
 from vegglue.errors import shown_path
 from vegglue.in_short import so_many
 from vegglue.results.diagnosis import Diagnosis
@@ -62,6 +62,7 @@ def _show_discovery(result: DiscoveredCase) -> None:
 
 
 def _show_check(case: Case, found: CheckedCase) -> None:
+    show_carried(found.carried)
     for sentence in found.remarks:
         print(f"- {sentence}")
     print(

@@ -21,6 +21,7 @@ from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
 from vegglue.diagnosis.verdict import judged
 from vegglue.engine.interface import Model
 from vegglue.inference.likelihood import root_mean_square
+from vegglue.measurements.carried_in_words import carried_otherwise
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.results.diagnosis import (
     Diagnosis,
@@ -94,6 +95,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
     """What the verdict rests on, but for fields and laws."""
     silent = not (found.steps or found.places or found.undecided)
     there = unseen_errors(last.base, unseen) if silent and unseen is not None else UnseenErrors(float("nan"), 1.0)
+    model = last.base.model
     return Grounds(
         errors=estimated_errors(last, found),
         misfit=misfit,
@@ -106,8 +108,9 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         neighbours=_neighbours_aside(last, found),
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
-        stretch=stretch_in_words(last.base.model.case, last.base.model.station),
+        stretch=stretch_in_words(model.case, model.station),
         places_searched=any(one.x.size for one in last.fingerprints.places),
+        carried=tuple(carried_otherwise(model.case, model.site, model.station)),
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from vegglue.diagnosis.findings import Findings
+from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed, VerdictKind
@@ -21,7 +22,7 @@ class Grounds:
     strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
     measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
     channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
-    something at a place.
+    something at a place; carried: sections that clearly carry another discharge than stated.
     """
 
     errors: EstimatedErrors
@@ -38,6 +39,7 @@ class Grounds:
     laws: LawsSuspected | None = None
     stretch: str = ""
     places_searched: bool = True
+    carried: tuple[CarriedDischarge, ...] = ()
 
 
 @dataclass(frozen=True)

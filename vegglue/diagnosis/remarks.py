@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
 from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
+from vegglue.measurements.carried_in_words import carried_in_words
 from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.screening.places import LEAST_DEPTH
@@ -21,9 +22,10 @@ TOO_SHALLOW = (
 
 
 def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
-    """All of them, those on what is named first; statement: beside which they stand."""
+    """All of them, those on what is carried and on what is named first; statement: beside which they stand."""
     found, misfit = grounds.findings, grounds.misfit
-    remarks = _implausible(found.steps, suspects)
+    remarks = carried_in_words(grounds.carried)
+    remarks += _implausible(found.steps, suspects)
     remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     remarks += _besides(grounds, suspects, statement)
     remarks += [grounds.stretch] if grounds.stretch else []

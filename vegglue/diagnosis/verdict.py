@@ -21,6 +21,7 @@ from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
+from vegglue.measurements.carried_in_words import carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 
@@ -49,13 +50,19 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     statement, places = _stated(grounds, suspects), grounds.findings.places
     return Verdict(
         kind=statement.kind,
-        sentence=statement.sentence,
+        sentence=statement.sentence + _carried(grounds),
         remarks=tuple(remarks_of(grounds, suspects, statement)),
         location=places[0] if places else None,
         not_excluded=grounds.not_excluded,
         clears_the_model=statement.clears_the_model,
         tells_laws=statement.tells_laws,
     )
+
+
+def _carried(grounds: Grounds) -> str:
+    """That sections carry another discharge than stated, behind whatever is said of the model; '' where none does."""
+    off = carried_in_short(grounds.carried)
+    return f" But {off}, and what is missing may only make up for that." if off else ""
 
 
 def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:

@@ -27,6 +27,7 @@ class PlausibleFlow:
     """Bounds for one experiment, at columns x (nx,) and rows y (ny,) of the grid [m].
 
     slowest and fastest (nx,): Q / A [m/s], inf where the section may be dry; lowest and highest (nx,): water level [m];
+    smoothest and thickest (nx,): the same without what is left for gauges that are off, on smooth walls and in growth;
     floor (nx,): lowest bed of the section [m]; discharge: least, of one inflow alone, and most, of all [m3/s];
     depth: largest at the outlet [m]; level: at the outlet [m]; width: of the grid [m]; depths: expected (nx, ny) [m].
     """
@@ -37,6 +38,8 @@ class PlausibleFlow:
     fastest: Array
     lowest: Array
     highest: Array
+    smoothest: Array
+    thickest: Array
     floor: Array
     discharge: Bounds
     depth: float
@@ -55,17 +58,20 @@ class PlausibleFlow:
 
 
 def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleFlow:
-    """U = Q / A(x) with A under the expected level, and z_out - h / 2 <= z <= z_highest + h / 2, see `_highest`.
+    """U = Q / A(x) with A under the expected level, and z_out - h / 2 <= z <= z_highest + h / 2, see `_thickest`.
 
     Q and z_out within 95 % of their priors. A of `slowest` lies under a surface parallel to the floor, or that of the
-    outlet where it is higher; A of `fastest` under the lower one that smooth walls leave, see `_shallowest`. Where
+    outlet where it is higher; A of `fastest` under the lower one that smooth walls leave, see `_smoothest`. Where
     plants hold the water up, A is larger and the flow slower.
     """
     level = prior_range(case, experiment.level)
     parts = [prior_range(case, value) for value in experiment.discharge.values()]
     least, most = min(low for low, _ in parts), sum(high for _, high in parts)
     deep = _depths(case, site, experiment, level[1])
-    shallow = _shallowest(site, _depths(case, site, experiment, level[0]), level[0], least)
+    expected = _depths(case, site, experiment, level[0])
+    smoothest = _smoothest(site, expected, level[0], least)
+    shallow = np.minimum(expected, np.maximum(smoothest[:, None] - site.bed, 0.0))
+    thickest = _thickest(site, deep, level[1], most)
     dy, floor = site.grid.dy, site.bed.min(axis=1)
     depth = float(deep[-1].max())
     with np.errstate(divide="ignore"):
@@ -76,7 +82,9 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
         slowest=slowest,
         fastest=fastest,
         lowest=np.full(site.grid.x.size, level[0] - CRITICAL_HEAD * depth),
-        highest=_highest(site, deep, level[1], most) + CRITICAL_HEAD * depth,
+        highest=thickest + CRITICAL_HEAD * depth,
+        smoothest=smoothest,
+        thickest=thickest,
         floor=floor,
         discharge=(least, most),
         depth=depth,
@@ -90,8 +98,8 @@ def _depths(case: Case, site: Site, experiment: Experiment, level: float) -> Arr
     return np.maximum(expected_depth(case, site, experiment.model_copy(update={"level": level})), 0.0)
 
 
-def _shallowest(site: Site, depths: Array, level: float, discharge: float) -> Array:
-    """h at z = max(z_out, z_floor + (n q / sqrt(S))^(3/5)), but no more than `depths`, (nx, ny) [m].
+def _smoothest(site: Site, depths: Array, level: float, discharge: float) -> Array:
+    """z = max(z_out, z_floor + (n q / sqrt(S))^(3/5)) (nx,) [m].
 
     Above the backwater of its outlet a reach may flow at normal depth (Manning), least on smooth walls. S: fall of the
     floor over the length of the grid [-]; q: Q over the widest water [m2/s].
@@ -102,10 +110,10 @@ def _shallowest(site: Site, depths: Array, level: float, discharge: float) -> Ar
     normal = 0.0
     if slope > 0.0 and width > 0.0 and discharge > 0.0:
         normal = (SMOOTHEST_WALLS * discharge / width / slope**0.5) ** 0.6
-    return np.minimum(depths, np.maximum(np.maximum(level, floor + normal)[:, None] - site.bed, 0.0))
+    return np.maximum(level, floor + normal)
 
 
-def _highest(site: Site, depths: Array, level: float, discharge: float) -> Array:
+def _thickest(site: Site, depths: Array, level: float, discharge: float) -> Array:
     """z = z_floor + h with h^(13/3) = h_L^(13/3) + 13/3 n^2 q^2 (L - x), (nx,) [m]: water held up by growth all over.
 
     The integral of dh/dx = -n^2 q^2 / h^(10/3), friction after Manning on an even bed, at the thickest growth; on a bed

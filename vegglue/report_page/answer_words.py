@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, unit_html
 from vegglue.in_short import listed
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.carried_in_words import carried_in_short, carried_otherwise
 from vegglue.measurements.kinds import KINDS
 from vegglue.report_page.cause_words import (
     accepted_causes,
@@ -144,8 +145,11 @@ def of_which_model(run: Run) -> str:
 def why_not_to_rely(run: Run) -> str:
     """What forbids using the answer, in one sentence; '' where nothing does."""
     told = run.behind is None and not run.posterior.claimed  # by the headline
-    verdict = [*_of_verdict(run.diagnosis or run.behind)]
-    parameters = [*([] if told else _of_posterior(run.posterior)), *_of_ensemble(run.ensemble)]
+    found = run.diagnosis or run.behind
+    of_discharges = [*_of_discharges(run)]
+    verdict = [*_of_verdict(found), *(of_discharges if found else [])]
+    weights = [] if told else _of_posterior(run.posterior)
+    parameters = [*([] if found else of_discharges), *weights, *_of_ensemble(run.ensemble)]
     if verdict and parameters:
         subject = "Neither the verdict nor the parameters below are"
     else:
@@ -159,6 +163,11 @@ def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
         return
     if found.misfit.p < UNBELIEVED and found.verdict.kind != "cannot-tell":
         yield "what is left of the misfit is still larger than the errors allow"
+
+
+def _of_discharges(run: Run) -> Iterator[str]:
+    if off := carried_otherwise(run.case, run.site, run.observations.table):
+        yield html.escape(carried_in_short(off))
 
 
 def _of_posterior(posterior: Posterior) -> Iterator[str]:

@@ -12,6 +12,7 @@ from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
+from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
 from vegglue.screening.beyond_seen import laws_beyond_their_range
@@ -22,9 +23,10 @@ from vegglue.workflow.run_folder import folder_of, model_in, validation_of
 
 @dataclass(frozen=True)
 class CheckedCase:
-    """What a check has found: remarks in sentences, sizes, and where the channel is drawn."""
+    """What a check has found: remarks, what each section carries, sizes, and where the channel is drawn."""
 
     remarks: tuple[str, ...]
+    carried: tuple[CarriedDischarge, ...]
     cells: int
     stations: int
     used_stations: int
@@ -47,7 +49,8 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
     if case.engine is not None:
         remarks.append(command_tried(model_of(case, observations), picture.parent))
     table = observations.table
-    return CheckedCase(tuple(remarks), site.bed.size, len(table), int(table["used"].sum()), picture)
+    carried = tuple(carried_discharges(case, site, table))
+    return CheckedCase(tuple(remarks), carried, site.bed.size, len(table), int(table["used"].sum()), picture)
 
 
 @one_thread()

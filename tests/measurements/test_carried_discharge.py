@@ -1,0 +1,155 @@
+"""What the velocities of sections carry is told beside the stated discharge, and said to be off only where it is."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnoses import a_diagnosis
+from open_cases import imported
+from reach import write_reach
+from report_runs import a_toy
+from verdicts import grounds, said, step
+
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.cli.tables import show_carried
+from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
+from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
+from vegglue.measurements.observations import read_observations
+from vegglue.report_page.answer_words import why_not_to_rely
+from vegglue.site.gridded_site import build_site
+
+# Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
+REALLY_OTHERWISE = {"open-d": ("high", 1.087), "open-m": ("low", 1.11)}
+HIGHER = CarriedDischarge("low", "A", 36.0, 2.1, (1.9, 2.3), (1.4, 1.4), 0.85, 17, True)
+
+
+def faster(table: pd.DataFrame, times: float, experiment: str | None = None) -> pd.DataFrame:
+    """All velocities, or those of one experiment, times a factor."""
+    chosen = (table["kind"] == "velocity") & (True if experiment is None else table["experiment"] == experiment)
+    return table.assign(value=table["value"].where(~chosen, times * table["value"]))
+
+
+def read(case: Case) -> tuple[Case, pd.DataFrame]:
+    return case, read_observations(case).table
+
+
+def carried(case: Case, table: pd.DataFrame) -> list[CarriedDischarge]:
+    return carried_discharges(case, build_site(case), table)
+
+
+def standard_errors_off(one: CarriedDischarge) -> float:
+    assert one.stated is not None
+    low, high = one.interval95
+    off = one.value - one.stated[0]
+    return off / (one.value - low if off > 0.0 else high - one.value) * 1.96
+
+
+@pytest.mark.parametrize("name", [f"open-{letter}" for letter in "abcdefghijklmnop"])
+def test_sections_of_campaigns_carry_what_is_stated(tmp_path: Path, name: str) -> None:
+    case, table = read(imported(name, tmp_path))
+    found, (experiment, true) = carried(case, table), REALLY_OTHERWISE.get(name, ("", 1.0))
+    assert len(found) == 12
+    assert all(one.gauged and 0.8 < one.share < 0.95 for one in found)
+    assert [one.ratio for one in found if one.experiment == experiment] == pytest.approx(
+        [true] * 4 * bool(experiment), rel=0.01
+    )
+    others = [standard_errors_off(one) for one in found if name not in REALLY_OTHERWISE]
+    assert np.abs(others).max(initial=0.0) < 1.2
+    assert carried_otherwise(case, build_site(case), table) == []
+
+
+def test_velocities_that_carry_half_as_much_again_are_said_of_each_experiment(tmp_path: Path) -> None:
+    case, table = read(imported("open-b", tmp_path))
+    off = carried_otherwise(case, build_site(case), faster(table, 1.5))
+    assert [one.ratio for one in off] == pytest.approx([1.5] * 12, rel=0.02)
+    (together,) = carried_in_words(off)
+    assert together.startswith(
+        "The velocities of 12 sections in experiments low, mid and high carry 1.5 times the stated discharge (D0, x = "
+        "36 m, in low: 2.07 m3/s, 1.9 to 2.24, where 1.4 m3/s is stated): check the discharge"
+    )
+    (alone,) = carried_in_words(carried_otherwise(case, build_site(case), faster(table, 0.7, "mid")))
+    assert "4 sections in experiment mid carry 0.7 to 0.71 times the stated discharge" in alone
+
+
+def test_what_was_not_measured_makes_it_less_certain(tmp_path: Path) -> None:
+    """With the verticals of the middle alone, or few of them, 1.3 times the discharge is no longer clearly off."""
+    case, table = read(imported("open-b", tmp_path))
+    more = faster(table, 1.3)
+    assert all(one.clearly_off for one in carried(case, more))
+    middle = more[(more["kind"] == "level") | (more["y"].abs() < 1.0)]
+    few = more[(more["kind"] == "level") | more["y"].isin([-1.8, -0.6, 0.6, 1.8])]
+    for part in (middle, few):
+        assert not any(one.clearly_off for one in carried(case, part))
+    whole, narrow = carried(case, table)[0], carried(case, table[table.index.isin(middle.index)])[0]
+    assert narrow.share < 0.4 < whole.share
+    assert np.ptp(narrow.interval95) > 3.0 * np.ptp(whole.interval95)
+
+
+def test_without_a_gauge_the_water_may_be_higher(tmp_path: Path) -> None:
+    case, table = read(imported("open-b", tmp_path))
+    for one in carried(case, table[table["kind"] != "level"]):
+        low, high = one.interval95
+        assert not one.gauged
+        assert high - one.value > 3.0 * (one.value - low), "growth may hold it up, walls are no smoother than smooth"
+    assert any(one.clearly_off for one in carried(case, faster(table, 1.5)))
+    assert not any(one.clearly_off for one in carried(case, faster(table[table["kind"] != "level"], 0.7)))
+
+
+def test_the_section_of_the_paper_carries_its_discharge_under_the_level_stated_beside_it() -> None:
+    configs = Path(__file__).parents[2] / "configs"
+    for name, true in (("d0", 0.986), ("d3a", 1.002), ("d3b", 0.968)):
+        (one,) = carried(*read(load_case(configs / f"{name}.yaml")))
+        assert one.gauged
+        assert one.ratio == pytest.approx(true, abs=2e-3)
+
+
+def test_few_verticals_of_a_reach_say_little(tmp_path: Path) -> None:
+    case, table = read(load_case(write_reach(tmp_path)))
+    found = carried(case, table)
+    assert [one.section for one in found] == ["above", "patch", "below"]
+    assert all(0.9 < one.ratio < 1.1 and one.verticals == 5 and one.share < 0.6 for one in found)
+    assert not any(one.clearly_off for one in carried(case, faster(table, 1.3)))
+
+
+def test_an_experiment_whose_discharge_is_calibrated_is_not_doubted(tmp_path: Path) -> None:
+    case, table = read(imported("open-b", tmp_path))
+    of_one = {"discharge_error": {"experiments": ["low"], "values": {"relative_error": 0.5}}}
+    told = Case.model_validate({**case.model_dump(exclude_unset=True), "effects": of_one, "source": case.source})
+    off = carried_otherwise(told, build_site(told), faster(table, 1.5))
+    assert {one.experiment for one in off} == {"mid", "high"}
+
+
+def test_values_that_no_flow_can_have_are_said_instead(tmp_path: Path) -> None:
+    case, table = read(imported("open-b", tmp_path))
+    assert all(one.clearly_off for one in carried(case, faster(table, 100.0)))
+    assert carried_otherwise(case, build_site(case), faster(table, 100.0)) == []
+
+
+def test_a_name_stands_beside_the_doubt() -> None:
+    named = grounds(step("wind"), carried=(HIGHER,))
+    _, sentence, remarks = said(named)
+    doubt = "sections carry 1.5 times the stated discharge in experiment low"
+    assert sentence.endswith(f"But {doubt}, and what is missing may only make up for that.")
+    assert remarks.startswith(
+        "The velocities of 1 section in experiment low carry 1.5 times the stated discharge (A, x"
+    )
+    assert "But sections" not in said(grounds(step("wind")))[1]
+
+
+def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    toy = replace(a_toy(tmp_path), diagnosis=a_diagnosis())
+    before = why_not_to_rely(toy)
+    monkeypatch.setattr("vegglue.report_page.answer_words.carried_otherwise", lambda *_: [HIGHER])
+    assert carried_in_short([HIGHER]) in why_not_to_rely(toy)
+    assert carried_in_short([HIGHER]) not in before
+
+
+def test_every_section_stands_in_the_table_of_a_check(capsys: pytest.CaptureFixture[str]) -> None:
+    show_carried([HIGHER, replace(HIGHER, section="B", stated=None, gauged=False)])
+    _, heading, first, second = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert " ".join(heading) == "experiment section x [m] carries 95 % stated ratio width measured level"
+    assert " ".join(first) == "low A 36 2.1 1.9 to 2.3 1.4 1.50 85% measured"
+    assert " ".join(second) == "low B 36 2.1 1.9 to 2.3 - - 85% estimated"
