@@ -9,7 +9,7 @@ from sound_case import ROWS, SOUND, odd
 
 from vegglue.case.config import load_case
 from vegglue.checks.boundaries import remarks_on_discharges
-from vegglue.checks.case_check import check_case
+from vegglue.checks.case_check import check_case, doubts_about
 from vegglue.figures.channel import save_channel_figure
 from vegglue.measurements.observations import read_observations
 from vegglue.site.channel_geometry import expected_depth
@@ -35,6 +35,20 @@ def test_a_patch_on_the_map_is_told_as_that(tmp_path):
         "Patch p1 covers no cell centre: its corners are places on the map" in one for one in odd(tmp_path, framed)
     )
     assert any("Patch p1 covers no cell centre: it lies outside the grid, at x" in one for one in odd(tmp_path, on_map))
+
+
+@pytest.mark.parametrize(
+    ("measured", "advice"), [(True, r"the bed\."), (False, r"the bed, or take the experiment out, in ")]
+)
+def test_an_outlet_below_the_bed_is_said_once_and_before_every_command(tmp_path, measured, advice):
+    """It left simulate without a flow, whether or not anything was measured in the experiment."""
+    dry = SOUND.replace("level: 1.0}", "level: 1.0}\n  dry: {discharge: 2.0, level: -0.5}")
+    rows = ROWS + ROWS.split("\n", 1)[1].replace("low", "dry") if measured else ROWS
+    said = [one for one in odd(tmp_path, dry, rows) if "dry" in one and "no used observation" not in one]
+    assert len(said) == 1, said
+    assert re.match(r"The outlet level of experiment dry, -0\.5 m, .* no command finds a flow: .*" + advice, said[0])
+    case = load_case(tmp_path / "sound.yaml")
+    assert said[0] in doubts_about(case, build_site(case), read_observations(case))
 
 
 def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):

@@ -22,17 +22,16 @@ LEAST_TURN = 0.02
 def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
     """Inflows and outlets without cells or without water, water on edges that act as walls, ends in a bend."""
     yield from _ends_in_a_bend(site)
+    dry = dry_outlets(case, site)
     for name, experiment in case.experiments.items():
         now = in_experiment(site, name)
         depth = expected_depth(case, now, experiment)
         open_ = centres_within(case.outlet.range, site.grid.y)
-        level = middle_value(case, experiment.level)
         wet = np.maximum(depth[-1, open_], 0.0)
         if not open_.any():
             yield "The outlet holds no cell centre: no water can leave."
-        elif not (wet > 0).any():
-            lowest = now.bed[-1, open_].min()
-            yield f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {lowest:.3g} m."
+        elif name in dry:
+            continue
         elif (froude := _froude(case, experiment, wet, site.grid.dy)) > 0.7:
             yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."
         if case.friction.walls is None and (depth[:, [0, -1]] > 0).any():
@@ -47,6 +46,28 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
                 yield f"Inflow {inflow} holds no cell centre: no water can enter."
             elif not (edge[cells] > 0).any():
                 yield f"Inflow {inflow} lies above the water of experiment {name}."
+
+
+def dry_outlets(case: Case, site: Site) -> dict[str, float]:
+    """Experiments whose outlet level lies below all of the bed there, and the lowest of that [m]."""
+    open_ = centres_within(case.outlet.range, site.grid.y)
+    if not open_.any():
+        return {}
+    lowest = {name: float(in_experiment(site, name).bed[-1, open_].min()) for name in case.experiments}
+    return {name: bed for name, bed in lowest.items() if middle_value(case, case.experiments[name].level) <= bed}
+
+
+def remarks_on_dry_outlets(case: Case, site: Site, observations: Observations) -> Iterator[str]:
+    """Outlets below the bed, where no command finds a flow; one that was measured in or not is solved alike."""
+    table = observations.table
+    for name, bed in dry_outlets(case, site).items():
+        level = middle_value(case, case.experiments[name].level)
+        measured = (table["experiment"] == name).any()
+        advice = "" if measured else ", or take the experiment out, in which nothing was measured"
+        yield (
+            f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {bed:.3g} m, so that no "
+            f"command finds a flow: correct the level or the bed{advice}."
+        )
 
 
 def _ends_in_a_bend(site: Site) -> Iterator[str]:

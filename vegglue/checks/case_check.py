@@ -4,7 +4,7 @@ Each remark comes from one function of the file of its subject; a new one is add
 """
 
 from vegglue.case.schema import Case
-from vegglue.checks.boundaries import remarks_on_boundaries, remarks_on_discharges
+from vegglue.checks.boundaries import remarks_on_boundaries, remarks_on_discharges, remarks_on_dry_outlets
 from vegglue.checks.channel_and_plants import (
     remarks_on_bank_law,
     remarks_on_canopies,
@@ -38,14 +38,16 @@ from vegglue.site.gridded_site import Site
 
 
 def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
-    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values, and
-    sections that carry another discharge than stated.
+    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values,
+    outlets that no water reaches, and sections that carry another discharge than stated.
 
-    Nothing where none of them is in use: every command refuses that, with the reason of the first.
+    Nothing of measurements where none is in use: commands that need them refuse that, with the reason of the first.
     """
+    dry = [*remarks_on_dry_outlets(case, site, observations)]
     if not observations.table["used"].any():
-        return []
+        return dry
     return [
+        *dry,
         *remarks_on_absurd_values(case, site, observations),
         *remarks_on_exchanged_axes(case, observations),
         *remarks_on_map_places(case, observations),
@@ -79,6 +81,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_unnamed_banks(case, site),
         remarks_on_idle_parameters(case, site),
         remarks_on_units_of_effects(case),
+        remarks_on_dry_outlets(case, site, observations),
         remarks_on_boundaries(case, site),
         remarks_on_steep_flow(case, site),
         remarks_on_canopies(case, site, observations),

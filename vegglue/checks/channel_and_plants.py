@@ -9,6 +9,7 @@ from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds
 from vegglue.case.parts import Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case, Experiment
+from vegglue.checks.boundaries import dry_outlets
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment
@@ -127,7 +128,9 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[str]:
 
 def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     """Canopies above the water, dry stands, and heights [m] that differ from those measured."""
-    for name, experiment in case.experiments.items():
+    flowing = [name for name in case.experiments if name not in dry_outlets(case, site)]
+    for name in flowing:
+        experiment = case.experiments[name]
         depth = expected_depth(case, in_experiment(site, name), experiment)
         for stand in sorted({case.plants.patches[index].stand for index in patches_present(case, name)}):
             cells = np.isin(site.patch, [i for i, patch in enumerate(case.plants.patches) if patch.stand == stand])

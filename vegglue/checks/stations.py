@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.schema import Case
+from vegglue.checks.boundaries import dry_outlets
 from vegglue.checks.units_of_places import fitting_unit
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations
@@ -49,10 +50,14 @@ def remarks_on_dry_velocities(case: Case, site: Site, observations: Observations
 
 
 def _on_land(case: Case, site: Site, table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame, bool]]:
-    """Of each experiment the stations above the expected water, `above` [m] by how much; whether most velocities do."""
+    """Of each experiment the stations above the expected water, `above` [m] by how much; whether most velocities do.
+
+    None of an experiment whose outlet is dry: that is said once.
+    """
+    dry_ones = dry_outlets(case, site)
     at_point = np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)
     inside = table[(table["reason"] != OUTSIDE).to_numpy(bool) & at_point]
-    for experiment, rows in inside.groupby("experiment", sort=False):
+    for experiment, rows in inside[~inside["experiment"].isin(list(dry_ones))].groupby("experiment", sort=False):
         now = in_experiment(site, str(experiment))
         depth = expected_depth(case, now, case.experiments[str(experiment)])
         i, j = (np.abs(np.subtract.outer(rows[name].to_numpy(float), at)).argmin(axis=1)
