@@ -13,8 +13,10 @@ from rungs import a_rung
 from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
+from vegglue.case.parameter_space import shown_bounds
+from vegglue.cli.tables import show_ladder
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
-from vegglue.in_short import in_short, interval_in_short, so_many
+from vegglue.in_short import in_digits, in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.solver.status import FAILED
@@ -62,6 +64,27 @@ def test_members_that_all_failed_were_run_by_a_command_only_where_there_is_one(t
     assert repr(nothing).startswith("Ensemble of 12 members: 0 solved by Newton's method, 0 by marching, 12 failed\n")
     by_command = replace(nothing, config="name: brook\nengine:\n  command: own\n")
     assert repr(by_command).startswith("Ensemble of 12 members: 0 run by the command, 12 failed\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "told"),
+    [
+        (1523.0, 2, "1500"), (312.0, 1, "300"), (-1523.0, 3, "-1520"), (99_600.0, 2, "100000"),
+        (123_456.0, 3, "1.23e+05"), (0.00123, 2, "0.0012"), (0.00965, 3, "0.00965"), (0.0, 3, "0"),
+        (float("inf"), 3, "inf"), (float("nan"), 2, "nan"),
+    ],
+)  # fmt: skip
+def test_sizes_that_people_read_are_written_in_full(value: float, digits: int, told: str) -> None:
+    assert in_digits(value, digits) == told
+
+
+def test_large_numbers_have_one_form_in_tables_and_sentences(capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = a_rung("brook"), a_rung("brook-wind")
+    worse = replace(before, held_out=replace(before.held_out, sections=np.array([0.045, 0.065])))
+    show_ladder(Comparison((worse, after), pd.DataFrame(columns=MEASUREMENT)))
+    assert "1900 ± 800" in capsys.readouterr().out, "it was 1.9e+03 ± 8e+02"
+    assert interval_in_short("force", 1523.4, 1200.0, 1900.0, "N") == "force: 1520, 95 % 1200 to 1900 N"
+    assert shown_bounds((1234.0, 5678.0)) == "1230 to 5680"
 
 
 @pytest.mark.parametrize("found", [a_diagnosis(), NOTHING])

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Iterable, Sequence
 
+# Sizes up to which a number is written in full; beyond, as a power of ten.
+LARGEST_IN_FULL = 1e5
+
 
 def in_short(heading: str, lines: Iterable[str]) -> str:
     """The heading, and the lines that say something, indented below it."""
@@ -19,10 +22,19 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
+def in_digits(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits, for people: `0.00965`, `1500`, `1.5e+06`; every sentence and table of the
+    terminal that may hold a large one asks for it here, the page by `short` of figures/typography.
+    """
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(float(text)) <= LARGEST_IN_FULL else text
+
+
 def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:
     """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit behind unless it is none."""
     digits = telling_digits(low, high)
-    return f"{name}: {value:.{digits}g}, 95 % {low:.{digits}g} to {high:.{digits}g} {unit.removesuffix('-')}".rstrip()
+    middle, least, most = (in_digits(one, digits) for one in (value, low, high))
+    return f"{name}: {middle}, 95 % {least} to {most} {unit.removesuffix('-')}".rstrip()
 
 
 def telling_digits(low: float, high: float) -> int:

@@ -15,6 +15,7 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
 from vegglue.errors import InputError, shown_path
+from vegglue.in_short import in_digits
 
 Bounds = tuple[float, float]
 # Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.
@@ -100,4 +101,4 @@ def prior_range(case: Case, value: Value) -> Bounds:
 def shown_bounds(bounds: Bounds) -> str:
     """`low to high`, or one number where both are the same."""
     low, high = bounds
-    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+    return in_digits(low) if low == high else f"{in_digits(low)} to {in_digits(high)}"

@@ -7,6 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
+from vegglue.in_short import in_digits
 from vegglue.measurements.carried_in_words import carried_in_words, carried_otherwise
 from vegglue.measurements.observations import Observations
 from vegglue.resistance.physical_constants import GRAVITY
@@ -65,8 +66,8 @@ def remarks_on_dry_outlets(case: Case, site: Site, observations: Observations) -
         measured = (table["experiment"] == name).any()
         advice = "" if measured else ", or take the experiment out, in which nothing was measured"
         yield (
-            f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {bed:.3g} m, so that no "
-            f"command finds a flow: correct the level or the bed{advice}."
+            f"The outlet level of experiment {name}, {level:g} m, is below the bed there, {in_digits(bed)} m, so that "
+            f"no command finds a flow: correct the level or the bed{advice}."
         )
 
 
@@ -76,8 +77,9 @@ def _ends_in_a_bend(site: Site) -> Iterator[str]:
     for end, turning in (("begins", curvature[0]), ("ends", curvature[-1])):
         if abs(turning) * site.grid.y.size * site.grid.dy > LEAST_TURN:
             yield (
-                f"The grid {end} in a bend with a radius of {1.0 / abs(turning):.3g} m, where water that enters evenly "
-                f"or leaves at one level has to find its shape first: let the grid run on straight for about its width."
+                f"The grid {end} in a bend with a radius of {in_digits(1.0 / abs(turning))} m, where water that enters "
+                "evenly or leaves at one level has to find its shape first: let the grid run on straight for about its "
+                "width."
             )
 
 

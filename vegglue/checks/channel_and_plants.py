@@ -10,6 +10,7 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import quantile
 from vegglue.case.schema import Case, Experiment
 from vegglue.checks.boundaries import dry_outlets
+from vegglue.in_short import in_digits
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment
@@ -41,7 +42,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
             yield f"Patch {patch.name} covers no cell centre: {_why_none(case, site, corners_of(case, patch))}."
         elif abs(covered - meant) > 0.1 * meant:
             remedy = _beyond_grid(case, corners_of(case, patch)) or "take finer cells"
-            yield f"Patch {patch.name} of {meant:.3g} m2 becomes {covered:.3g} m2 of cells: {remedy}."
+            yield f"Patch {patch.name} of {in_digits(meant)} m2 becomes {in_digits(covered)} m2 of cells: {remedy}."
         if hidden:
             yield f"Patch {patch.name} loses {hidden} cells to patches listed after it, which win where they overlap."
     unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from vegglue.case.schema import Case
+from vegglue.in_short import in_digits
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations
 
@@ -33,8 +34,8 @@ def remarks_on_units_of_places(case: Case, observations: Observations) -> Iterat
     spread = float(table["x"].max() - table["x"].min())
     if 0.0 < spread < HUDDLED * (east - west) and _all_inside(case, table[["x", "y"]] * [KILOMETRE, 1.0]):
         yield (
-            f"All velocities lie within {spread:.2g} m of a grid of {east - west:g} m, {_first(table)}, as if x were "
-            "in km: check its unit."
+            f"All velocities lie within {in_digits(spread, 2)} m of a grid of {east - west:g} m, {_first(table)}, as "
+            "if x were in km: check its unit."
         )
 
 

@@ -8,6 +8,7 @@ from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
+from vegglue.in_short import in_digits
 from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, Suspect
@@ -50,12 +51,12 @@ def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
     return (
         one.name,
         f"{found.chances[one.name]:.0%}" if one.name in found.chances else "",
-        f"{amplitude.value:.3g} {unit}".strip(),
-        f"{low:.3g} .. {high:.3g}" if low < high else "at its end",
+        f"{in_digits(amplitude.value)} {unit}".strip(),
+        f"{in_digits(low)} .. {in_digits(high)}" if low < high else "at its end",
         " -> ".join(f"{score:+.1f}" for score in scores if np.isfinite(score)),
         "" if np.isnan(p) else f"< {p:.1g}" if p < 5e-4 else f"{p:.2g}",
         f"{detectability.visibility:.2f}",
-        f"{detectability.smallest:.2g}" if detectability.ever else "never",
+        in_digits(detectability.smallest, 2) if detectability.ever else "never",
     )
 
 
@@ -69,13 +70,12 @@ def show_carried(sections: Sequence[CarriedDischarge]) -> None:
 
 
 def _carried_cells(one: CarriedDischarge) -> tuple[str, ...]:
-    low, high = one.interval95
     return (
         one.experiment,
         one.section,
         f"{one.x:g}",
-        f"{one.value:.3g}",
-        f"{low:.3g} to {high:.3g}",
+        in_digits(one.value),
+        shown_bounds(one.interval95),
         shown_bounds(one.stated) if one.stated else "-",
         _error(one.ratio, ".2f"),
         f"{one.share:.0%}",
@@ -91,7 +91,7 @@ def _error(value: float, digits: str = ".4f") -> str:
 def _gain(before: Rung | None, one: Rung) -> str:
     """By how much held-out squares fell [(mm/s)^2]; the error of that is - where one section alone was held out."""
     gain, error = (1e6 * part for part in improvement(before, one)) if before else (float("nan"),) * 2
-    return "" if np.isnan(gain) else f"{gain:.2g} ± {_error(error, '.1g')}"
+    return "" if np.isnan(gain) else f"{in_digits(gain, 2)} ± {'-' if np.isnan(error) else in_digits(error, 1)}"
 
 
 def show_ladder(found: Comparison) -> None:

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vegglue.case.parameter_space import shown_bounds
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.diagnosis.rivals import HARDLY
+from vegglue.in_short import in_digits
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     FaultyInstrument,
@@ -41,8 +43,9 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 def _place_words(place: Location) -> str:
     low, high = place.interval95
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
-    range95 = f"{low:.3g} to {high:.3g}"
-    told = f"{range95} {place.unit}" if place.term in TOLD_BY_SIZE else f"{place.amplitude:.3g} {place.unit}, {range95}"
+    range95 = shown_bounds((low, high))
+    size = f"{in_digits(place.amplitude)} {place.unit}"
+    told = f"{range95} {place.unit}" if place.term in TOLD_BY_SIZE else f"{size}, {range95}"
     what = _what_acts(place.term, place.amplitude)
     return f"at {at} it acts as if {what} ({'; '.join([told, *_against(place)])})"
 
@@ -59,7 +62,7 @@ def _what_acts(term: str, amplitude: float) -> str:
     return {
         "drag": "something holds the flow back" if amplitude > 0 else "something lets the flow pass or pushes it on",
         "bed": f"the bed lies {abs(amplitude):.2f} m {'higher' if amplitude > 0 else 'lower'}",
-        "inflow": f"water {'enters' if amplitude > 0 else 'leaves'}, {abs(amplitude):.3g} m3/s",
+        "inflow": f"water {'enters' if amplitude > 0 else 'leaves'}, {in_digits(abs(amplitude))} m3/s",
         "viscosity": f"the water mixes {'more' if amplitude > 0 else 'less'}",
     }[term]
 
@@ -80,9 +83,10 @@ def field_sentence(field: FieldFound) -> str:
     """What varies, over which distance, and where most surely."""
     what = {"friction": "friction", "bed": "the bed level", "viscosity": "viscosity", "inflow": "water that enters"}
     value = f"{field.value:+.0%}" if field.term == "friction" else f"{field.value:+.3g} {UNIT_OF_FIELD[field.term]}"
+    along, across = (in_digits(2 * size, 2) for size in (field.length, field.width))
     return (
-        f"it acts like {what[field.term]} that differs from place to place over some {2 * field.length:.2g} m along "
-        f"and {2 * field.width:.2g} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
+        f"it acts like {what[field.term]} that differs from place to place over some {along} m along "
+        f"and {across} m across, most surely around x = {field.x:.1f}, y = {field.y:.1f} m ({value})"
     )
 
 
@@ -121,12 +125,12 @@ def _instrument_words(one: FaultyInstrument) -> str:
     }[one.kind]
     low, high = one.interval95
     rather = "" if np.isnan(one.factor) else f", rather by a factor of {one.factor:.3g} than by the same everywhere"
-    return f"{what} by {one.offset:.3g} {one.unit} ({low:.3g} to {high:.3g}){rather}; it was set aside"
+    return f"{what} by {in_digits(one.offset)} {one.unit} ({shown_bounds((low, high))}){rather}; it was set aside"
 
 
 def _where(x: float, y: float) -> str:
     """x = 14.3, y = 1.5, without what is NaN."""
-    return ", ".join(f"{name} = {value:.4g}" for name, value in (("x", x), ("y", y)) if np.isfinite(value))
+    return ", ".join(f"{name} = {in_digits(value, 4)}" for name, value in (("x", x), ("y", y)) if np.isfinite(value))
 
 
 def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
@@ -136,7 +140,8 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     best = by_name[step.accepted]
     low, high = best.amplitude.interval95
     unit = "" if best.amplitude.unit == "-" else f" {best.amplitude.unit}"
-    words = f"{step.accepted} of {best.amplitude.value:.3g}{unit} ({low:.3g} to {high:.3g}; {best.title.lower()})"
+    size, range95 = f"{in_digits(best.amplitude.value)}{unit}", shown_bounds((low, high))
+    words = f"{step.accepted} of {size} ({range95}; {best.title.lower()})"
     alike = next(group for group in step.groups if step.accepted in group)
     same = [name for name in alike if name != step.accepted]
     rest = [name for name in step.rivals if name not in alike]

@@ -20,7 +20,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
-from vegglue.in_short import so_many
+from vegglue.in_short import in_digits, so_many
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
@@ -66,7 +66,7 @@ def rung_in_short(rung: Rung) -> str:
         "never seen": rung.validation,
         "noise floor": rung.in_sample.noise_floor,
     }
-    known = [f"{words} {value:.2g}" for words, value in told.items() if np.isfinite(value)]
+    known = [f"{words} {in_digits(value, 2)}" for words, value in told.items() if np.isfinite(value)]
     return f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known) or 'no velocity'}"
 
 

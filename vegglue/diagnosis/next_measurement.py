@@ -23,6 +23,7 @@ from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, Point, linearise_from, responses
+from vegglue.in_short import in_digits
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
 from vegglue.screening.candidates import Candidate, cause_of
@@ -227,7 +228,7 @@ def _with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
         level = floor + depth * factor**LEVEL_POWER
         digits = max(1 - math.floor(math.log10(depth * factor**LEVEL_POWER)), 0) if depth > 0.0 else 2
         discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
-        plan = f"at {factor * totals[name]:.3g} m3/s (level at the outlet about {level:.{digits}f} m)"
+        plan = f"at {in_digits(factor * totals[name])} m3/s (level at the outlet about {level:.{digits}f} m)"
         more[plan] = one.model_copy(update={"discharge": discharge, "level": level})
     unseen = {name: one for name, one in more.items() if name not in case.experiments}
     return case.model_copy(update={"experiments": {**case.experiments, **unseen}})

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from vegglue.in_short import in_digits
+
 NARROW = "\u202f"  # between a number and its unit, never broken
 FIRM = "\u00a0"  # a space where a line must not break
 MINUS = "\u2212"
@@ -131,7 +133,7 @@ class Notation:
 
 PLAIN_TEXT = Notation(
     parameter=str,
-    number=lambda value, digits: f"{value:.{digits}g}",
+    number=in_digits,
     unit=lambda unit: f" {unit}" if unit not in ("", "-") else "",
     share=lambda share: f"{100 * share:.0f} %",
     power_of_ten=lambda exponent, sd: f"10^({exponent:.2f} ± {sd:.2f})",

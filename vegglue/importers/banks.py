@@ -6,6 +6,7 @@ from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.importers.config_parts import loguniform_prior
 from vegglue.importers.field_site import Channel, FieldSite
+from vegglue.in_short import in_digits
 from vegglue.site.grid import Grid
 from vegglue.site.zones import beyond_slope_break, slope
 
@@ -43,6 +44,6 @@ def found_banks(bed: Array, grid: Grid, channel: Channel, steeper: float) -> tup
         return False, f"no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
     floor, stated = float(np.mean((~banks).sum(axis=1)) * grid.dy), channel.bottom_width_m
     return True, (
-        f"banks lie beyond a slope of {steeper:g}, half the stated one, and leave a floor of {floor:.3g} m "
-        f"({stated:.3g} m stated)"
+        f"banks lie beyond a slope of {steeper:g}, half the stated one, and leave a floor of {in_digits(floor)} m "
+        f"({in_digits(stated)} m stated)"
     )

@@ -20,6 +20,7 @@ from vegglue.importers.map_files import geojson_features, rounded_place, shapes_
 from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import refuse_degrees
+from vegglue.in_short import in_digits
 from vegglue.site.centreline import Centreline, centreline_of
 
 # Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
@@ -69,8 +70,8 @@ def _made(shape: CentrelineShape, columns: Tree, units: Tree, how: str) -> Drawn
     turn = np.degrees(line.heading[-1] - line.heading[0])
     side = "left" if turn > 0.0 else "right"
     sharpest = float(np.abs(np.gradient(line.heading, line.s)).max())
-    radius = f", radius {1.0 / sharpest:.3g} m at least" if sharpest > 0.0 else ""
-    taken = f"centreline of {line.s[-1]:.4g} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
+    radius = f", radius {in_digits(1.0 / sharpest)} m at least" if sharpest > 0.0 else ""
+    taken = f"centreline of {in_digits(line.s[-1], 4)} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
     return DrawnCentreline(kept, line, columns, units, taken)
 
 

@@ -17,6 +17,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, rows_of_table
 from vegglue.importers.number_words import is_number
+from vegglue.in_short import in_digits
 
 # How a file of each program says what it is; its columns of place, depth and mean velocity of the vertical.
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)
@@ -62,7 +63,7 @@ def on_the_tape(path: Path, taken: MeasuredRows, words: FileWords) -> MeasuredRo
     east, north = (x1 - x0) / length, (y1 - y0) / length
     t = taken.numbers["tape"]
     places = {"x": x0 + t * east, "y": y0 + t * north}
-    return taken.having(places, f"places along a tape of {length:.4g} m").without("tape")
+    return taken.having(places, f"places along a tape of {in_digits(length, 4)} m").without("tape")
 
 
 def _columns(table: LooseTable) -> dict[str, str]:

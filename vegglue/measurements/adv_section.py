@@ -11,6 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError, shown_path
+from vegglue.in_short import in_digits
 from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
@@ -239,15 +240,16 @@ def _none_in_the_water(observation: Observation, points: pd.DataFrame, bed: Arra
     exchanged = "whether they and `u`, whose numbers would lie in the water, are exchanged, " if fits else ""
     return InputError(
         f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the water "
-        f"surface at z = {surface:.4g} m, got none: at x = {points['x'].iloc[0]:.4g} m and y = {_span(points['y'])} m "
-        f"the bed lies at {_span(bed)} m, the points {_span(above)} m above it; check unit and sign of their heights, "
+        f"surface at z = {in_digits(surface, 4)} m, got none: at x = {points['x'].iloc[0]:.4g} m and y = "
+        f"{_span(points['y'])} m the bed lies at {_span(bed)} m, the points {_span(above)} m above it; check unit and "
+        "sign of their heights, "
         f"{exchanged}their x and y, the levels of the water, and `floor`, `surface` and `offset` of the observation."
     )
 
 
 def _span(values: Array) -> str:
     """Lowest and highest of some values, or the one that they are."""
-    low, high = f"{np.min(values):.3g}", f"{np.max(values):.3g}"
+    low, high = in_digits(float(np.min(values))), in_digits(float(np.max(values)))
     return low if low == high else f"{low} to {high}"
 
 

@@ -6,7 +6,7 @@ import pandas as pd
 
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.case.schema import Case
-from vegglue.in_short import listed, so_many
+from vegglue.in_short import in_digits, listed, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.sections import section_in_words
 from vegglue.measurements.suspicious_values import absurd_values
@@ -52,7 +52,7 @@ def _grouped(off: Sequence[CarriedDischarge]) -> list[list[CarriedDischarge]]:
 
 def _times(group: Sequence[CarriedDischarge]) -> str:
     """`1.5`, `1.4 to 1.6`."""
-    low, high = (f"{end(one.ratio for one in group):.2g}" for end in (min, max))
+    low, high = (in_digits(end(one.ratio for one in group), 2) for end in (min, max))
     return low if low == high else f"{low} to {high}"
 
 
@@ -62,11 +62,11 @@ def _experiments(group: Sequence[CarriedDischarge]) -> str:
 
 
 def _sentence(group: Sequence[CarriedDischarge]) -> str:
-    first, (low, high) = group[0], group[0].interval95
-    stated = shown_bounds(first.stated or (0.0, 0.0))
+    first, stated = group[0], shown_bounds(group[0].stated or (0.0, 0.0))
+    carries = f"{in_digits(first.value)} m3/s, {shown_bounds(first.interval95)}"
     return (
         f"The velocities of {so_many(len(group), 'section')} in {_experiments(group)} carry {_times(group)} times the "
-        f"stated discharge ({section_in_words(first.section, first.x)}, in {first.experiment}: {first.value:.3g} m3/s, "
-        f"{low:.3g} to {high:.3g}, where {stated} m3/s is stated): {CHECK}, as a diagnosis would name something that "
+        f"stated discharge ({section_in_words(first.section, first.x)}, in {first.experiment}: {carries}, "
+        f"where {stated} m3/s is stated): {CHECK}, as a diagnosis would name something that "
         "makes up for it."
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vegglue.in_short import so_many, telling_digits
+from vegglue.in_short import in_digits, so_many, telling_digits
 from vegglue.results.posterior import Posterior, Transfer
 
 # p-value [-], over all parameters compared (Bonferroni), below which a parameter is said to differ between experiments.
@@ -66,14 +66,15 @@ def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, ot
     other = others.get(REFERENCE_CHI2 + name)
     reference = f"; the source has {other:g}" if isinstance(other, int | float) else ""
     return (
-        f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {transfer.chi2[j]:.3g} with "
+        f"From each experiment alone, {scale} = {each}: chi2 of homogeneity {in_digits(transfer.chi2[j])} with "
         f"{so_many(int(transfer.freedom[j]), 'degree')} of freedom (p = {transfer.p[j]:.2g}{reference}), {verdict}."
     )
 
 
 def _misfits(transfer: Transfer) -> str:
     each = ", ".join(
-        f"{together:.3g} together and {f'{alone:.3g} alone' if np.isfinite(alone) else 'not found alone'} over "
+        f"{in_digits(together)} together and "
+        f"{f'{in_digits(alone)} alone' if np.isfinite(alone) else 'not found alone'} over "
         f"{int(stations)} stations ({experiment})"
         for experiment, together, alone, stations in zip(
             transfer.experiments, transfer.misfit_together, transfer.misfit_alone, transfer.stations, strict=True
@@ -82,7 +83,7 @@ def _misfits(transfer: Transfer) -> str:
     errors = f" (errors {transfer.scale:.2f} times as large, as the experiments alone leave them)"
     return (
         f"The misfit chi2 is {each}{errors if transfer.scale != 1.0 else ''}: with parameters of its own for each "
-        f"experiment it falls by {transfer.gain:.3g} for {transfer.more} more (p = {transfer.p_all:.2g})."
+        f"experiment it falls by {in_digits(transfer.gain)} for {transfer.more} more (p = {transfer.p_all:.2g})."
     )
 
 

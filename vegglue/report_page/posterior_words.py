@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.figures.typography import PLAIN_TEXT, Notation
-from vegglue.in_short import so_many, telling_digits
+from vegglue.in_short import in_digits, so_many, telling_digits
 from vegglue.inference.likelihood import sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
@@ -188,8 +188,8 @@ def _modes(posterior: Posterior, modes: PosteriorModes) -> str:
     if modes.mode_chi2.size == 1:
         return "one mode"
     each = (
-        f"{', '.join(f'{name} = {value:.3g}' for name, value in zip(posterior.parameters, theta, strict=True))} "
-        f"with chi2 = {misfit:.4g} and weight {weight:.2g}"
+        f"{', '.join(f'{name} = {in_digits(value)}' for name, value in zip(posterior.parameters, theta, strict=True))} "
+        f"with chi2 = {in_digits(misfit, 4)} and weight {in_digits(weight, 2)}"
         for theta, misfit, weight in zip(modes.mode_theta, modes.mode_chi2, modes.mode_weight, strict=True)
     )
     return f"{modes.mode_chi2.size} modes ({'; '.join(each)})"
@@ -206,7 +206,7 @@ def _errors(posterior: Posterior, model: ErrorModel) -> list[str]:
         )
         return [estimate, *_neighbours(model)]
     grid = (
-        f"that of the grid ({model.grid_error:.2g} on the whole) among them"
+        f"that of the grid ({in_digits(model.grid_error, 2)} on the whole) among them"
         if math.isfinite(model.grid_error)
         else "without that of the grid, whose cells cannot be doubled"
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vegglue.in_short import so_many
+from vegglue.in_short import in_digits, so_many
 from vegglue.inference.refinement_summary import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.results.posterior import Posterior
@@ -34,8 +34,10 @@ def _misfit_under_errors(misfit: MisfitTest) -> list[str]:
 def chi2_in_words(misfit: MisfitTest, missing: str) -> str:
     """chi2 with its degrees of freedom, and whether the errors explain it; missing: what is said where they do not."""
     if misfit.freedom < 1:
-        return f"chi2 = {misfit.chi2:.4g} with no more readings than parameters: these data do not test the model."
-    result = f"chi2 = {misfit.chi2:.4g} with {so_many(misfit.freedom, 'degree')} of freedom (p = {misfit.p_misfit:.2g})"
+        untested = "with no more readings than parameters: these data do not test the model."
+        return f"chi2 = {in_digits(misfit.chi2, 4)} {untested}"
+    degrees = so_many(misfit.freedom, "degree")
+    result = f"chi2 = {in_digits(misfit.chi2, 4)} with {degrees} of freedom (p = {misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
         return f"{result}: {missing}"
     return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from vegglue.in_short import in_digits
+
 # What stands in a question between an effect that calibration hides and the parameter that hides it.
 HIDDEN_BEHIND = " from a change of "
 # Below this D^2 a measurement does not separate anything.
@@ -55,7 +57,7 @@ class Question:
     def __repr__(self) -> str:
         if not self.useful:
             return f"To tell {self.tells_apart}: {self._why_none()}."
-        heading = f"To tell {self.tells_apart} (D2 now {self.useful[0].now:.2g} squared standard errors):"
+        heading = f"To tell {self.tells_apart} (D2 now {in_digits(self.useful[0].now, 2)} squared standard errors):"
         return "\n".join([heading, *(f"- {_in_short(one)}" for one in self.useful)])
 
     def _why_none(self) -> str:
@@ -64,9 +66,9 @@ class Question:
         if not self.nearest:
             return f"{many} would by itself"
         best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
-        most = f"D2 at most {best.then:.2g}: {best.name}"
+        most = f"D2 at most {in_digits(best.then, 2)}: {best.name}"
         if best.then >= SEPARATES:
-            return f"D2 is {best.now:.2g} already, where {enough}, and {many} adds a tenth to it ({most})"
+            return f"D2 is {in_digits(best.now, 2)} already, where {enough}, and {many} adds a tenth to it ({most})"
         return f"{many} would by itself, where {enough} ({most})"
 
 
@@ -88,4 +90,4 @@ def _proposed_from(tree: Mapping[str, Any]) -> ProposedMeasurement:
 
 
 def _in_short(one: ProposedMeasurement) -> str:
-    return f"{one.name}: {one.then:.2g}, {one.stations} station(s), {one.hours:.1f} h"
+    return f"{one.name}: {in_digits(one.then, 2)}, {one.stations} station(s), {one.hours:.1f} h"

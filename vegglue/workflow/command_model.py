@@ -19,7 +19,7 @@ from vegglue.engine.command_runs import command_predictions, command_runs, ended
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import so_many
+from vegglue.in_short import in_digits, so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch, silent
@@ -150,18 +150,18 @@ def command_tried(model: Model, folder: Path) -> str:
     for name, rows in stations_by_kind(model.station).items():
         kind, found = kind_of(name), end.prediction[rows]
         off = "" if own is None else _beside_the_own(found, own.prediction[rows], name == STREAMWISE)
-        told.append(f"{kind.words} {found.min():.3g} to {found.max():.3g} {kind.unit}{off}")
+        told.append(f"{kind.words} {in_digits(found.min())} to {in_digits(found.max())} {kind.unit}{off}")
     return f"The command of `engine` took {end.seconds:.1f} s at the medians of the priors: {'; '.join(told)}."
 
 
 def _beside_the_own(found: Array, own: Array, along: bool) -> str:
     """How far the command is from the built-in engine, and why velocities along x may be of another size or sign."""
-    said = f", {root_mean_square(found - own):.2g} from the built-in engine"
+    said = f", {in_digits(root_mean_square(found - own), 2)} from the built-in engine"
     times = float(found @ own) / float(own @ own) if along and own.any() else 1.0
     if times < 0.0:
         return f"{said} (the other way: check their sign)"
     if not 1.0 / OF_ANOTHER_UNIT < times < OF_ANOTHER_UNIT:
-        return f"{said} ({times:.2g} times as large: check their unit, and that stations keep their numbers)"
+        return f"{said} ({in_digits(times, 2)} times as large: check their unit, and that stations keep their numbers)"
     return said
 
 

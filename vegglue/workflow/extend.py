@@ -21,6 +21,7 @@ from vegglue.diagnosis.stepwise_choice import Choice, Names
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
+from vegglue.in_short import in_digits
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
@@ -140,7 +141,8 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
     spread = [(candidate_at(case, place).name, place) for place in places_tried(found)]
     said = [
-        f"{name} is spread over where it may lie: half length {one.length:.2g} m, half width {one.width:.2g} m."
+        f"{name} is spread over where it may lie: half length {in_digits(one.length, 2)} m, half width "
+        f"{in_digits(one.width, 2)} m."
         for name, one in spread
         if name in kept
     ]
