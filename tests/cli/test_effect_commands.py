@@ -32,7 +32,9 @@ def pasted(text: str) -> tuple[tuple[str, str], ...]:
 
 def test_the_list_names_every_effect(capsys, monkeypatch):
     assert said_to(monkeypatch, capsys, "effects")[0] == 0
-    assert said_to_text(monkeypatch, capsys, "effects").count("\n") == len(SHIPPED) + 7
+    assert said_to_text(monkeypatch, capsys, "effects").count("\n") == len(SHIPPED) + 8
+    *_, last = said_to_text(monkeypatch, capsys, "effects").splitlines()
+    assert last.startswith(f"{len(SHIPPED)} entries: {len(SHIPPED) - 4} effects that a diagnosis tries, ")
     named = json.loads(said_to_text(monkeypatch, capsys, "effects", "--json"))
     assert {entry["name"] for entry in named} == {effect.name for effect in SHIPPED}
 

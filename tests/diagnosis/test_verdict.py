@@ -341,6 +341,13 @@ def test_many_untestable_effects_are_told_in_groups() -> None:
     assert told in said(grounds(), hidden)[2]
 
 
+def test_candidates_are_not_counted_as_effects() -> None:
+    """One effect in three experiments counted as three: 54 effects in the pages, 62 and 67 in the terminal."""
+    in_each = [a_suspect(f"discharge_error[{name}]") for name in ("low", "mid", "high")]
+    assert "none of 4 candidates of 2 effects stands out" in said(grounds(), [*in_each, NONE])[1]
+    assert "none of 1 effect stands out" in said(grounds(), [NONE])[1]
+
+
 def test_what_was_found_is_not_called_untestable() -> None:
     hidden = [a_suspect(name, detectability={"testable": False}) for name in ("wind", "elder")]
     assert "neither present nor absent: elder." in said(grounds(step("wind")), hidden)[2]

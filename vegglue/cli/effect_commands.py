@@ -58,6 +58,11 @@ def _list(known: "tuple[Effect, ...]", as_object: bool) -> None:
         print(heading)
         for effect in effects:
             print(f"  {effect.name:<22}{effect.title}")
+    at_a_place = sum("search" in effect.tags for effect in known)
+    print(
+        f"{len(known)} entries: {len(known) - at_a_place} effects that a diagnosis tries, some once for each "
+        f"experiment, section, device or patch, and {at_a_place} for something at a place that nobody listed."
+    )
 
 
 def _show(effect: "Effect", case: "Case | None", as_object: bool) -> None:

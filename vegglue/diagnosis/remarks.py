@@ -7,6 +7,7 @@ from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_
 from vegglue.measurements.carried_in_words import carried_in_words
 from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
+from vegglue.results.suspect import counted_in_words
 from vegglue.screening.places import LEAST_DEPTH
 
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
@@ -99,7 +100,9 @@ def _untestable(hidden: Sequence[Suspect]) -> str:
     if len(hidden) <= NAMES_SHOWN:
         return "; ".join(_group(names, parameter, len(hidden)) for parameter, names in groups)
     shown = "; ".join(_group(names, parameter, NAMES_OF_GROUP) for parameter, names in groups)
-    return f"{len(hidden)} effects: {shown}. The table of effects on the page of the run (`vegglue report`) lists all"
+    return (
+        f"{counted_in_words(hidden)}: {shown}. The table of effects on the page of the run (`vegglue report`) lists all"
+    )
 
 
 def _group(names: Sequence[str], parameter: str, most: int) -> str:

@@ -24,6 +24,7 @@ from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.measurements.carried_in_words import carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
+from vegglue.results.suspect import counted_in_words
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -163,12 +164,12 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> Statemen
     if grounds.between > UNSEEN_RATIO:
         return _unsure_between(grounds)
     if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
-        seen = f"only {len(testable)} of {len(suspects)} effects would be seen in these data"
+        seen = f"only {len(testable)} of {counted_in_words(suspects)} would be seen in these data"
         unsure = f"{seen} if they were there at twice a plausible size"
         return Statement("cannot-tell", f"Nothing stands out ({misfit.told}), but {unsure}.")
     nothing = (
-        f"{misfit.told}, and none of {len(suspects)} effects stands out ({len(testable)} of them would be seen at "
-        "twice a plausible size)."
+        f"{misfit.told}, and none of {counted_in_words(suspects)} stands out ({len(testable)} of them would be seen "
+        "at twice a plausible size)."
     )
     clear = tuple(one for one in grounds.findings.instruments if is_clear(one))
     if clear:

@@ -12,6 +12,7 @@ from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report_page.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.report_page.key_numbers import KeyNumber
 from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.suspect import effects_among
 
 # Effects in the open table, a screen of a laptop; the others stand below it, folded.
 SUSPECTS_LISTED = 8
@@ -167,10 +168,11 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
     apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)
+    untestable = f"as {len(diagnosis.suspects)} candidates, {apart} of them untestable with these data"
     return [
         KeyNumber("chi², correlated errors", chi2, misfit.of_freedom),
         KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
-        KeyNumber("effects tried", f"{len(diagnosis.suspects)}", f"{apart} of them untestable with these data"),
+        KeyNumber("effects tried", f"{effects_among(diagnosis.suspects)}", untestable),
         KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),
         KeyNumber("error of the grid", f"{short(1000 * errors.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
     ]

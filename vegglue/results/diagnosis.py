@@ -22,7 +22,7 @@ from vegglue.results.causes import (
     ModelErrorUsed,
     PlaceMap,
 )
-from vegglue.results.suspect import Suspect
+from vegglue.results.suspect import Suspect, counted_in_words
 
 # instrument: some readings are off. Whether more is missing says `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
@@ -234,7 +234,7 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         misfit, sizes = self.misfit, [(name, self.suspect(name).amplitude) for name in self.set]
-        tested = f"{len(self.suspects)} effects tested, vegglue {self.version}"
+        tested = f"{counted_in_words(self.suspects)} tested, vegglue {self.version}"
         return in_short(
             f"Diagnosis of {self.name}: {self.verdict.kind}",
             [

@@ -1,8 +1,11 @@
 """One effect under suspicion, as the data see it: how large, how surely, and whether they could show it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from vegglue.in_short import so_many
 
 # |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
 # its trace (cos^2 = 0.64).
@@ -83,3 +86,17 @@ class Suspect:
     amplitude: AmplitudeEstimate
     test: ScoreTest
     detectability: Detectability
+
+
+def effects_among(suspects: Sequence[Suspect]) -> int:
+    """How many effects they are, wherever each may act."""
+    return len({one.name.partition("[")[0] for one in suspects})
+
+
+def counted_in_words(suspects: Sequence[Suspect]) -> str:
+    """`54 effects`; `67 candidates of 54 effects` where some of them are one effect in one experiment, section, device
+    or patch each.
+    """
+    number = effects_among(suspects)
+    told = so_many(number, "effect")
+    return told if number == len(suspects) else f"{so_many(len(suspects), 'candidate')} of {told}"
