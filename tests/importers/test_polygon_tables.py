@@ -31,7 +31,9 @@ def test_a_table_of_corners_is_read_as_patches(tmp_path: Path) -> None:
     assert [(one.name, one.stems) for one in case.plants.patches] == [("reed", 20.0), ("sedge", 40.0)]
     assert [len(one.polygon or ()) for one in case.plants.patches] == [4, 3]
     assert case.imported is not None
-    assert case.imported[-1].taken == "2 patches: stems from Stems/m2; not read: d (mm)"
+    assert case.imported[-1].taken == (
+        "2 patches: stems from Stems/m2; no unit given of x and y, taken as m; not read: d (mm)"
+    )
     assert not any("equally dense" in one for one in assumptions_of(folder))
 
 
@@ -64,4 +66,21 @@ def test_a_density_is_told_by_its_heading_and_its_unit(tmp_path: Path, heading: 
     if density is None:
         assert said == "1 patch: no stems, and so equally dense; not read: a_per_m"
     else:
-        assert said == f"1 patch: stems from {heading}"
+        taken = "" if "2" in heading or "²" in heading else f"; no unit given of {heading}, taken as 1/m2"
+        assert said == f"1 patch: stems from {heading}{taken}"
+
+
+@pytest.mark.parametrize(
+    ("heading", "taken"),
+    [
+        ("name,x,y,stems", "; no unit given of x and y, taken as m, and of stems, taken as 1/m2"),
+        ("name,x_m,y [m],stems", "; no unit given of stems, taken as 1/m2"),
+        ("name,x_cm,y_cm,stems_per_m2", ""),
+    ],
+)
+def test_units_that_a_table_of_patches_does_not_give_are_told(tmp_path: Path, heading: str, taken: str) -> None:
+    """Those of measurements were, and of plants nothing was said."""
+    rows = "".join(f"reed,{x},{y},20\n" for x, y in SQUARE[:-1])
+    (tmp_path / "patch.csv").write_text(f"{heading}\n{rows}", encoding="utf-8")
+    found = planted_polygons(tmp_path / "patch.csv", None)
+    assert planted_in_words(found) == f"1 patch: stems from {heading.split(',')[-1]}{taken}"

@@ -1,7 +1,7 @@
 """Polygons of patches and friction classes from GeoJSON, shapefiles and tables, brought into the channel."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,14 @@ import numpy as np
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
-from vegglue.importers.polygon_properties import CLASSES, NAMES, density_factor, density_heading, first_heading
+from vegglue.importers.polygon_properties import (
+    CLASSES,
+    NAMES,
+    density_factor,
+    density_heading,
+    first_heading,
+    names_its_unit,
+)
 from vegglue.importers.polygon_tables import polygons_of_table
 from vegglue.in_short import listed, so_many
 
@@ -23,7 +30,7 @@ Ring = list[tuple[float, float]]
 @dataclass(frozen=True)
 class NamedPolygon:
     """Corners in the channel [m]; density [1/m2] and class where the file says them; density_from: its heading;
-    unread: headings of what else the file says of it.
+    unread: headings of what else the file says of it; lengths_taken: which of x and y were taken as m, unsaid.
     """
 
     name: str
@@ -32,22 +39,25 @@ class NamedPolygon:
     friction_class: str | None
     density_from: str | None = None
     unread: tuple[str, ...] = ()
+    lengths_taken: tuple[str, ...] = ()
 
 
 def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
     """All polygons of a file, each part of one for itself. Errors: InputError for another file, and for degrees."""
-    features = list(_features(path))
+    features, taken = _features(path)
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     refuse_degrees(path, frame, [ring for ring, _ in features])
-    return [_named_polygon(path, frame, f"p{number}", *one) for number, one in enumerate(features, 1)]
+    named = [_named_polygon(path, frame, f"p{number}", *one) for number, one in enumerate(features, 1)]
+    return [replace(one, lengths_taken=taken) for one in named]
 
 
-def _features(path: Path) -> Iterable[tuple[Ring, Mapping[str, Any]]]:
+def _features(path: Path) -> tuple[Sequence[tuple[Ring, Mapping[str, Any]]], tuple[str, ...]]:
+    """Outlines with their properties, and which of x and y nobody gave a unit of; a map is in m by its frame."""
     ending = path.suffix.lower()
-    if ending == ".shp":
-        return _of_shapefile(path)
-    return polygons_of_table(path) if ending in TABLES else _of_geojson(path)
+    if ending in TABLES:
+        return polygons_of_table(path)
+    return list(_of_shapefile(path) if ending == ".shp" else _of_geojson(path)), ()
 
 
 def _named_polygon(
@@ -70,9 +80,17 @@ def planted_in_words(found: Sequence[NamedPolygon]) -> str:
     known = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
     unread = dict.fromkeys(heading for one in found for heading in one.unread)
     said = f"stems from {listed(list(known))}" if known else "no stems, and so equally dense"
-    return f"{so_many(len(found), 'patch', 'patches')}: {said}" + (
-        f"; not read: {listed(list(unread))}" if unread else ""
-    )
+    clauses = [f"{so_many(len(found), 'patch', 'patches')}: {said}", *units_taken(found)]
+    return "; ".join([*clauses, *([f"not read: {listed(list(unread))}"] if unread else [])])
+
+
+def units_taken(found: Sequence[NamedPolygon]) -> list[str]:
+    """`no unit given of x and y, taken as m`, and the same of densities, taken as 1/m2; nothing where all are given."""
+    lengths = [*dict.fromkeys(axis for one in found for axis in one.lengths_taken)]
+    headings = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
+    plain = [heading for heading in headings if not names_its_unit(heading)]
+    taken = [f"{listed(names)}, taken as {unit}" for names, unit in ((lengths, "m"), (plain, "1/m2")) if names]
+    return [f"no unit given of {', and of '.join(taken)}"] if taken else []
 
 
 def planted_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:

@@ -25,6 +25,12 @@ def density_factor(heading: str) -> float:
     return UNITS["density"][f"1/{(found and found[1]) or 'm2'}"]
 
 
+def names_its_unit(heading: str) -> bool:
+    """Whether the heading of a density says of what it is."""
+    found = DENSITY.fullmatch(words_of(heading))
+    return bool(found and found[1])
+
+
 def first_heading(properties: Properties, names: Iterable[str]) -> str | None:
     """The heading that is the first of these names and holds something; None where there is none."""
     known = {words_of(heading): heading for heading in properties if _holds(properties[heading])}

@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import role_of
+from vegglue.importers.columns_of_table import columns_of_table, taken_as_si
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import rows_of_table
@@ -16,8 +17,9 @@ Corners = list[tuple[float, float]]
 FEWEST_CORNERS = 3
 
 
-def polygons_of_table(path: Path) -> list[tuple[Corners, Mapping[str, str]]]:
+def polygons_of_table(path: Path) -> tuple[list[tuple[Corners, Mapping[str, str]]], tuple[str, ...]]:
     """Corners [m] and properties, those of its first row, of each name; of all rows where no column names polygons.
+    And which of x and y nobody gave a unit of.
 
     Errors: InputError for a table without x and y, a corner that lacks one, and fewer corners than a triangle has.
     """
@@ -45,4 +47,5 @@ def polygons_of_table(path: Path) -> list[tuple[Corners, Mapping[str, str]]]:
                 f"{shown_path(path)}: expected three corners or more of patch {name!r}, got {len(corners)}; add them, "
                 "a row each, or write a rectangle into the site file, `patches: [{x: [20, 24], y: [0, 1.5]}]`."
             )
-    return list(found.values())
+    assumed = taken_as_si(table, columns_of_table(path, table, FileWords()), FileWords())
+    return list(found.values()), tuple(one for one in ("x", "y") if one in assumed)

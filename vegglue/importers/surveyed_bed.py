@@ -18,7 +18,7 @@ from vegglue.importers.field_site import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.file_words import file_words
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import read_polygons
+from vegglue.importers.polygon_files import read_polygons, units_taken
 from vegglue.importers.terrain_files import RASTERS, Terrain, filled, read_terrain
 from vegglue.site.grid import Grid, centres
 
@@ -157,8 +157,10 @@ def _friction(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, li
         return friction, []
     path = _named(folder, site.classes, "classes")
     zones = []
-    for polygon in read_polygons(path, place.frame):
+    polygons = read_polygons(path, place.frame)
+    for polygon in polygons:
         name = case_name(polygon.friction_class or polygon.name)
         friction["classes"].setdefault(name, MANNING_BED)
         zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
-    return friction | {"zones": zones}, [record(path, None, f"friction classes: {len(zones)} polygons")]
+    said = "; ".join([f"friction classes: {len(zones)} polygons", *units_taken(polygons)])
+    return friction | {"zones": zones}, [record(path, None, said)]
