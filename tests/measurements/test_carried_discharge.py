@@ -132,7 +132,7 @@ def test_a_name_stands_beside_the_doubt() -> None:
     named = grounds(step("wind"), carried=(HIGHER,))
     _, sentence, remarks = said(named)
     doubt = "sections carry 1.5 times the stated discharge in experiment low"
-    assert sentence.endswith(f"But {doubt}, and what is missing may only make up for that.")
+    assert sentence.endswith(f"But {doubt}, and what is said of the model may only make up for that.")
     assert remarks.startswith(
         "The velocities of 1 section in experiment low carry 1.5 times the stated discharge (A, x"
     )

@@ -63,7 +63,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
 def _carried(grounds: Grounds) -> str:
     """That sections carry another discharge than stated, behind whatever is said of the model; '' where none does."""
     off = carried_in_short(grounds.carried)
-    return f" But {off}, and what is missing may only make up for that." if off else ""
+    return f" But {off}, and what is said of the model may only make up for that." if off else ""
 
 
 def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
