@@ -11,7 +11,7 @@ from house import FILES, PACKAGE, ROOT, folders, functions, imported, imported_f
 from house import public_names as public_names_of
 
 MODULES = [path for path in FILES if path.name != "__init__.py"]
-NOWHERE_ELSE = {"numpy", "scipy"}  # at home everywhere
+AT_HOME_EVERYWHERE = {"numpy", "scipy"}
 # Folders or files where each library may be imported. A new home is a decision: say it here.
 HOMES = {
     "h5py": {"storage"},
@@ -76,7 +76,7 @@ def test_files_import_each_other_in_no_circle() -> None:
         needs = {name: needed for name, needed in needs.items() if name not in free}
 
 
-def test_files_above_the_folders_know_none_of_them() -> None:
+def test_files_beside_the_folders_know_none_of_them() -> None:
     """errors, arrays and their like are below all folders; only what Python starts with lies above."""
     for path in PACKAGE.glob("*.py"):
         if path.stem not in ("__init__", "__main__"):
@@ -87,7 +87,7 @@ def test_every_library_stays_at_home() -> None:
     found: dict[str, set[str]] = {}
     for path in FILES:
         home = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        for library in of_others(path) - NOWHERE_ELSE:
+        for library in of_others(path) - AT_HOME_EVERYWHERE:
             found.setdefault(library, set()).add(home)
     assert found == HOMES | HOMES_OF_EXTRAS
 
@@ -95,7 +95,7 @@ def test_every_library_stays_at_home() -> None:
 def test_what_is_imported_is_what_is_declared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[<>=\[ ]", requirement)[0] for requirement in project["dependencies"]}
-    assert declared == {DISTRIBUTIONS.get(library, library) for library in HOMES} | NOWHERE_ELSE
+    assert declared == {DISTRIBUTIONS.get(library, library) for library in HOMES} | AT_HOME_EVERYWHERE
     extras = [
         one for name in ("arviz", "cluster", "field", "instruments") for one in project["optional-dependencies"][name]
     ]
@@ -141,7 +141,8 @@ def test_the_map_is_made_of_the_docstrings() -> None:
 
 def tracked() -> list[Path]:
     """Text files of the project, whether or not there is a version control to ask."""
-    inside = [path for name in ("vegglue", "tests", "configs", "data", ".ci") for path in (ROOT / name).rglob("*")]
+    of_text = ("vegglue", "tests", "docs", "configs", "data", ".ci", ".github")
+    inside = [path for name in of_text for path in (ROOT / name).rglob("*")]
     here = [path for path in ROOT.iterdir() if path.suffix in (".md", ".toml") or path.name in ("Makefile", "LICENSE")]
     return [path for path in inside + here if path.is_file() and "__pycache__" not in path.parts]
 
