@@ -1,9 +1,9 @@
 """The commands of the shell: each parses its options, calls one verb of `workflow`, and prints what came.
 
 To add a command, write a function `NAME_command` in the file of its group (`ensemble_commands`, `loop_commands`,
-`effect_commands`, `twin_commands`), with options from `options.py` where they mean the same, and list it in COMMANDS of
-`main.py`. What it does belongs into `workflow`; what it prints into `words.py` and, for `--json`, `objects.py`; README
-lists it.
+`map_commands`, `effect_commands`, `twin_commands`), with options from `options.py` where they mean the same, and list
+it in COMMANDS of `main.py`. What it does belongs into `workflow`; what it prints into `words.py` and, for `--json`,
+`objects.py`. Both tables of `docs/commands.md` list it.
 
 Help and a refused config come at once, since files of commands import nothing heavy at their top: verbs are called as
 `vegglue.NAME`, which imports them then, and all else that needs numpy is imported in the function that needs it.

@@ -1,4 +1,4 @@
-"""The shell of the loop: import, diagnose, discover, extend, compare, next."""
+"""The shell of the loop: import, diagnose, discover, extend, compare, next; and overview, of several runs."""
 
 import sys
 from pathlib import Path
