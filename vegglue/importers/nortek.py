@@ -11,18 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from vegglue.arrays import Array, Mask
+from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import readable_text
 from vegglue.importers.measured_rows import MeasuredRows
+from vegglue.importers.point_records import record_mean, refuse_nowhere
 from vegglue.importers.raw_files import opened_raw
 
 # How a binary record of a Vector begins: its hardware configuration, with its serial number.
 VECTOR_BEGINS = b"\xa5\x05\x18\x00VEC"
-BYTES_OF_A_SAMPLE = 24
-LEAST_CORRELATION = 70.0  # %, the maker's advice for means and turbulence
-SPIKE = 6.0  # robust standard deviations beyond which a sample is a spike; of normal noise one in 5e8 is
+BYTES_OF_A_SAMPLE = 24  # of the record of velocities in a .vec
 
 
 @dataclass(frozen=True)
@@ -78,51 +77,6 @@ def read_vector(path: Path, words: FileWords) -> MeasuredRows:
     return record_mean(path, words, "Vector, binary", velocity[there], correlation[there], float(data.attrs["fs"]))
 
 
-def record_mean(
-    path: Path, words: FileWords, name: str, velocity: Array, correlation: Array, rate: float
-) -> MeasuredRows:
-    """The mean of a record at its `position`, its standard deviation and its length.
-
-    velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%]; rate: [1/s]. Samples of low correlation
-    and spikes are left out, and counted. Errors: InputError where none is left.
-    """
-    u, v, w = velocity.T
-    trusted = trusted_samples(velocity, correlation)
-    if not trusted.any():
-        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
-    x, y, z = (np.array([one]) for one in words.position or ())
-    numbers = {
-        "x": x,
-        "y": y,
-        "z": z,
-        **{axis: part[trusted].mean(keepdims=True) for axis, part in zip("uvw", (u, v, w), strict=True)},
-    }
-    numbers["u_std"] = u[trusted].std(ddof=1, keepdims=True)
-    numbers["duration_s"] = np.array([trusted.sum() / rate])
-    said = f"{name}, {len(velocity):,} samples at {rate:g} Hz, {len(velocity) - int(trusted.sum()):,} left out"
-    device = name.partition(",")[0]
-    return MeasuredRows(numbers, {"device": [device]}, {"u": "velocity x", "v": "velocity y", "w": "velocity z"},
-                 dict.fromkeys("uvw", "m/s"), (said,), of_probe=True)  # fmt: skip
-
-
-def trusted_samples(velocity: Array, correlation: Array) -> Mask:
-    """Samples of sound correlation in all beams, and no spike in any direction (n,).
-
-    velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%].
-    """
-    sound = correlation.min(axis=1) >= LEAST_CORRELATION
-    return np.logical_and.reduce([sound, *(_no_spike(part) for part in velocity.T)])
-
-
-def refuse_nowhere(path: Path, words: FileWords) -> None:
-    """Errors: InputError where the site file does not say where a probe stood."""
-    if words.position is None:
-        raise InputError(
-            f"{shown_path(path)}: expected where the probe stood, `position: [x, y, z]`, which no record says; add "
-            "it to this file in `files`."
-        )
-
-
 def _rows(path: Path) -> tuple[_Layout, Array]:
     lines = [line.split() for line in readable_text(path).splitlines() if line.strip()]
     layout = next((one for one in _LAYOUTS if lines and len(lines[0]) >= one.columns), None)
@@ -137,12 +91,6 @@ def _rows(path: Path) -> tuple[_Layout, Array]:
             f"{shown_path(path)}: expected the columns of a Vectrino or Vector, got others; export it anew."
         )
     return layout, rows
-
-
-def _no_spike(velocity: Array) -> Mask:
-    """Samples within SPIKE times 1.4826 MAD, the robust standard deviation."""
-    off = np.abs(velocity - np.median(velocity))
-    return np.asarray(off <= SPIKE * 1.4826 * max(float(np.median(off)), 1e-4))
 
 
 def _header(path: Path) -> Path | None:

@@ -16,7 +16,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.nortek import LEAST_CORRELATION, refuse_nowhere, trusted_samples
+from vegglue.importers.point_records import LEAST_CORRELATION, refuse_nowhere, trusted_samples
 
 PROFILER_VARIABLES = ("Data", "Config")  # the variables by which such a file is known
 BEAMS = 2  # `coordSystem` of velocities along the beams; 1 for x, y and z
