@@ -16,10 +16,15 @@ from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import FileOfSite
 from vegglue.importers.file_words import file_words
-from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
+from vegglue.importers.map_files import (
+    geojson_features,
+    may_be_degrees,
+    refuse_degrees,
+    rounded_place,
+    shapes_and_records,
+)
 from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import refuse_degrees
 from vegglue.in_short import in_digits
 from vegglue.site.centreline import Centreline, centreline_of
 
@@ -122,7 +127,7 @@ def _of_map(path: Path) -> MeasuredRows:
     if places.ndim != 2 or not np.isfinite(places).all():
         raise InputError(f"{shown_path(path)}: expected a line of points with numbers, got another; draw it anew.")
     x, y = places[:, :2].T
-    if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0:
+    if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and may_be_degrees(zip(x.tolist(), y.tolist(), strict=True)):
         raise InputError(f"{shown_path(path)}: expected coordinates in m, got degrees; save it in a projected system.")
     form = (f"line of {path.suffix[1:]}",)
     return MeasuredRows({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, form)

@@ -1,14 +1,18 @@
 """What map programs save: features of GeoJSON and shapes of shapefiles."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.library_files import read_by_library
 from vegglue.importers.loose_table import readable_text
+
+# No longitude and no latitude is further from 0 [degrees].
+LARGEST_LONGITUDE, LARGEST_LATITUDE = 360.0, 90.0
 
 
 @contextmanager
@@ -45,3 +49,19 @@ def shapes_and_records(path: Path, kind: str) -> Iterator[list[Any]]:
 def rounded_place(x: float, y: float) -> tuple[float, float]:
     """To a tenth of a millimetre [m]."""
     return round(x, 4), round(y, 4)
+
+
+def may_be_degrees(places: Iterable[tuple[float, float]]) -> bool:
+    """Whether all places (east, north) are small enough for degrees."""
+    return all(abs(x) <= LARGEST_LONGITUDE and abs(y) <= LARGEST_LATITUDE for x, y in places)
+
+
+def refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Sequence[tuple[float, float]]]) -> None:
+    """Errors: InputError where all points are degrees and those of the frame are metres."""
+    if frame is None or max(map(abs, frame.origin)) <= LARGEST_LONGITUDE:
+        return
+    if may_be_degrees(place for line in lines for place in line):
+        raise InputError(
+            f"{shown_path(path)}: expected coordinates in m like the origin of `frame`, got degrees; save it in the "
+            f"projected system{f' {frame.crs}' if frame.crs else ''}."
+        )

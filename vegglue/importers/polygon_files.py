@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.map_files import geojson_features, rounded_place, shapes_and_records
+from vegglue.importers.map_files import geojson_features, refuse_degrees, rounded_place, shapes_and_records
 from vegglue.importers.polygon_properties import (
     CLASSES,
     NAMES,
@@ -164,14 +164,3 @@ def _density(path: Path, heading: str, value: Any) -> float:
 
 def _open(ring: Ring) -> Ring:
     return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
-
-
-def refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Ring]) -> None:
-    """Errors: InputError where all points are degrees and those of the frame are metres."""
-    if frame is None or max(map(abs, frame.origin)) <= 360.0:
-        return
-    if all(abs(x) <= 360.0 and abs(y) <= 90.0 for line in lines for x, y in line):
-        raise InputError(
-            f"{shown_path(path)}: expected coordinates in m like the origin of `frame`, got degrees; save it in the "
-            f"projected system{f' {frame.crs}' if frame.crs else ''}."
-        )
