@@ -1,9 +1,10 @@
 """The error ladder as it is kept for the page: what each model of a comparison misses, the baseline first."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from vegglue.plain_json import number_kept
 
 # Errors of a step, which may be unknown.
 ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "noise_floor")
@@ -51,5 +52,5 @@ def ladder_from(tree: Mapping[str, Any]) -> Ladder:
 
 
 def _step_from(step: Mapping[str, Any]) -> LadderStep:
-    errors = {name: math.nan if step[name] is None else float(step[name]) for name in ERRORS}
+    errors = {name: number_kept(step[name]) for name in ERRORS}
     return LadderStep(**{**step, **errors, "added": tuple(step["added"])})

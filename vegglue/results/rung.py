@@ -1,6 +1,5 @@
 """One model of the error ladder, and how it lies in the folder of its run: what it misses, seen and unseen."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +8,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.measurements.kinds import KINDS
+from vegglue.plain_json import number_kept
 
 
 @dataclass(frozen=True)
@@ -83,26 +83,22 @@ def rung_from(tree: Mapping[str, Any]) -> Rung:
         effects=tuple(tree["effects"]),
         values={name: _interval(*value) for name, value in tree["values"].items()},
         in_sample=InSample(
-            rmse={kind: _number(seen["rmse"][kind]) for kind in KINDS},
-            chi2=_number(seen["chi2"]),
+            rmse={kind: number_kept(seen["rmse"][kind]) for kind in KINDS},
+            chi2=number_kept(seen["chi2"]),
             stations=int(seen["stations"]),
-            noise_floor=_number(seen["noise_floor"]),
+            noise_floor=number_kept(seen["noise_floor"]),
         ),
         held_out=HeldOut(
-            sections=np.array([_number(error) for error in held_out["sections"]]),
-            experiments=np.array([_number(error) for error in held_out["experiments"]]),
+            sections=np.array([number_kept(error) for error in held_out["sections"]]),
+            experiments=np.array([number_kept(error) for error in held_out["experiments"]]),
             velocity=np.array([bool(one) for one in held_out["velocity"]]),
             clusters=tuple((str(experiment), str(section)) for experiment, section in held_out["clusters"]),
         ),
-        predictive=PredictiveScores(**{name: _number(value) for name, value in tree["predictive"].items()}),
-        homogeneity={name: _number(p) for name, p in tree["homogeneity"].items()},
-        validation=_number(tree["validation"]),
+        predictive=PredictiveScores(**{name: number_kept(value) for name, value in tree["predictive"].items()}),
+        homogeneity={name: number_kept(p) for name, p in tree["homogeneity"].items()},
+        validation=number_kept(tree["validation"]),
     )
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
-
-
 def _interval(value: float | None, low: float | None, high: float | None) -> tuple[float, float, float]:
-    return _number(value), _number(low), _number(high)
+    return number_kept(value), number_kept(low), number_kept(high)
