@@ -115,7 +115,7 @@ def test_a_question_names_its_best_measurements() -> None:
     useful = Question("wind from waves", tuple(replace(best, name=f"section {n}") for n in range(6)))
     assert repr(useful).splitlines() == [
         "To tell wind from waves (D2 now 2 squared standard errors):",
-        *(f"- section {n}: 9, 3 station(s), 1.5 h" for n in range(4)),
+        *(f"- section {n}: 9, 3 stations, 1.5 h" for n in range(4)),
     ]
     useless = Question("wind from waves", (replace(best, then=2.1),))
     assert repr(useless).endswith(

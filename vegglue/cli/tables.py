@@ -8,7 +8,7 @@ from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
-from vegglue.in_short import in_digits
+from vegglue.in_short import in_digits, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.results.diagnosis import Diagnosis, Suspect
@@ -31,7 +31,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     print_table(headings, rows, headings[1:5])
     for off in found.instruments:
         at = ", ".join(f"{name} = {value:g}" for name, value in (("x", off.x), ("y", off.y)) if np.isfinite(value))
-        console().print(f"- set aside: the {off.kind} at {at} m, {len(off.stations)} reading(s)")
+        console().print(f"- set aside: the {off.kind} at {at} m, {so_many(len(off.stations), 'reading')}")
     of_instruments = {row for off in found.instruments for row in off.stations}
     for row in [row for row in found.errors.flagged if row not in of_instruments]:
         station = found.predictions.station.iloc[row]

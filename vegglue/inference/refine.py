@@ -19,6 +19,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Model, predict
 from vegglue.engine.model import model_of
 from vegglue.engine.newton import NEWTON
+from vegglue.in_short import so_many
 from vegglue.inference.glue import check_stations
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import Sample, sample
@@ -61,7 +62,7 @@ def refine(
     base = modes_and_errors(model, tried, case.infer.sigma, watch)
     run = partial(predict, solved_for(base.model, base.noise), [one.point for one in base.fits])
     density, start = partial(log_posterior, base.noise), mixture_around(base.fits)
-    finished = counted(watch, f"drawing around {len(base.fits)} mode(s)", EFFECTIVE_DRAWS, "effective draws")
+    finished = counted(watch, f"drawing around {so_many(len(base.fits), 'mode')}", EFFECTIVE_DRAWS, "effective draws")
     drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
     watch(Progress("summing up"))
     posterior = _posterior(base, drawn, "" if ensemble is None else ensemble.config_hash)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from vegglue.in_short import in_digits
+from vegglue.in_short import in_digits, so_many
 
 # What stands in a question between an effect that calibration hides and the parameter that hides it.
 HIDDEN_BEHIND = " from a change of "
@@ -90,4 +90,4 @@ def _proposed_from(tree: Mapping[str, Any]) -> ProposedMeasurement:
 
 
 def _in_short(one: ProposedMeasurement) -> str:
-    return f"{one.name}: {in_digits(one.then, 2)}, {one.stations} station(s), {one.hours:.1f} h"
+    return f"{one.name}: {in_digits(one.then, 2)}, {so_many(one.stations, 'station')}, {one.hours:.1f} h"
