@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import FLAG, Json, Quiet, Runs
+from vegglue.cli.options import FLAG, RUNS, Json, Quiet, Runs
 from vegglue.cli.output import print_object
 from vegglue.errors import InputError
 
@@ -27,7 +27,7 @@ def effects_command(
     trust: Annotated[
         bool, typer.Option("--trust", metavar=FLAG, help="Run the Python file of effects that is named.")
     ] = False,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
 ) -> None:
     """List the physical effects that can be added, or show one of them."""
     if check is not None:

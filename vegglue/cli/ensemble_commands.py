@@ -1,7 +1,6 @@
 """The shell of the ensemble: check, simulate, infer, report; and run, which goes the whole way."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
@@ -9,13 +8,13 @@ import typer
 import vegglue
 from vegglue.cli.doubts import opened_case
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
+from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
 
 
 def check_command(
-    config: Config, runs: Runs = Path("runs"), as_object: Json = False, quiet: Quiet = False, trust: Trust = False
+    config: Config, runs: Runs = RUNS, as_object: Json = False, quiet: Quiet = False, trust: Trust = False
 ) -> None:
     """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
     case = vegglue.load_case(config, trust)
@@ -29,7 +28,7 @@ def simulate_command(
     members: Members = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -67,7 +66,7 @@ def infer_command(
     members: Members = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -82,7 +81,7 @@ def infer_command(
 def report_command(
     config: Config,
     members: Members = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -99,7 +98,7 @@ def run_command(
     members: Members = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,

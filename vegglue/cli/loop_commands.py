@@ -9,7 +9,7 @@ import typer
 import vegglue
 from vegglue.cli.doubts import opened_case, opened_cases
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import FLAG, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
+from vegglue.cli.options import FLAG, RUNS, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
@@ -64,7 +64,7 @@ def diagnose_command(
     config: Config,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -95,7 +95,7 @@ def discover_command(
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -120,7 +120,7 @@ def extend_command(
     to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -154,7 +154,7 @@ def extend_command(
 def compare_command(
     configs: Annotated[list[Path], typer.Argument(help="Cases, the baseline first.", show_default=False)],
     jobs: Jobs = -1,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -168,7 +168,7 @@ def compare_command(
 
 def overview_command(
     configs: Annotated[list[Path], typer.Argument(help="Cases with a posterior, the best first.", show_default=False)],
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
@@ -185,7 +185,7 @@ def next_command(
     between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,

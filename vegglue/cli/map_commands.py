@@ -7,7 +7,7 @@ import typer
 
 import vegglue
 from vegglue.cli.hearing import heard
-from vegglue.cli.options import FLAG, Config, Json, Quiet, Runs, Trust
+from vegglue.cli.options import FLAG, RUNS, Config, Json, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
 from vegglue.errors import shown_path
 
@@ -45,7 +45,7 @@ def export_command(
     only: Annotated[
         Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help="The one form to write; all if not given.")
     ] = None,
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,

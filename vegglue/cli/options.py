@@ -12,6 +12,8 @@ FLAG = " "
 
 Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
 Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
+# Where results lie unless told.
+RUNS = Path("runs")
 
 
 def _some(jobs: int) -> int:

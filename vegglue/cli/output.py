@@ -8,14 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vegglue.cli.options import RUNS
 from vegglue.plain_json import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-
-# Where results lie unless told.
-RUNS = Path("runs")
 # Letters of a line in a file or a pipe, where nothing has to be left out.
 WIDEST = 1000
 # Spaces between two columns of a table.

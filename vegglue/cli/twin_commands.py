@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import vegglue
-from vegglue.cli.options import Force, Json, Quiet, Runs, Trust
+from vegglue.cli.options import RUNS, Force, Json, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
 from vegglue.errors import shown_path
 
@@ -43,7 +43,7 @@ def twin_command(
 
 def reveal_command(
     folder: Annotated[Path, typer.Argument(help="Folder that `vegglue twin` made.", show_default=False)],
-    runs: Runs = Path("runs"),
+    runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,

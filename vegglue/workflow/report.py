@@ -42,7 +42,7 @@ def report(case: Case, *, runs: Path | str = "runs", members: int | None = None,
     return write_report(replace(known, flow=flow))
 
 
-def results_of(sized: Case, case: Case, runs: Path | str = "runs", above: str = "../") -> Run:
+def results_of(sized: Case, case: Case, runs: Path | str, above: str = "../") -> Run:
     """All that is kept of a run but its flow. sized: the case with as many members as its ensemble has, which is all
     that a diagnosis does not depend on; above: the folder of all runs, seen from the page that is made.
 
@@ -85,7 +85,7 @@ def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
         )
 
 
-def loop_results_of(case: Case, runs: Path | str = "runs", above: str = "../") -> LoopResults:
+def loop_results_of(case: Case, runs: Path | str, above: str) -> LoopResults:
     """What diagnose, extend, compare and next left of exactly this case, and of the model its ladder begins with."""
     runs, wanted = Path(runs), case_hash(case)
     ladder = ladder_that_fits(runs / case.name, wanted)

@@ -58,7 +58,7 @@ def simulate(
     return read_ensemble(path)
 
 
-def is_simulated(case: Case, runs: Path | str = "runs") -> bool:
+def is_simulated(case: Case, runs: Path | str) -> bool:
     """Whether a readable ensemble of exactly this case is there, with its fields if the case keeps any."""
     path, wanted = Path(runs) / case.name / "ensemble.h5", simulation_hash(case)
     try:
