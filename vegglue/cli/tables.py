@@ -18,6 +18,11 @@ from vegglue.workflow.compare import Comparison
 
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
+# p-value [-] of one parameter below which the ladder says that it differs between experiments: of five parameters, one
+# does by chance in one model of twenty. The words on a posterior are stricter, they count how many were compared.
+TOLD_TO_DIFFER = 0.01
+# Suspects in the table, the strongest: they fit on a screen with what is said of them, and the page has all.
+SUSPECTS_SHOWN = 10
 
 
 def show_diagnosis(found: Diagnosis) -> None:
@@ -26,7 +31,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     console().print(found.verdict.sentence)
     for remark in found.verdict.remarks:
         console().print(f"- {remark}")
-    rows = [_suspect_cells(found, one) for one in found.suspects[:10]]
+    rows = [_suspect_cells(found, one) for one in found.suspects[:SUSPECTS_SHOWN]]
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
     print_table(headings, rows, headings[1:5])
     for off in found.instruments:
@@ -120,7 +125,7 @@ def show_ladder(found: Comparison) -> None:
     if note:
         console().print(note)
     for one in rungs:
-        moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < 0.01]
+        moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < TOLD_TO_DIFFER]
         if moving:
             console().print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
 
