@@ -47,6 +47,8 @@ from vegglue.version import VERSION
 ODDS_OF_FIELD = 100.0
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
+# Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
+NEIGHBOURS_WITHIN = 1.5
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -202,7 +204,7 @@ def _neighbours_aside(screening: Screening, found: Findings) -> bool:
     single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
     noise = screening.base.noise
     rows = [int(np.flatnonzero(noise.rows == station)[0]) for station in single]
-    return any(0.0 < noise.separation[a, b] < 1.5 for a in rows for b in rows)
+    return any(0.0 < noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
 
 
 def _strained(screening: Screening) -> tuple[str, float]:

@@ -25,6 +25,7 @@ from vegglue.measurements.carried_in_words import carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 from vegglue.results.suspect import counted_in_words
+from vegglue.screening.candidates import START_OFF_ENDS
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -42,7 +43,7 @@ ABSURD = 4.0
 FAR_OFF = 4.0
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
-AT_BOUND = 0.01
+AT_BOUND = START_OFF_ENDS
 NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad probe does not explain"
 
 

@@ -19,6 +19,9 @@ from vegglue.measurements.kinds import velocity_rows
 
 # Combinations of shapes of an effect that a search tries at most. Chosen, not measured: each is a tangent of the flow.
 MOST_SETTINGS = 12
+# Share of a plausible size [-] by which a fit starts off the ends of a support: there the normal variable in which it
+# searches is at its furthest. Chosen, not measured.
+START_OFF_ENDS = 0.01
 # Tags of effects that are no suspects of their own: something at a place, and laws of the grammar.
 NOT_SEARCHED = {"search", "law"}
 
@@ -204,5 +207,5 @@ def prior_of(candidate: Candidate) -> Parameter:
 
 def start_amplitude(amplitude: Amplitude, gain: float) -> float:
     """The amplitude of that gain, kept off the ends of its support."""
-    margin = 0.01 * min(amplitude.scale, amplitude.high - amplitude.low)
+    margin = START_OFF_ENDS * min(amplitude.scale, amplitude.high - amplitude.low)
     return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))
