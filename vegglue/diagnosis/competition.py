@@ -24,7 +24,7 @@ from vegglue.diagnosis.tempered_chances import tempered_chances, tempering
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import HypothesisKind
+from vegglue.screening.evidence import HypothesisKind, kind_named
 from vegglue.screening.instruments import Instrument
 from vegglue.screening.places import EFFECT_AT_PLACE, Places
 from vegglue.screening.residual_screening import Screening, refit_start
@@ -92,30 +92,30 @@ class _Round:
 
 def _round(screening: Screening, linear: Array, best: float, tried: set[str]) -> _Round:
     """What is within reach of the best and was not tried."""
-    kinds, candidates = {kind.name: kind for kind in screening.kinds}, screening.fingerprints.candidates
+    candidates = screening.fingerprints.candidates
     effects = [j for j in _worth_refitting(screening, linear, best) if candidates[j].name not in tried]
     places = [
         (one, promising_spots(screening, one, best))
         for one in screening.fingerprints.places
-        if f"{one.term} at a place" not in tried and _within_reach(kinds[one.term].total, best)
+        if f"{one.term} at a place" not in tried and _within_reach(kind_named(screening.kinds, one.term).total, best)
     ]
     return _Round(effects, places)
 
 
 def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[float]:
     """ln evidence to first order of what may be refitted and was not tried."""
-    kinds, candidates = {kind.name: kind for kind in screening.kinds}, screening.fingerprints.candidates
+    candidates = screening.fingerprints.candidates
     of_each = _of_each(screening, linear)
     effects = [float(of_each[j]) for j in _most_promising(of_each) if candidates[j].name not in tried]
     terms = [one.term for one in screening.fingerprints.places if f"{one.term} at a place" not in tried]
-    return effects + [kinds[term].total for term in terms]
+    return effects + [kind_named(screening.kinds, term).total for term in terms]
 
 
 def _refitted(
     screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[SecondLook]], watch: Watch
 ) -> list[Contender]:
     """Contenders of one round, those that found a flow; promised: evidence to first order, and the second looks."""
-    linear, kinds = promised[0], {kind.name: kind for kind in screening.kinds}
+    linear = promised[0]
     effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
     trials = [_effect_trial(screening, j, *promised) for j in effects]
     trials += [_place_trial(screening, one, spot) for one, spot in spots]
@@ -124,12 +124,12 @@ def _refitted(
     for j, refit in zip(effects, refits, strict=False):
         if refit is not None:
             column = _column_of(screening, j, linear)
-            evidence = refit.log_factor + _settings_charge(screening, kinds["effect"], j, column)
+            evidence = refit.log_factor + _settings_charge(screening, j, column)
             found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
     for one, _ in of_round.places:
         of_term = zip(spots, refits[len(effects) :], strict=True)
         ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
-        found += _place_contender(screening.search, one, kinds[one.term], ended)
+        found += _place_contender(screening.search, one, kind_named(screening.kinds, one.term), ended)
     return found
 
 
@@ -180,7 +180,7 @@ def promising_spots(screening: Screening, places: Places, best: float) -> list[i
     """The best spot of each length, those within reach; none where something of the term acts already: an effect at
     the same place has its name, and would take its place in the case.
     """
-    kind, case = next(kind for kind in screening.kinds if kind.name == places.term), screening.search.model.case
+    kind, case = kind_named(screening.kinds, places.term), screening.search.model.case
     effect = library(case.effect_file)[EFFECT_AT_PLACE[places.term]]
     acting = [place_candidate(effect, places.shapes(spot)).key in case.effects for spot in range(places.x.size)]
     evidence = np.where(acting, -np.inf, kind.log_evidence)
@@ -211,7 +211,7 @@ def _effect_trial(screening: Screening, candidate: int, linear: Array, looks: Se
 def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
     """Something unlisted at one spot, from the best place and the size of its score."""
     case, search = screening.search.model.case, screening.search
-    kind = next(kind for kind in screening.kinds if kind.name == places.term)
+    kind = kind_named(screening.kinds, places.term)
     shapes = places.shapes(spot)
     candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[places.term]], shapes, places.plausible)
     gain = float(kind.gain[spot])
@@ -219,9 +219,9 @@ def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
     return RefitTrial(candidate, shapes, tuple(starts))
 
 
-def _settings_charge(screening: Screening, kind: HypothesisKind, candidate: int, column: int) -> float:
+def _settings_charge(screening: Screening, candidate: int, column: int) -> float:
     """ln prior of an effect whose setting `column` was refitted, and what its other settings add to first order."""
-    columns = screening.fingerprints.columns[candidate]
+    columns, kind = screening.fingerprints.columns[candidate], screening.kinds[0]
     evidence = kind.log_evidence
     others = float(np.logaddexp.reduce(evidence[columns]) - evidence[columns].max())
     return float(kind.log_prior[column]) + others

@@ -37,6 +37,7 @@ from vegglue.results.diagnosis import (
     Suspect,
 )
 from vegglue.screening import score_test
+from vegglue.screening.evidence import kind_named
 from vegglue.screening.residual_screening import Screening
 from vegglue.site.channel_geometry import half_width
 from vegglue.version import VERSION
@@ -233,5 +234,5 @@ def _place_map(screening: Screening, found: Findings) -> PlaceMap:
     """Scores of the term of the first place that was found, else of drag, before anything was accepted."""
     term = found.places[0].term if found.places else "drag"
     places = next(one for one in screening.fingerprints.places if one.term == term)
-    scores = next(one for one in screening.kinds if one.name == term).scores
+    scores = kind_named(screening.kinds, term).scores
     return PlaceMap(term, places.x, places.y, scores)

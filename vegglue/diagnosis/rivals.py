@@ -16,7 +16,7 @@ from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 from vegglue.screening import score_test
-from vegglue.screening.evidence import prior_shrinkage
+from vegglue.screening.evidence import kind_named, prior_shrinkage
 from vegglue.screening.instruments import Instrument, error_columns
 from vegglue.screening.residual_screening import Screening
 
@@ -115,7 +115,7 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     """One contender, something at a place, as a location."""
     best = contenders[which]
     places = next(one for one in screening.fingerprints.places if one.term == best.kind)
-    kind = next(one for one in screening.kinds if one.name == best.kind)
+    kind = kind_named(screening.kinds, best.kind)
     noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]
     white = noise.whiten(noise.used(column))[:, 0] ** 2
     names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
@@ -144,7 +144,7 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
 def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:
     """The best contender, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
     noise = screening.base.noise
-    kind = next(of for of in screening.kinds if of.name == best.kind)
+    kind = kind_named(screening.kinds, best.kind)
     length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
     shrunk = float(prior_shrinkage(kind.size[best.column]))
     offset, spread = shrunk * score / length, np.sqrt(shrunk) / length

@@ -10,7 +10,7 @@ sum over all, against the same sum in draws of errors alone.
 Source: Kass and Raftery (1995), doi:10.2307/2291091, for Bayes factors; not checked against it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +62,11 @@ class HypothesisKind:
     def best(self) -> int:
         """The column with the most evidence."""
         return int(np.argmax(self.log_evidence))
+
+
+def kind_named(kinds: Iterable[HypothesisKind], name: str) -> HypothesisKind:
+    """The kind of that name."""
+    return next(one for one in kinds if one.name == name)
 
 
 def kind_of_hypotheses(
