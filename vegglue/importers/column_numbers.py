@@ -9,6 +9,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.loose_table import LooseTable
 from vegglue.in_short import so_many
+from vegglue.measurements.suspicious_values import is_of_nines
 
 # Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
 # 99 m may be a level. Others are named by `missing` in the site file.
@@ -54,12 +55,12 @@ def refuse_negative(path: Path, table: LooseTable, place: int, errors: Array) ->
 
 def _nines(value: float) -> bool:
     """-99, -999.9 and the like: no level, and no velocity in any unit that comes near to it."""
-    return bool(value <= -99.0) and set(f"{-value:g}") <= set("9.")
+    return bool(value <= -99.0) and is_of_nines(-value)
 
 
 def doubted_nines(values: Array, heading: str) -> list[str]:
     """That velocities of nines only, 99.99, may be marks; they may be velocities, too, and are kept."""
-    nines = {f"{value:g}" for value in values if value > 0.0 and set(f"{value:g}") <= set("9.")}
+    nines = {f"{value:g}" for value in values if value > 0.0 and is_of_nines(value)}
     return [
         f"kept {nine} in {heading} (if it marks no value, say `missing: [{nine}]`)"
         for nine in sorted(nines)

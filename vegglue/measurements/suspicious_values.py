@@ -213,4 +213,9 @@ def is_mark(value: float) -> bool:
     size = abs(value)
     if size >= LARGEST_NUMBER or size in MISSING_MARKS:
         return True
-    return size >= 9.0 and set(f"{size:g}") <= set("9.")
+    return size >= 9.0 and is_of_nines(size)
+
+
+def is_of_nines(value: float) -> bool:
+    """Whether a number is written with nines alone: 9, 99.9, 9999."""
+    return set(f"{value:g}") <= set("9.")
