@@ -24,6 +24,8 @@ CHECK_OR_MOVE = "check the file, or move it out of the folder where it holds no 
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 # Lines from the end of a file by which its separator is told: titles stand at its head.
 LOOKED_AT = 200
+# Share of the lines [-] by which one further back in that order has to cut more of them to be taken.
+MORE_LINES_CUT = 0.2
 # `U [m/s]` in a heading parted by spaces is one field; in a row of units none has a name before it.
 UNIT_BEHIND_NAME = re.compile(r"(?<=[^\s\])])\s+([\[(][^\s\[\]()]+[\])])")
 BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or not
@@ -95,7 +97,7 @@ def _separator(lines: Sequence[str]) -> str:
         fields = [len(_filled(_fields(line, separator))) for line in lines[-LOOKED_AT:]]
         counts = Counter(count for count in fields if count > 1)
         share = max(counts.values(), default=0) / len(fields) if fields else 0.0
-        if share > best + 0.2:
+        if share > best + MORE_LINES_CUT:
             found, best = separator, share
     return found
 

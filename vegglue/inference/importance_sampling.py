@@ -27,6 +27,9 @@ SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 GROWTH = 2
 # Draws with a density below which nothing is drawn anew: the emulator predicts each from others.
 FEWEST_SOLVED = 2
+# Effective share of the draws [-] below which the next round is small, and the least that is hoped for of another,
+# as proposals get better; what is drawn over what is missing, for hope may be wrong. Chosen, not measured.
+POOR_SHARE, HOPED_SHARE, OVER_MISSING = 0.25, 0.75, 1.05
 # Draws come in sets of this size: neighbours are solved together.
 DRAWS_TOGETHER = 16
 Predict = Callable[[Array], Array]
@@ -109,5 +112,8 @@ def _effective_share(logs: Array, z: Array, own: list[tuple[int, Mixture]]) -> f
 
 def _next_size(missing: float, share: float) -> int:
     """Draws of the next round: few while only a small `share` of the draws is effective, else what is missing."""
-    size = 2 * FIRST_DRAWS if share < 0.25 else np.clip(1.05 * missing / max(share, 0.75), DRAWS_TOGETHER, MOST_DRAWS)
+    if share < POOR_SHARE:
+        size = 2 * FIRST_DRAWS
+    else:
+        size = np.clip(OVER_MISSING * missing / max(share, HOPED_SHARE), DRAWS_TOGETHER, MOST_DRAWS)
     return int(DRAWS_TOGETHER * np.ceil(size / DRAWS_TOGETHER))

@@ -19,6 +19,10 @@ EFFECTIVE_TO_FIT = 200
 ADAPTATION_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, COMPONENTS_ADDED = 8, 4096, 12, 3
 # Rounds whose draws are pooled; draws of equal weight that a fit is made to, in so many steps.
 ROUNDS_POOLED, DRAWS_FITTED, FIT_STEPS = 3, 2000, 10
+# Share that is handed out evenly after each fit: a component that nothing belongs to for once can grow again.
+SHARED_EVENLY = 0.05
+# Steps that halve the range of the power t in w^t: 1 in 2^40 is left of it.
+HALVINGS = 40
 # Share of the effective draws given up to cover the tails, for a normal density: the mixture adapts to a flatter one.
 TAIL_SHARE = 0.2
 # Adaptation ends when this share of the draws is effective, or when a round gains less than this factor on the last.
@@ -116,7 +120,7 @@ def tempered(weights: Array, wanted: float) -> Array:
     low, high = 0.0, 1.0
     logs = np.log(np.maximum(weights, 1e-300))
     logs -= logs.max()
-    for _ in range(40):
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         enough = effective_size(np.exp(middle * logs)) >= wanted
         low, high = (middle, high) if enough else (low, middle)
@@ -153,4 +157,5 @@ def _fitted(mixture: Mixture, z: Array, worth: float) -> Mixture:
         scatter = (z - centre[k]).T @ ((z - centre[k]) * gain[:, k, None])
         kept = 2.0 * p / worth
         lower[k] = np.linalg.cholesky((scatter + kept * lower[k] @ lower[k].T) / (share[k] + kept))
-    return replace(mixture, share=(share + 0.05 / share.size) / 1.05, centre=centre, lower=lower)
+    share = (share + SHARED_EVENLY / share.size) / (1.0 + SHARED_EVENLY)
+    return replace(mixture, share=share, centre=centre, lower=lower)
