@@ -6,13 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
+from untrusted_imports import IMPORTS
 
 import vegglue
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError
+from vegglue.importers import instruments
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.instruments import reader_of
-from vegglue.importers.nortek import read_nortek
+from vegglue.importers.nortek import read_nortek, read_vector
+from vegglue.importers.pd0_transects import read_pd0
 from vegglue.importers.tape_tables import read_tape_table
 from vegglue.importers.winriver import read_winriver
 from vegglue.measurements.observations import read_observations
@@ -24,6 +27,17 @@ SITE = """\
 channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}
 experiments: {June: {discharge: 2.0, level: 0.95}}
 """
+
+
+def test_every_reader_has_a_file_that_is_damaged(tmp_path: Path) -> None:
+    """But those that hand raw records to mhkit, which may not be there."""
+    damaged = set()
+    for name, content, _ in IMPORTS:
+        (tmp_path / name).write_bytes(content)
+        (tmp_path / name).with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
+        damaged.add(reader_of(tmp_path / name))
+    known = {one for name, one in vars(instruments).items() if name.startswith("read_")}
+    assert known - damaged == {read_pd0, read_vector}
 
 
 @pytest.mark.parametrize("export", [flowtracker, riversurveyor])

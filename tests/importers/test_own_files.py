@@ -1,5 +1,6 @@
 """Files as people have them become a case: what is in them is found, converted, turned, and told in one line each."""
 
+import re
 from math import cos, radians, sin
 from pathlib import Path
 
@@ -34,6 +35,14 @@ def survey_on_the_map() -> str:
         fields = (*(f"{one:.3f}" for one in place), f"{100 * east:.3f}", f"{100 * north:.3f}")
         lines.append(";".join([str(number), *(field.replace(".", ",") for field in fields)]))
     return "\n".join([*lines, "9;683120,000;247480,000;-999;-999"])
+
+
+def test_the_page_has_every_word_of_a_file() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "own_files.md").read_text(encoding="utf-8")
+    table = page.partition("## What an entry of `files` may say")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE)
+    told = {key for row in rows for key in re.findall(r"`([a-z_]+)", row)}
+    assert told == set(FileWords.__dataclass_fields__)
 
 
 def test_both_velocities_of_a_plain_table_are_taken(tmp_path: Path) -> None:
