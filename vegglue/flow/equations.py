@@ -13,8 +13,8 @@ from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 @dataclass(frozen=True)
 class Faces:
-    """What a state means on the grid: depths [m] at cells, faces, corners; velocities [m/s] and fluxes [m2/s] on
-    faces.
+    """What a state means on the grid: levels [m], depths [m] at cells, faces, corners; velocities [m/s] on faces, and
+    the flux through those between columns [m2/s].
     """
 
     level: Array
@@ -25,7 +25,6 @@ class Faces:
     u: Array
     v: Array
     flux_x: Array
-    flux_y: Array
 
 
 def residual(problem: Problem, state: Array) -> Array:
@@ -78,7 +77,7 @@ def faces(problem: Problem, state: Array) -> Faces:
     level = np.ascontiguousarray(state[:, LEVEL])
     cell, face_x, face_y, corner = all_depths(problem, level)
     u, v = kernels.velocities(state, 0, problem.shape[0], cell, *side_fluxes(problem, cell))
-    return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u, face_y * v)
+    return Faces(level, cell, face_x, face_y, corner, u, v, face_x * u)
 
 
 def cell_depths(problem: Problem, state: Array) -> Array:
