@@ -127,6 +127,13 @@ def as_power(posterior: Posterior, name: str) -> bool:
     return name in posterior.marginals.log10_median and high > 10 * low
 
 
+def study_value(case: Case, posterior: Posterior, name: str) -> tuple[float, float] | None:
+    """Median and standard deviation another study gives, NaN where it gives none, as a power where ours is told so."""
+    table = case.reference.table if case.reference else {}
+    stated = table.get(f"log10_{name}" if as_power(posterior, name) else name)
+    return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
+
+
 def estimate(posterior: Posterior, name: str) -> str:
     """Median ± standard deviation (HTML, with unit); as a power of ten where as_power says so and it is WIDE."""
     unit = unit_html(posterior.sample.unit[name])

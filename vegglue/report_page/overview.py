@@ -1,6 +1,7 @@
 """Several runs as one page, the most telling first: their answers, their parameters side by side, and their reports."""
 
 import html
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from vegglue.figures.style import Picture, publish_text
 from vegglue.figures.typography import short, unit_html
 from vegglue.report_page.answer import CaseAnswer, answer_of
 from vegglue.report_page.answer_words import headline
-from vegglue.report_page.key_numbers import as_power, symbol
+from vegglue.report_page.key_numbers import as_power, study_value, symbol
 from vegglue.report_page.page_file import rendered, write_page
 from vegglue.report_page.run import Run, file_name
 from vegglue.whole_files import folder_within
@@ -154,12 +155,11 @@ def _references(run: Run, name: str) -> Iterator[tuple[str, DrawnInterval]]:
     reference = run.case.reference
     if reference is None:
         return
-    powers = as_power(run.posterior, name)
-    stated = reference.table.get(f"log10_{name}" if powers else name)
+    stated = study_value(run.case, run.posterior, name)
     if stated is not None:
-        centre, sd = stated if isinstance(stated, tuple) else (stated, None)
-        ends = [centre, centre, centre] if sd is None else [centre - BOTH_SIDES * sd, centre, centre + BOTH_SIDES * sd]
-        low, middle, high = (10.0**value if powers else value for value in ends)
+        centre, reach = stated[0], 0.0 if math.isnan(stated[1]) else BOTH_SIDES * stated[1]
+        powers = as_power(run.posterior, name)
+        low, middle, high = (10.0**one if powers else one for one in (centre - reach, centre, centre + reach))
         yield reference.source, DrawnInterval(low, middle, high, others=True)
     if name in reference.made_with:
         made = float(reference.made_with[name])

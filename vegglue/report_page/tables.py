@@ -15,7 +15,7 @@ from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, 
 from vegglue.in_short import telling_digits
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import STREAMWISE, kind_of
-from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, symbol
+from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, study_value, symbol
 from vegglue.report_page.posterior_words import identification
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.run import Run, station_zones
@@ -146,20 +146,14 @@ def _range(low: float, high: float) -> str:
     return f"{short(low, digits)} to {short(high, digits)}"
 
 
-def _study_value(run: Run, name: str) -> tuple[float, float] | None:
-    """Median and standard deviation another study gives, on the scale the parameter is looked at."""
-    table = run.case.reference.table if run.case.reference else {}
-    stated = table.get(f"log10_{name}" if as_power(run.posterior, name) else name)
-    return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
-
-
 def _compared(run: Run, name: str, centre: float, sd: float) -> ReferenceComparison:
     """What others have for a parameter, and how far off `centre` ± `sd` lies (log10 where it is looked at so).
 
     From another study in the standard deviations of both together; from known values in our own and in the study's.
     """
     logarithmic = as_power(run.posterior, name)
-    stated, known = _study_value(run, name), (run.case.reference.made_with if run.case.reference else {}).get(name)
+    stated = study_value(run.case, run.posterior, name)
+    known = (run.case.reference.made_with if run.case.reference else {}).get(name)
     study = study_difference = made_with = made_with_difference = "–"
     if stated is not None:
         study = f"10<sup>{as_given(*stated)}</sup>" if logarithmic else as_given(*stated)
