@@ -82,7 +82,7 @@ def gone(
     alone = SimpleNamespace(rungs=(TWIN.name,), left_out=None)
     made, shown, kept = list[str](), list[str](), list[str]()
 
-    def has_posterior(case: Case, *_: Any) -> bool:
+    def make_posterior(case: Case, *_: Any) -> bool:
         made.append(case.name)
         return False
 
@@ -97,7 +97,7 @@ def gone(
         "held_out_rmse": lambda rung: rungs[rung],
         "next_measurement": lambda case, **_: [],
         "draw_ladder_of": lambda *_: Path("ladder.png"),
-        "_has_posterior": has_posterior,
+        "_make_posterior": make_posterior,
     }
     for name, fake in fakes.items():
         patched.setattr(whole_way, name, fake)

@@ -67,7 +67,7 @@ def run(
     # A posterior of the case without what it lacks would be of a model that is known to be wrong. What the diagnosis
     # said is of the case, whatever its size.
     wanted = members is not None or _is_wanted(last, runs)
-    if _has_posterior(last, members, wanted, runs, jobs, watch, show, force):
+    if _make_posterior(last, members, wanted, runs, jobs, watch, show, force):
         from vegglue.workflow.report import report
 
         show(last, report(last, runs=runs, members=members, watch=watch))
@@ -108,11 +108,11 @@ def _is_wanted(case: Case, runs: Path | str) -> bool:
     return there or case.simulate.fields is not None or needs_ensemble(case, chosen_method(case, None))
 
 
-def _has_posterior(
+def _make_posterior(
     case: Case, members: int | None, wanted: bool, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
 ) -> bool:
-    """Makes the ensemble, if `wanted`, and the posterior of a case where they are not up to date; False where it has no
-    posterior.
+    """Make the ensemble, if `wanted`, and the posterior of a case where they are not up to date; whether it has a
+    posterior then.
     """
     folder, ensemble = folder_of(runs, case), None
     if wanted:
