@@ -6,6 +6,14 @@ import numpy as np
 
 from vegglue.arrays import Array
 
+# Square of 1 mm/s [m2/s2], below which friction is linear in the solver, too (`flow/kernels`).
+AT_REST_SQUARED = 1e-6
+
+
+def speed_of(u: Array, v: Array) -> Array:
+    """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s], never zero, so that it has a derivative at rest."""
+    return np.sqrt(u**2 + v**2 + AT_REST_SQUARED)
+
 
 @dataclass(frozen=True)
 class ChannelGeometry:
@@ -61,8 +69,8 @@ class Cells:
 
     @property
     def speed(self) -> Array:
-        """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s], never zero, so that it has a derivative at rest."""
-        return np.sqrt(self.u**2 + self.v**2 + 1e-6)
+        """|U| [m/s], never zero; see `speed_of`."""
+        return speed_of(self.u, self.v)
 
     @property
     def shear_velocity(self) -> Array:

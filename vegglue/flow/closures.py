@@ -9,7 +9,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import applied
-from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells
+from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells, speed_of
 from vegglue.flow.problem import ACROSS, ALONG, EMPTY, LEVEL, Problem
 from vegglue.flow.wet_and_dry import afloat
 from vegglue.resistance import bed_laws, plant_laws
@@ -121,7 +121,7 @@ def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Ar
         phi=phi,
         canopy_height=canopy_height,
         depth=depth[column, row],
-        speed=np.sqrt(u**2 + v**2 + 1e-6),
+        speed=speed_of(u, v),
         front=geometry.front[column, row],
         edge=geometry.edge[column, row],
         x=geometry.x[column, 0],
