@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from diagnoses import NOTHING, a_location, a_suspect, laws_suspected_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
-from verdicts import grounds
+from verdicts import grounds, step
 
-from vegglue.calibration.noise import GRID_ERROR_SHARE, with_grid_error
+from vegglue.calibration.noise import GRID_ERROR_SHARE, with_correlation, with_grid_error
 from vegglue.diagnosis import conclusion
-from vegglue.diagnosis.conclusion import estimated_errors
+from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, standing_out
 from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.screening.residual_screening import Screening
 
@@ -38,7 +38,7 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
     laws, judged = laws_suspected_of("law_bank_speed_step", chance=0.99), []
     stubs = {
         "laws_suspected": lambda *_: laws, "suspects_of": lambda one: {"wind": tested[one is first]},
-        "_misfit": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
+        "misfit_of": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
         "_place_map": lambda *_: None, "_parameters": lambda *_: None,
         "_grounds": lambda used, held, *_: judged.append((used, held)) or grounds(),
         "judged": lambda *_: NOTHING.verdict,
@@ -50,3 +50,25 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
     found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None)
     assert judged == [(first, Findings())]  # what competed beside the place was told beside the law
     assert (found.places, found.suspects) == ((), (tested[True],))
+
+
+def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
+    """At the rate of the alarm beside what was accepted; what was accepted may be tested again."""
+    chances = {"wind": 0.008, "elder": 0.02, "jet": 0.001}
+    last: Any = SimpleNamespace(
+        fingerprints=SimpleNamespace(candidates=[SimpleNamespace(name=name) for name in chances]),
+        best_score=lambda j: j, effects=SimpleNamespace(p_of=lambda j: list(chances.values())[j]),
+    )  # fmt: skip
+    assert standing_out(last, Findings(steps=(step("jet"),))) == {"wind": 0.008}
+
+
+def test_a_misfit_is_told_in_the_errors_of_the_last_model() -> None:
+    """In those of the first it was told beside the errors of the last: nobody could say whose they were."""
+    station = stations_of(CASE_OF_TWINS, ("A",), 4)
+    base = at_best(CASE_OF_TWINS, station, np.full(12, 0.1), np.zeros((12, 4)))
+    first, last = (
+        SimpleNamespace(base=replace(base, noise=with_correlation(base.noise, 0.0, scale))) for scale in (3.0, 2.0)
+    )
+    zones = misfit_of(cast("Screening", first), cast("Screening", last), ()).zones
+    stated = misfit_of(cast("Screening", SimpleNamespace(base=base)), cast("Screening", SimpleNamespace(base=base)), ())
+    assert 4.0 * zones["chi2"].to_numpy() == pytest.approx(stated.zones["chi2"].to_numpy())

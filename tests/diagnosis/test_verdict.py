@@ -1,11 +1,12 @@
 """From what was found to a verdict in words: when it names, when it only remarks, and when it cannot tell."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import a_field, a_location, a_suspect, an_instrument
+from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspected_of
 from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 
 from vegglue.calibration.fit import chance_of_misfit
@@ -289,6 +290,47 @@ def test_what_is_left_too_large_is_remarked_after_a_step_only() -> None:
     assert left not in said(grounds(step("a")), [a_suspect("a")])[2]
     assert left not in said(grounds(misfit=MISSES))[2]
     assert left not in said(grounds(step(*"abcd"), misfit=MISSES), [a_suspect(name) for name in "abcd"])[2]
+
+
+def test_a_name_is_told_with_what_its_model_still_asks_for() -> None:
+    """ "identified, 100 %" said nothing of errors twice as large as stated, nor of what stood out beside it."""
+    twice, suspects = replace(AS_STATED, scale=2.1), [a_suspect("a"), NONE]
+    one = {"b": 0.008}
+    kind, sentence, remarks = said(grounds(step("a"), errors=twice, standing_out=one), suspects)
+    assert kind == "identified"
+    assert sentence.endswith(
+        " with it. Even so the model asks for errors 2.1 times as large as stated; chi2 and intervals are under these. "
+        "Beside it b (p = 0.008) stands out among all effects, but was not accepted."
+    )
+    assert "too small by a factor" not in remarks, "twice"
+    verdict = judged(grounds(step("a"), errors=twice, standing_out=one), suspects)
+    assert (verdict.sentence.endswith(verdict.left_over), verdict.standing_out) == (True, one)
+    of_place = said(grounds(places=(a_location(),), errors=twice))[1]
+    assert "Even so the model asks for errors 2.1 times as large as stated" in of_place
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"steps": [step("a")], "errors": replace(AS_STATED, scale=1.2)},
+        {"errors": replace(AS_STATED, scale=2.1), "laws": laws_suspected_of("a"), "misfit": MISSES},
+        {"errors": replace(AS_STATED, scale=2.1), "instruments": (an_instrument(),)},
+        {"standing_out": {"b": 0.008}},
+    ],
+)
+def test_only_what_is_clear_is_told_beside_a_name(parts: dict[str, Any]) -> None:
+    verdict = judged(grounds(*parts.pop("steps", ()), **parts), [a_suspect("a")])
+    assert "Even so" not in verdict.sentence + verdict.left_over
+    assert "Beside it" not in verdict.sentence
+
+
+def test_of_many_that_stand_out_three_are_named() -> None:
+    many = {f"e{k}": 0.001 * k for k in range(5, 0, -1)} | {"least": 1 / 3001}
+    sentence = said(grounds(step("a"), standing_out=many), [a_suspect("a")])[1]
+    assert (
+        "Beside it least (p < 0.0003), e1 (p = 0.001), e2 (p = 0.002) and 3 more stand out among all effects, but were "
+        "not accepted."
+    ) in sentence
 
 
 def test_errors_that_are_not_as_stated_are_remarked() -> None:

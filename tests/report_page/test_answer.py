@@ -12,6 +12,7 @@ from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
 from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
+from vegglue.report_page.diagnosis_words import diagnosis_section
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
@@ -263,6 +264,18 @@ def test_words_of_users_close_no_script() -> None:
     text = safe_json([{"section": "</script><script>alert('weeds')</script> & \u2028"}])
     assert not set("<>&\u2028") & set(text)
     assert json.loads(text)[0]["section"].startswith("</script><script>")
+
+
+def test_what_the_model_still_asks_for_stands_beside_its_verdict(toy: Run) -> None:
+    """The page said "identified" above errors twice as large as stated, and nothing of these."""
+    told = {"kind": "identified", "left_over": "Even so the model asks for <more>."}
+    found = a_diagnosis(verdict=told, errors={"scale": 2.1})
+    assert headline(replace(toy, diagnosis=found)).endswith(". Even so the model asks for &lt;more&gt;.")
+    whose = "standard errors (each 2.1 times as large as stated). Errors of measuring alone would make 1."
+    assert whose in where_it_fails(found)
+    numbers = {one.name: one.value for one in diagnosis_section(found).numbers}
+    assert numbers["errors of the data"] == "2.1 times"
+    assert "errors of the data" not in [one.name for one in diagnosis_section(a_diagnosis()).numbers]
 
 
 def test_gauges_that_are_missed_most_are_no_section() -> None:

@@ -18,8 +18,9 @@ from vegglue.storage.result_files import diagnosis_that_fits, read_diagnosis, wr
 HASH = "d" * 64
 ATTRIBUTES = {
     "chi2", "chi2_first", "config", "config_hash", "correlation", "field", "first_parameters", "first_scores",
-    "flagged", "format", "freedom", "grid_error", "instruments", "laws", "locations", "mapped_term", "model_error",
-    "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "steps", "tells_laws",
+    "flagged", "format", "freedom", "grid_error", "instruments", "laws", "left_over", "locations", "mapped_term",
+    "model_error", "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "standing_out",
+    "steps", "tells_laws",
     "threshold", "verdict", "clears_the_model", "version", "where",
 }  # fmt: skip
 OF_STATIONS = [
@@ -44,9 +45,9 @@ DATASETS = {
     "alike": ["name", "other", "cosine"],
 }
 IN_JSON = [
-    "verdict", "sentence", "set", "groups", "not_excluded", "where", "effects", "steps", "remarks", "chi2", "threshold",
-    "noise", "flagged", "parameters", "first_parameters", "places", "instruments", "field", "model_error", "laws",
-    "zones",
+    "verdict", "sentence", "left_over", "standing_out", "set", "groups", "not_excluded", "where", "effects", "steps",
+    "remarks", "chi2", "threshold", "noise", "flagged", "parameters", "first_parameters", "places", "instruments",
+    "field", "model_error", "laws", "zones",
 ]  # fmt: skip
 
 

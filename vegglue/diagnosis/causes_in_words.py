@@ -1,6 +1,6 @@
 """What was found, in words: effects, places, fields, instruments, each with its size, and the model's own error."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -8,9 +8,10 @@ from vegglue.case.parameter_space import shown_bounds
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.diagnosis.rivals import HARDLY
-from vegglue.in_short import in_digits
+from vegglue.in_short import in_digits, listed
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
+    EstimatedErrors,
     FaultyInstrument,
     FieldFound,
     Location,
@@ -30,8 +31,10 @@ TOLD_BY_SIZE = ("bed", "inflow")
 # Odds of a place against what is known above which they are not told: as of a rival that is told apart whatever its
 # trace.
 KNOWN_TOLD_ODDS = 1.0 / HARDLY
-# Contenders that are told where none is surely it.
-UNDECIDED_TOLD = 3
+# Contenders that are told where none is surely it, and effects that stand out beside what was accepted.
+UNDECIDED_TOLD, STANDING_OUT_TOLD = 3, 3
+# p below which it is one over the number of draws: none of them was as large.
+LEAST_P_TOLD = 5e-4
 
 
 def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
@@ -171,6 +174,30 @@ def _other_words(step: Step, name: str) -> str:
 
 def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
     return f"something in no list, as if {_what_acts(term, amplitude)} at x = {x:.1f}, y = {y:.1f} m"
+
+
+def left_over_in_words(errors: EstimatedErrors, standing_out: Mapping[str, float]) -> str:
+    """What the model with all that was accepted still asks for: larger errors than stated, and which effects stand out
+    in it; '' for neither.
+    """
+    asked = f"Even so the model asks for errors {errors.scale:.1f} times as large as stated"
+    larger = f"{asked}; chi2 and intervals are under these."
+    return " ".join([*([larger] if errors.clearly_larger else []), *_standing_out_words(standing_out)])
+
+
+def _standing_out_words(standing_out: Mapping[str, float]) -> list[str]:
+    """A sentence on the effects that stand out, the clearest first."""
+    ranked = sorted(standing_out.items(), key=lambda one: one[1])
+    told = [f"{name} ({p_in_words(p)})" for name, p in ranked[:STANDING_OUT_TOLD]]
+    left = len(ranked) - len(told)
+    names = listed([*told, *([f"{left} more"] if left else [])])
+    verbs = "stands out among all effects, but was" if len(ranked) == 1 else "stand out among all effects, but were"
+    return [f"Beside it {names} {verbs} not accepted."] if told else []
+
+
+def p_in_words(p: float) -> str:
+    """`p = 0.008`, or that it is below the least that draws can count."""
+    return f"p < {p:.1g}" if p < LEAST_P_TOLD else f"p = {p:.1g}"
 
 
 def undecided_in_words(undecided: Undecided) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
+from vegglue.calibration.noise import with_correlation
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
@@ -46,6 +47,9 @@ from vegglue.version import VERSION
 # 1995, doi:10.2307/2291091), for it is the vaguest answer. Chosen after 10 to 1 had told three fields on 53 sites
 # of the blind study on which nothing is hidden.
 ODDS_OF_FIELD = 100.0
+# Chance that errors alone make any effect look as strong, below which one is told as standing out: the rate of the
+# alarm beside what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.
+STANDS_OUT = 0.01
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
 # Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
@@ -64,7 +68,7 @@ def concluded(
         found = replace(found, places=(), charges=(), of_shape=0.0, undecided=None)
         last, suspects = first, suspects_of(first)
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
-    misfit = _misfit(first, last, found.flagged)
+    misfit = misfit_of(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
     grounds = replace(_grounds(last, found, misfit, unseen), field=field, laws=laws)
     base, before = last.base, first.base
@@ -114,20 +118,30 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         stretch=stretch_in_words(model.case, model.station),
         places_searched=any(one.x.size for one in last.fingerprints.places),
         carried=tuple(carried_otherwise(model.case, model.site, model.station)),
+        standing_out=standing_out(last, found),
     )
 
 
-def _misfit(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
+def standing_out(last: Screening, found: Findings) -> dict[str, float]:
+    """Effects that stand out in the last model and are not in it, with the family-wise p of each [-]."""
+    chances = {one.name: last.effects.p_of(last.best_score(j)) for j, one in enumerate(last.fingerprints.candidates)}
+    return {name: p for name, p in chances.items() if p < STANDS_OUT and name not in found.effects}
+
+
+def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
+    """chi2 before and after, and where the first model misses."""
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
     readings = after.noise.rows.size - int(np.linalg.matrix_rank(after.noise.unknown))
     freedom = freedom_of_misfit(readings, after.fitted.covariance)
+    # The errors that are told: those of the last model, whose residual holds the least that is no error.
+    errors_as_last = with_correlation(before.noise, after.noise.correlation, after.noise.scale)
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
         chi2=misfit,
         freedom=freedom,
         p=chance_of_misfit(misfit, freedom),
-        zones=misfit_zones(before.model, before.noise, before.fitted.point, flagged),
+        zones=misfit_zones(before.model, errors_as_last, before.fitted.point, flagged),
     )
 
 

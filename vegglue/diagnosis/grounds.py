@@ -1,6 +1,8 @@
 """What a verdict rests on, and what is asked of it by its sentence and by its remarks."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import field as by_default
 
 from vegglue.diagnosis.findings import Findings
 from vegglue.measurements.carried_discharge import CarriedDischarge
@@ -22,7 +24,8 @@ class Grounds:
     strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
     measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
     channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
-    something at a place; carried: sections that clearly carry another discharge than stated.
+    something at a place; carried: sections that clearly carry another discharge than stated; standing_out: effects
+    that stand out in the last model, with the family-wise p of each [-].
     """
 
     errors: EstimatedErrors
@@ -40,12 +43,14 @@ class Grounds:
     stretch: str = ""
     places_searched: bool = True
     carried: tuple[CarriedDischarge, ...] = ()
+    standing_out: Mapping[str, float] = by_default(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Statement:
     """The sentence of a verdict, its kind, and what it says besides: whether it clears the model but for instruments,
-    whether it tells the laws that stand out, and of which instruments it tells.
+    whether it tells the laws that stand out, of which instruments it tells, and whether it says by how much errors are
+    larger than stated.
     """
 
     kind: VerdictKind
@@ -53,6 +58,7 @@ class Statement:
     clears_the_model: bool = False
     tells_laws: bool = False
     instruments: tuple[FaultyInstrument, ...] = ()
+    tells_errors: bool = False
 
 
 def is_clear(instrument: FaultyInstrument) -> bool:

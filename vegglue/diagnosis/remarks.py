@@ -52,7 +52,7 @@ def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement
         remarks.append(f"To first order {law_in_words(grounds.laws)}{rather}. {TO_DISCOVER}")
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
-    if errors.scale > 1:
+    if errors.scale > 1 and not statement.tells_errors:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
     remarks += [_told_of(one) for one in grounds.findings.instruments if one not in statement.instruments]
     told = {name for group in grounds.not_excluded for name in group} | {*effects}

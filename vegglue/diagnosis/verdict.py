@@ -4,6 +4,7 @@ Silence has to be earned, and so has a name: see DECISIONS.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from vegglue.diagnosis.causes_in_words import (
     field_sentence,
     instruments_in_words,
     law_in_words,
+    left_over_in_words,
     undecided_in_words,
     with_their_chances,
 )
@@ -31,10 +33,10 @@ from vegglue.screening.candidates import START_OFF_ENDS
 MOST_GROUPS = 3
 # Share of the effects that must be testable before it is said that nothing is missing.
 TESTABLE_SHARE = 0.25
-# Scale and correlation of the errors above which they, and not the model, would explain the misfit: nothing is then
-# said to be missing or not. Stated errors are good to a quarter; probes side by side that err alike by more than 0.8
-# are a model that errs. Chosen, not measured.
-LARGEST_SCALE, LARGEST_CORRELATION = 1.25, 0.8
+# Correlation of the errors above which they, and not the model, would explain the misfit: nothing is then said to be
+# missing or not, nor where they are clearly larger than stated. Probes side by side that err alike by more than 0.8 are
+# a model that errs. Chosen, not measured.
+LARGEST_CORRELATION = 0.8
 # Errors at what was not seen, over those expected, above which the model disagrees. Chosen, not measured.
 UNSEEN_RATIO = 1.3
 # chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
@@ -50,21 +52,33 @@ NEIGHBOURS_ASIDE = "readings side by side had to be set aside, which one bad pro
 def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     """The verdict, its sentence, and what else should be known."""
     statement, places = _stated(grounds, suspects), grounds.findings.places
+    left_over = _left_over(grounds, statement)
+    statement = replace(statement, tells_errors=bool(left_over) and grounds.errors.clearly_larger)
     return Verdict(
         kind=statement.kind,
-        sentence=statement.sentence + _carried(grounds),
+        sentence=" ".join(one for one in (statement.sentence, left_over, _carried(grounds)) if one),
         remarks=tuple(remarks_of(grounds, suspects, statement)),
         location=places[0] if places else None,
         not_excluded=grounds.not_excluded,
         clears_the_model=statement.clears_the_model,
         tells_laws=statement.tells_laws,
+        left_over=left_over,
+        standing_out=dict(grounds.standing_out),
     )
 
 
 def _carried(grounds: Grounds) -> str:
     """That sections carry another discharge than stated, behind whatever is said of the model; '' where none does."""
     off = carried_in_short(grounds.carried)
-    return f" But {off}, and what is said of the model may only make up for that." if off else ""
+    return f"But {off}, and what is said of the model may only make up for that." if off else ""
+
+
+def _left_over(grounds: Grounds, statement: Statement) -> str:
+    """What the model asks for with what was accepted, where that is what the statement names."""
+    found = grounds.findings
+    if not found.accepted or found.absurd or statement.tells_laws or grounds.field is not None:
+        return ""
+    return left_over_in_words(grounds.errors, grounds.standing_out)
 
 
 def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
@@ -208,7 +222,7 @@ def _all_clear(grounds: Grounds) -> bool:
 def _unearned(grounds: Grounds) -> str:
     """Why it cannot be said that nothing is missing, '' when it can."""
     errors, used = grounds.errors, grounds.model_error
-    if errors.scale > LARGEST_SCALE:
+    if errors.clearly_larger:
         return f"only with errors {errors.scale:.1f} times as large as stated: they, or the model, are wrong"
     if errors.correlation > LARGEST_CORRELATION:
         return (

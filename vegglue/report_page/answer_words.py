@@ -15,6 +15,7 @@ from vegglue.report_page.cause_words import (
     likelier_place_in_words,
     place_in_headline,
 )
+from vegglue.report_page.diagnosis_words import standard_errors
 from vegglue.report_page.findings import FAILED_TOLERATED
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.page_file import set_as_code
@@ -60,7 +61,8 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
     if _only_suspects_a_law(found):
         return f"Something {tense} missing from {model} that is in no list: {_law_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
-        return _what_is_missing(found, model, tense)
+        left_over = html.escape(found.verdict.left_over)
+        return " ".join(filter(None, [_what_is_missing(found, model, tense), left_over]))
     if kind == "cannot-tell" and found.laws is not None and not (found.steps or found.places):
         best, chance = found.laws.laws[0], percent(sum(one.chance for one in found.laws.alike))
         law = html.escape(f"a law of {best.quantity} in {best.term}")
@@ -199,5 +201,5 @@ def where_it_fails(found: Diagnosis | None) -> str:
     model = "Before, the model" if accepted_causes(found) else "The model"
     return (
         f"{model} misses most at {section}{worst['zone']}, in experiment {worst['experiment']}: by "
-        f"{fixed(size, 1)} standard errors. Errors of measuring alone would make 1."
+        f"{fixed(size, 1)} {standard_errors(found)}. Errors of measuring alone would make 1."
     )

@@ -24,6 +24,7 @@ from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.diagnosis_words import (
     ranked_suspects,
     rms_residual,
+    standard_errors,
     suspect_status,
 )
 from vegglue.report_page.run import Run, published_picture
@@ -143,8 +144,8 @@ def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
         return
     worst, size = most
     finding = (
-        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(size, 1)} standard "
-        "errors, where errors alone make 1"
+        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(size, 1)} "
+        f"{standard_errors(diagnosis)}, where errors alone make 1"
     )
     caption = (
         f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(finding)}. Small: the mean in "

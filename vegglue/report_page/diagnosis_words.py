@@ -102,6 +102,12 @@ def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
     )
 
 
+def standard_errors(diagnosis: Diagnosis) -> str:
+    """Whose standard errors a misfit is told in: those of the data, or these made larger, as the residual asks for."""
+    scale = diagnosis.errors.scale
+    return "standard errors" if scale <= 1.0 else f"standard errors (each {fixed(scale, 1)} times as large as stated)"
+
+
 def rms_residual(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
     """Root mean square of measured minus predicted over the stations that count [unit of the kind], NaN without."""
     station = diagnosis.predictions.station
@@ -174,5 +180,10 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
         KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
         KeyNumber("effects tried", f"{effects_among(diagnosis.suspects)}", untestable),
         KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),
+        *([] if errors.scale <= 1.0 else [_errors_made_larger(errors.scale)]),
         KeyNumber("error of the grid", f"{short(1000 * errors.grid_error, 2)}{NARROW}mm/s", "counted as an error"),
     ]
+
+
+def _errors_made_larger(scale: float) -> KeyNumber:
+    return KeyNumber("errors of the data", f"{fixed(scale, 1)} times", "those stated, as the last residual asks for")

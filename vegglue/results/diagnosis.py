@@ -61,6 +61,9 @@ class Step:
         return best if best and self.others[best] > max(groups) else ""
 
 
+# Errors over those stated above which they, and not the model, would explain the misfit: stated errors are good to a
+# quarter. Chosen, not measured.
+LARGEST_SCALE = 1.25
 # How a sentence begins that tells of measurements which no flow of the case can show.
 BEFORE_ALL_ELSE = "Before anything can be said of the model: "
 
@@ -70,7 +73,9 @@ class Verdict:
     """What was concluded. location: of something that no listed effect explains, None without; not_excluded: groups
     of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
     clears_the_model: whether nothing is missing in the model, an instrument or none being off; tells_laws: whether the
-    sentence tells of laws that stand out.
+    sentence tells of laws that stand out. left_over: its part that says what the model with all that was accepted still
+    asks for, '' for nothing; standing_out: effects that stand out in it, and were not accepted, with the family-wise p
+    of each [-].
     """
 
     kind: VerdictKind
@@ -80,6 +85,8 @@ class Verdict:
     not_excluded: tuple[tuple[str, ...], ...]
     clears_the_model: bool
     tells_laws: bool
+    left_over: str = ""
+    standing_out: dict[str, float] = field(default_factory=dict)
 
     @property
     def doubts_the_data(self) -> bool:
@@ -90,7 +97,7 @@ class Verdict:
 @dataclass(frozen=True)
 class Misfit:
     """chi2 = |W (y - f)|^2 of the first and of the last model [-]; freedom: degrees of the last; p: chance of a chi2 as
-    large under errors alone; zones: mean misfit of the first by experiment, section and zone.
+    large under errors alone; zones: mean misfit of the first by experiment, section and zone, in errors of the last.
     """
 
     chi2_first: float
@@ -129,6 +136,11 @@ class EstimatedErrors:
     scale: float
     grid_error: float
     flagged: tuple[int, ...]
+
+    @property
+    def clearly_larger(self) -> bool:
+        """Whether they are larger than stated by more than can pass for the errors of stating them."""
+        return self.scale > LARGEST_SCALE
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "sentence": verdict.sentence,
         "clears_the_model": verdict.clears_the_model,
         "tells_laws": verdict.tells_laws,
+        "left_over": verdict.left_over,
         "chi2_first": misfit.chi2_first,
         "chi2": misfit.chi2,
         "freedom": misfit.freedom,
@@ -120,6 +121,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": None if verdict.location is None else asdict(verdict.location),
         "remarks": verdict.remarks,
         "not_excluded": verdict.not_excluded,
+        "standing_out": verdict.standing_out,
         "flagged": errors.flagged,
         "first_scores": diagnosis.first_screening.scores,
         "first_parameters": diagnosis.parameters.first,
@@ -198,6 +200,8 @@ def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
         not_excluded=_parsed(tuple[tuple[str, ...], ...], attributes["not_excluded"]),
         clears_the_model=stated_as(bool, attributes, "clears_the_model"),
         tells_laws=stated_as(bool, attributes, "tells_laws"),
+        left_over=stated_as(str, attributes, "left_over"),
+        standing_out=_parsed(dict[str, float], attributes["standing_out"]),
     )
 
 

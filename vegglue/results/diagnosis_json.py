@@ -13,6 +13,8 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     tree = {
         "verdict": verdict.kind,
         "sentence": verdict.sentence,
+        "left_over": verdict.left_over,
+        "standing_out": verdict.standing_out,
         "set": diagnosis.set,
         "groups": diagnosis.groups,
         "not_excluded": verdict.not_excluded,

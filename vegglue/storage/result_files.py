@@ -20,7 +20,7 @@ from vegglue.results.posterior_file import posterior_attributes, posterior_from,
 from vegglue.storage.hdf5 import UNREADABLE, open_hdf5, read_groups, stored_attribute, write_whole
 from vegglue.storage.resume import part_file
 
-POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 7", "vegglue flow 1"
+POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 8", "vegglue flow 1"
 Result = TypeVar("Result")
 
 
