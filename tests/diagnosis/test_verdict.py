@@ -390,6 +390,12 @@ def test_candidates_are_not_counted_as_effects() -> None:
     assert "none of 1 effect stands out" in said(grounds(), [NONE])[1]
 
 
+def test_what_stands_out_is_not_called_untestable() -> None:
+    hidden = [a_suspect("a"), a_suspect("probe_gain", detectability={"testable": False})]
+    assert "Untestable with these data, neither present nor absent: probe_gain" in said(grounds(step("a")), hidden)[2]
+    assert "Untestable" not in said(grounds(step("a"), standing_out={"probe_gain": 0.008}), hidden)[2]
+
+
 def test_what_was_found_is_not_called_untestable() -> None:
     hidden = [a_suspect(name, detectability={"testable": False}) for name in ("wind", "elder")]
     assert "neither present nor absent: elder." in said(grounds(step("wind")), hidden)[2]

@@ -32,8 +32,8 @@ pytestmark = pytest.mark.slow
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SUSPECTS = pd.DataFrame({
-    "name": list("abcde"), "status": list(MARKS), "first": [40.0, -30.0, 9.0, 1.0, 0.5],
-    "left": [np.nan, np.nan, 1.5, 0.2, np.nan], "visibility": [0.9, 0.5, 0.4, 0.3, 0.01],
+    "name": list("abcdef"), "status": list(MARKS), "first": [40.0, -30.0, 9.5, 9.0, 1.0, 0.5],
+    "left": [np.nan, np.nan, 4.0, 1.5, 0.2, np.nan], "visibility": [0.9, 0.5, 0.5, 0.4, 0.3, 0.01],
 })  # fmt: skip
 
 
@@ -48,6 +48,15 @@ def test_standings_follow_the_verdict() -> None:
     assert [one.name for one in ranked_suspects(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
     louder = a_diagnosis(first_screening={"scores": found.first_screening.scores | {"turning": -9.0}})
     assert suspect_status(louder, found.suspects[3]) == "less likely"
+
+
+def test_what_stands_out_is_not_called_untestable() -> None:
+    """A row said both "untestable" and p = 0.008: at a size that is not plausible these data showed it all the same."""
+    beside = a_diagnosis(verdict={"standing_out": {"wind": 0.008}})
+    wind = beside.suspect("wind")
+    assert not wind.detectability.testable
+    assert suspect_status(beside, wind) == "stands out"
+    assert {one.name: one.remark for one in diagnosis_section(beside).numbers}["effects tried"].startswith("0 of them")
 
 
 def test_errors_leave_out_what_does_not_count() -> None:
@@ -107,7 +116,7 @@ def test_suspects_differ_by_form_and_not_by_colour_alone() -> None:
     assert len(set(forms.values())) == len(forms)
     assert list(marks["rival"].get_xdata()) == [30.0]
     assert [bar.get_width() for bar in visible.patches] == list(SUSPECTS["visibility"])
-    assert "e (untestable)" in [tick.get_text() for tick in scores.get_yticklabels()]
+    assert "f (untestable)" in [tick.get_text() for tick in scores.get_yticklabels()]
     assert any(list(line.get_xdata()) == [3.4, 3.4] for line in scores.lines)
 
 

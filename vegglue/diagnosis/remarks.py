@@ -56,7 +56,8 @@ def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
     remarks += [_told_of(one) for one in grounds.findings.instruments if one not in statement.instruments]
     told = {name for group in grounds.not_excluded for name in group} | {*effects}
-    hidden = [one for one in suspects if not one.detectability.testable and one.name not in told]
+    seen = {*told, *grounds.standing_out}
+    hidden = [one for one in suspects if not one.detectability.testable and one.name not in seen]
     if hidden:
         also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
         remarks.append(f"Untestable with these data{also}, neither present nor absent: {_untestable(hidden)}.")

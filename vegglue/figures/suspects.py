@@ -25,6 +25,7 @@ from vegglue.screening.score_test import ALIKE, alike_groups
 MARKS: dict[str, tuple[str, str, str]] = {
     "accepted": ("o", "measured", "measured"),
     "rival": ("D", "measured", "measured"),
+    "stands out": ("P", "ink", "ink"),
     "less likely": ("X", "ink", "ink"),
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),

@@ -82,11 +82,15 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
 
 
 def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
-    """'accepted', 'rival' (may stand in place of an accepted one), 'less likely', 'no sign' or 'untestable'."""
+    """'accepted', 'rival' (may stand in place of an accepted one), 'stands out' in the last model, whatever size these
+    data would show, 'less likely', 'no sign' or 'untestable'.
+    """
     if suspect.name in [step.accepted for step in diagnosis.steps]:
         return "accepted"
     if suspect.name in diagnosis.set:
         return "rival"
+    if suspect.name in diagnosis.verdict.standing_out:
+        return "stands out"
     if not suspect.detectability.testable:
         return "untestable"
     threshold = diagnosis.first_screening.threshold
@@ -94,8 +98,8 @@ def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
 
 
 def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
-    """Accepted effects, rivals, less likely ones, those without a sign, untestable ones; within each by first score."""
-    order = ("accepted", "rival", "less likely", "no sign", "untestable")
+    """By their status, what was accepted first; within each by first score."""
+    order = ("accepted", "rival", "stands out", "less likely", "no sign", "untestable")
     return sorted(
         diagnosis.suspects,
         key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(diagnosis.first_score(one)))),
@@ -173,7 +177,7 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     fell = diagnosis.changed
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
-    apart = len(diagnosis.suspects) - sum(one.detectability.testable for one in diagnosis.suspects)
+    apart = sum(suspect_status(diagnosis, one) == "untestable" for one in diagnosis.suspects)
     untestable = f"as {len(diagnosis.suspects)} candidates, {apart} of them untestable with these data"
     return [
         KeyNumber("chi², correlated errors", chi2, misfit.of_freedom),

@@ -123,7 +123,8 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     if len(laws) > 1:
         return _asked(case, found, laws)
     # What calibration hides best, of all that would leave a trace without it.
-    hidden = [one for one in found.suspects if not one.detectability.testable]
+    seen = found.verdict.standing_out
+    hidden = [one for one in found.suspects if not one.detectability.testable and one.name not in seen]
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
     return [question for one in strongest for question in _asked(case, found, [one.name])]
 
