@@ -57,9 +57,11 @@ def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
     chances = {"wind": 0.008, "elder": 0.02, "jet": 0.001}
     last: Any = SimpleNamespace(
         fingerprints=SimpleNamespace(candidates=[SimpleNamespace(name=name) for name in chances]),
-        best_score=lambda j: j, effects=SimpleNamespace(p_of=lambda j: list(chances.values())[j]),
+        best_score=lambda j: [-4.0, 3.5, 5.0][j],
+        effects=SimpleNamespace(p_of=lambda score: {4.0: 0.008, 3.5: 0.02, 5.0: 0.001}.get(score, 0.3)),
     )  # fmt: skip
     assert standing_out(last, Findings(steps=(step("jet"),))) == {"wind": 0.008}
+    assert standing_out(last, Findings(steps=(step("jet"),)), slack=1.0) == {}
 
 
 def test_a_misfit_is_told_in_the_errors_of_the_last_model() -> None:

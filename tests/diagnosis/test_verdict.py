@@ -324,6 +324,13 @@ def test_only_what_is_clear_is_told_beside_a_name(parts: dict[str, Any]) -> None
     assert "Beside it" not in verdict.sentence
 
 
+def test_what_may_be_a_remainder_is_told_as_such() -> None:
+    sentence = said(grounds(step("a"), standing_out={"b": 0.008}, remainder=True), [a_suspect("a")])[1]
+    assert (
+        "but was not accepted: a remainder of what was, which no model has quite right, may look like that." in sentence
+    )
+
+
 def test_of_many_that_stand_out_three_are_named() -> None:
     many = {f"e{k}": 0.001 * k for k in range(5, 0, -1)} | {"least": 1 / 3001}
     sentence = said(grounds(step("a"), standing_out=many), [a_suspect("a")])[1]

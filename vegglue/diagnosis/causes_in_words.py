@@ -176,23 +176,24 @@ def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
     return f"something in no list, as if {_what_acts(term, amplitude)} at x = {x:.1f}, y = {y:.1f} m"
 
 
-def left_over_in_words(errors: EstimatedErrors, standing_out: Mapping[str, float]) -> str:
+def left_over_in_words(errors: EstimatedErrors, standing_out: Mapping[str, float], remainder: bool) -> str:
     """What the model with all that was accepted still asks for: larger errors than stated, and which effects stand out
-    in it; '' for neither.
+    in it; '' for neither. remainder: whether these may be what is left of what was accepted.
     """
     asked = f"Even so the model asks for errors {errors.scale:.1f} times as large as stated"
     larger = f"{asked}; chi2 and intervals are under these."
-    return " ".join([*([larger] if errors.clearly_larger else []), *_standing_out_words(standing_out)])
+    return " ".join([*([larger] if errors.clearly_larger else []), *_standing_out_words(standing_out, remainder)])
 
 
-def _standing_out_words(standing_out: Mapping[str, float]) -> list[str]:
+def _standing_out_words(standing_out: Mapping[str, float], remainder: bool) -> list[str]:
     """A sentence on the effects that stand out, the clearest first."""
     ranked = sorted(standing_out.items(), key=lambda one: one[1])
     told = [f"{name} ({p_in_words(p)})" for name, p in ranked[:STANDING_OUT_TOLD]]
     left = len(ranked) - len(told)
     names = listed([*told, *([f"{left} more"] if left else [])])
     verbs = "stands out among all effects, but was" if len(ranked) == 1 else "stand out among all effects, but were"
-    return [f"Beside it {names} {verbs} not accepted."] if told else []
+    why = ": a remainder of what was, which no model has quite right, may look like that" if remainder else ""
+    return [f"Beside it {names} {verbs} not accepted{why}."] if told else []
 
 
 def p_in_words(p: float) -> str:

@@ -101,6 +101,7 @@ def concluded(
 def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | None) -> Grounds:
     """What the verdict rests on, but for fields and laws."""
     silent = not (found.steps or found.places or found.undecided)
+    beside = standing_out(last, found)
     there = unseen_errors(last.base, unseen) if silent and unseen is not None else UnseenErrors(float("nan"), 1.0)
     model = last.base.model
     return Grounds(
@@ -118,13 +119,20 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         stretch=stretch_in_words(model.case, model.station),
         places_searched=any(one.x.size for one in last.fingerprints.places),
         carried=tuple(carried_otherwise(model.case, model.site, model.station)),
-        standing_out=standing_out(last, found),
+        standing_out=beside,
+        remainder=bool(beside) and not standing_out(last, found, found.slack),
     )
 
 
-def standing_out(last: Screening, found: Findings) -> dict[str, float]:
-    """Effects that stand out in the last model and are not in it, with the family-wise p of each [-]."""
-    chances = {one.name: last.effects.p_of(last.best_score(j)) for j, one in enumerate(last.fingerprints.candidates)}
+def standing_out(last: Screening, found: Findings, slack: float = 0.0) -> dict[str, float]:
+    """Effects that stand out in the last model and are not in it, with the family-wise p of each [-].
+
+    slack: by how much their scores are made smaller first [standard errors].
+    """
+    chances = {
+        one.name: last.effects.p_of(max(abs(last.best_score(j)) - slack, 0.0))
+        for j, one in enumerate(last.fingerprints.candidates)
+    }
     return {name: p for name, p in chances.items() if p < STANDS_OUT and name not in found.effects}
 
 

@@ -52,9 +52,6 @@ from vegglue.screening.residual_screening import Screening, screen
 
 # How often errors alone sound the first alarm; 5 % is usual. Later alarms are sounded five times less often.
 FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2
-# Share of an accepted fingerprint, in standard errors, that the model may have put wrong and something else then picks
-# up: with the true effect in open-c and open-e 0.1 of their length was left along one other, at the waterline.
-MISPLACED_SHARE = 0.1
 # Effects and places that are accepted at most, and instruments.
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 
@@ -122,8 +119,7 @@ def _calibrated_unless_absurd(model: Model, absurd: Sequence[str]) -> Baseline:
 
 def _with_alarm(screening: Screening, found: Findings) -> Findings:
     rate = FALSE_ALARMS * (STRICTER_LATER if found.accepted or found.instruments else 1.0)
-    slack = MISPLACED_SHARE * float(max(found.explained, 0.0) ** 0.5)
-    return replace(found, p=alarm_p(screening.kinds, screening.errors, 1, slack), rate=rate)
+    return replace(found, p=alarm_p(screening.kinds, screening.errors, 1, found.slack), rate=rate)
 
 
 def _following(

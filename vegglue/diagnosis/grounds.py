@@ -25,7 +25,8 @@ class Grounds:
     measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
     channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
     something at a place; carried: sections that clearly carry another discharge than stated; standing_out: effects
-    that stand out in the last model, with the family-wise p of each [-].
+    that stand out in the last model, with the family-wise p of each [-]; remainder: whether all of these may be what
+    is left of what was accepted.
     """
 
     errors: EstimatedErrors
@@ -44,6 +45,7 @@ class Grounds:
     places_searched: bool = True
     carried: tuple[CarriedDischarge, ...] = ()
     standing_out: Mapping[str, float] = by_default(default_factory=dict)
+    remainder: bool = False
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def _left_over(grounds: Grounds, statement: Statement) -> str:
     found = grounds.findings
     if not found.accepted or found.absurd or statement.tells_laws or grounds.field is not None:
         return ""
-    return left_over_in_words(grounds.errors, grounds.standing_out)
+    return left_over_in_words(grounds.errors, grounds.standing_out, grounds.remainder)
 
 
 def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
