@@ -81,6 +81,25 @@ def test_what_the_next_one_makes_needless_is_dropped() -> None:
     assert made == Choice((PARENT, B), {"a": "held-out errors are no higher without it"})
 
 
+def test_a_fall_that_cannot_be_told_from_none_is_told_as_such() -> None:
+    """An effect was credited with a fall of 20 +- 400: with any, that is."""
+    models: dict[Names, Errors | None] = {PARENT: (4, 4), A: (3.6, 3.6)}
+    unsure = choice(models, A, spread=4.0 * 0.4)
+    assert unsure.stages == (PARENT, A)
+    assert list(unsure.unclear) == ["a"]
+    assert "by sections, " in unsure.unclear["a"]
+    assert choice(models, A, spread=0.1).unclear == {}
+    errors = {PARENT: (4.0, 4.0), A: (1.0, 1.0), B: (4.0, 4.0), A + B: (0.9, 0.9)}
+
+    def rung_with(names: Names) -> Rung:
+        return a_rung(errors[names], dict.fromkeys(names, 9.0), sum(errors[names]), 0.3 if "b" in names else 0.0)
+
+    both = chosen([Nominee(name, name, 0.0) for name in A + B], rung_with)
+    assert (both.stages[-1], list(both.unclear)) == (A + B, ["b"]), "what did the work is not in doubt"
+    joint = choice({PARENT: (4, 4), A: (5, 5), B: (5, 5), A + B: (1, 1)})
+    assert (joint.stages[-1], joint.unclear) == (A + B, {}), "together they clearly help"
+
+
 def test_an_amplitude_compatible_with_none_is_dropped() -> None:
     made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2.5, 2.5)}, small={A + B: "a"})
     assert made == Choice((PARENT, B), {"a": "its amplitude is compatible with none"})

@@ -225,6 +225,12 @@ def test_what_is_not_kept_is_told() -> None:
     assert words == "Added: a. b was not kept: held-out errors did not fall."
 
 
+def test_a_fall_that_cannot_be_told_from_none_is_told() -> None:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    words = in_words(case, found_in(case, "identified"), Choice(((), ("a",)), {}, {"a": "20 ± 4e+02 by sections"}))
+    assert words.startswith("Added: a. That held-out errors fall with a cannot be told from chance (20 ± 4e+02 by sec")
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

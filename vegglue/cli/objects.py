@@ -41,7 +41,7 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
             return _discovered(result)
         case StepwiseExtension():
             told = {"configs": [one.source for one in result.cases], "cases": [one.name for one in result.cases]}
-            words = {"sentence": result.sentence, "reason": result.reason}
+            words = {"sentence": result.sentence, "reason": result.reason, "unclear": result.unclear}
             return told | words | _comparison(result.comparison)
         case Comparison():
             return _comparison(result)

@@ -42,10 +42,13 @@ RungWith = Callable[[Names], Rung | None]
 
 @dataclass(frozen=True)
 class Choice:
-    """stages: names in the model, from none to the last, each with all of those before; refused: why, by name."""
+    """stages: names in the model, from none to the last, each with all of those before; refused: why, by name; unclear:
+    by how much held-out errors fall with those of the last model whose fall cannot be told from none, in words.
+    """
 
     stages: tuple[Names, ...]
     refused: Reasons
+    unclear: Mapping[str, str] = field(default_factory=dict)
 
 
 def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False) -> Choice:
@@ -65,7 +68,7 @@ def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False)
     kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, rung_with)
     kept, refused = _known_of(named, kept, refused, rung_with)
     earlier = [stage for stage in stages if set(stage) < set(kept)]
-    return Choice((*earlier, kept), refused)
+    return Choice((*earlier, kept), refused, _unclear_of(named, kept, rung_with))
 
 
 Better = Callable[[Names, Names], tuple[Names, str]]
@@ -132,6 +135,28 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, rung_with
             why = f"with {known}, which is known, held-out errors are not clearly higher"
             kept, refused = both, {**_without(refused, known), one.name: why}
     return kept, refused
+
+
+def _unclear_of(named: Sequence[Nominee], kept: Names, rung_with: RungWith) -> Reasons:
+    """By how much held-out errors fall with each that is kept, in words, where neither way that is CLEAR.
+
+    Not of what the model finds no flow without.
+    """
+    falls: Reasons = {}
+    for one in (each for each in named if each.name in kept):
+        without, last = rung_with(tuple(name for name in kept if name != one.name)), rung_with(kept)
+        if without is None or last is None:
+            continue
+        gains = _gains(without, last, _untold([one]))
+        if not any(gain > CLEAR * error for gain, error in gains.values()):
+            falls[one.name] = ", ".join(f"{_fall_in_words(*gain)} by {by}" for by, gain in gains.items())
+    return falls
+
+
+def _fall_in_words(gain: float, error: float) -> str:
+    """`20 ± 400`, of squares in (mm/s)^2; without an error where one section alone was held out."""
+    fall = f"{1e6 * gain:.2g}"
+    return f"{fall} ± {1e6 * error:.1g}" if np.isfinite(error) else fall
 
 
 def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: Rung | None) -> str:

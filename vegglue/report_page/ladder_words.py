@@ -37,7 +37,18 @@ def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
         return f"The model misses {JUDGED_ON[judged]} by {_speed(after)}{floor}.{why}"
     with_it = listed([f"<code>{html.escape(name)}</code>" for name in _all_added(ladder)])
     model = html.escape(causes) or with_it or html.escape(last.name)
-    return f"With {model}, the error at {JUDGED_ON[judged]} {_from_to(before, after)}{floor}."
+    fall = f"With {model}, the error at {JUDGED_ON[judged]} {_from_to(before, after)}{floor}."
+    return " ".join(filter(None, [fall, _unclear_in_words(ladder)]))
+
+
+def _unclear_in_words(ladder: Ladder) -> str:
+    """Of which part of what was added nobody can say that it helps, '' for none."""
+    if not ladder.unclear:
+        return ""
+    names = listed([f"<code>{html.escape(name)}</code>" for name in ladder.unclear])
+    whole = {key_of(name) for name in ladder.unclear} >= set(_all_added(ladder))
+    what = "this fall" if whole else f"what {names} {'adds' if len(ladder.unclear) == 1 else 'add'} to it"
+    return f"By the errors at what was held out, {what} cannot be told from chance."
 
 
 def _from_to(before: float, after: float) -> str:

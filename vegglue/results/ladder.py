@@ -33,13 +33,15 @@ class LadderStep:
 @dataclass(frozen=True)
 class Ladder:
     """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words;
-    verdict: the sentence of the diagnosis that named what was added. Both are '' where nobody searched.
+    verdict: the sentence of the diagnosis that named what was added. Both are '' where nobody searched. unclear: names
+    of what was added whose fall of held-out errors cannot be told from none.
     """
 
     steps: tuple[LadderStep, ...]
     left_out: int
     reason: str
     verdict: str = ""
+    unclear: tuple[str, ...] = ()
 
 
 def ladder_from(tree: Mapping[str, Any]) -> Ladder:
@@ -48,7 +50,9 @@ def ladder_from(tree: Mapping[str, Any]) -> Ladder:
     Errors: KeyError, TypeError or ValueError where it is none.
     """
     steps = tuple(_step_from(step) for step in tree["steps"])
-    return Ladder(steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]))
+    return Ladder(
+        steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
+    )
 
 
 def _step_from(step: Mapping[str, Any]) -> LadderStep:

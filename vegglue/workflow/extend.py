@@ -96,6 +96,7 @@ def extend_stepwise(
     for one, errors, config_hash in zip(extension.cases, extension.comparison.rungs, hashes, strict=True):
         write_rung(folder_of(runs, one), errors, rows_set_aside(extension.comparison.left_out), config_hash)
     ladder = ladder_of(extension.comparison, extension.cases, hashes, extension.reason, extension.sentence)
+    ladder = replace(ladder, unclear=extension.unclear)
     keep_ladder(ladder, extension.cases, hashes, runs)
     return extension
 
@@ -127,9 +128,8 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     bases = [replace(base, model=replace(base.model, case=one)) for one, base in zip(cases, bases, strict=True)]
     unseen = [validation_of(one, folder_of(runs, one), watch) for one in cases]
     ladder = in_threads(rung, list(zip(bases, unseen, strict=True)))
-    return StepwiseExtension(
-        tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, in_words(case, found, choice)
-    )
+    words, unclear = in_words(case, found, choice), tuple(choice.unclear)
+    return StepwiseExtension(tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, words, unclear)
 
 
 def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
@@ -146,7 +146,16 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
         for name, one in spread
         if name in kept
     ]
+    said += [_unclear_in_words(name, fall) for name, fall in choice.unclear.items()]
     return " ".join([first, *said, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
+
+
+def _unclear_in_words(name: str, fall: str) -> str:
+    """What is kept although errors at what was held out do not show that it helps."""
+    return (
+        f"That held-out errors fall with {name} cannot be told from chance ({fall}, in (mm/s)^2 of their squares): it "
+        "is kept because the diagnosis names it, and they do not clearly rise."
+    )
 
 
 def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, float]) -> list[Addition]:

@@ -19,13 +19,15 @@ from vegglue.workflow.run_folder import folder_of
 @dataclass(frozen=True)
 class StepwiseExtension:
     """How a case was extended: the cases from the first to the last, their errors, the sentence of the verdict, and
-    what was added or not, and why.
+    what was added or not, and why; unclear: names of what was added whose fall of held-out errors cannot be told from
+    none.
     """
 
     cases: tuple[Case, ...]
     comparison: Comparison
     sentence: str
     reason: str
+    unclear: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         names = " -> ".join(case.name for case in self.cases)
@@ -50,7 +52,7 @@ def kept_extension(case: Case, found: Diagnosis, runs: Path | str) -> StepwiseEx
     rungs = [one for each in cases if (one := kept_rung(each, runs, aside)) is not None]
     if len(rungs) < len(kept.steps):
         return None
-    return StepwiseExtension(cases, Comparison(tuple(rungs), aside), sentence, kept.reason)
+    return StepwiseExtension(cases, Comparison(tuple(rungs), aside), sentence, kept.reason, kept.unclear)
 
 
 def _child_of(parent: Case, step: LadderStep) -> Case | None:
