@@ -1,8 +1,15 @@
-"""Commands that are told can be copied as they stand."""
+"""Commands that are told can be copied as they stand, and tables say what their numbers are under."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+import pytest
+from rungs import a_rung
+
 from vegglue.cli.output import command_line
+from vegglue.cli.tables import show_ladder
+from vegglue.workflow.compare import Comparison
 
 
 def test_a_command_that_is_told_can_be_copied() -> None:
@@ -10,3 +17,17 @@ def test_a_command_that_is_told_can_be_copied() -> None:
     assert command_line("run", Path("weir brook.yaml")) == "vegglue run 'weir brook.yaml'"
     told = command_line("extend", Path("brook.yaml"), "--auto", runs=Path("out"), trust=True)
     assert told == "vegglue extend brook.yaml --auto --runs out --trust"
+
+
+def test_differences_between_experiments_are_told_with_the_errors_they_are_under(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """`infer` said that one value does as well, of what `compare` told apart: one of them makes errors larger."""
+    alike, apart = a_rung("brook"), replace(a_rung("brook-wind"), homogeneity={"phi": 1e-5, "n_b": 0.3})
+    show_ladder(Comparison((alike,), pd.DataFrame()))
+    assert "under the errors as stated" not in capsys.readouterr().out
+    show_ladder(Comparison((alike, apart), pd.DataFrame()))
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        "- brook-wind: differs between experiments: phi (p = 1e-05) These differences are under the errors as" in said
+    )

@@ -119,6 +119,9 @@ def test_what_is_said_of_experiments(refined: Posterior, apart: float, words: st
     assert "the source has 16.9" in said[0]
     assert len(said) == 3  # nothing of phi, which one experiment alone tells
     assert ("does not carry over" in said[-1]) == (words == "not one value for all")
+    assert "under the errors as stated, with those of grid and model" in said[1]
+    larger = homogeneity_in_words(refined, replace(found, scale=2.1), {})
+    assert "under errors 2.10 times as large as stated; `vegglue compare` asks it under those stated" in larger[1]
 
 
 def test_errors_of_one_experiment_are_those_of_all(reach: SolvedReach) -> None:

@@ -126,7 +126,8 @@ def _of_transfer(posterior: Posterior) -> list[str]:
         return []
     moving = [name for name, moves in zip(posterior.parameters, moving_parameters(transfer), strict=True) if moves]
     what = " and ".join(moving) or "the parameters together"
-    return [f"One value does not fit all experiments: {what} would have to move; `vegglue diagnose` asks why."]
+    larger = f", even with errors {transfer.scale:.1f} times as large" if transfer.scale > 1.0 else ""
+    return [f"One value does not fit all experiments{larger}: {what} would have to move; `vegglue diagnose` asks why."]
 
 
 def _of_stations(posterior: Posterior) -> list[str]:

@@ -16,6 +16,11 @@ from vegglue.results.open_questions import Question
 from vegglue.results.rung import Rung
 from vegglue.workflow.compare import Comparison
 
+# Said where parameters differ between experiments, as `infer` may say of the same that they do not.
+UNDER_STATED_ERRORS = (
+    "These differences are under the errors as stated, with those of grid and model; where experiments calibrated "
+    "alone miss by more, `vegglue infer` makes the errors larger, and fewer differ."
+)
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
 # p-value [-] of one parameter below which the ladder says that it differs between experiments: of five parameters, one
@@ -124,10 +129,16 @@ def show_ladder(found: Comparison) -> None:
         )
     if note:
         console().print(note)
-    for one in rungs:
-        moving = [f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < TOLD_TO_DIFFER]
-        if moving:
-            console().print(f"- {one.name}: differs between experiments: {', '.join(moving)}")
+    differing = {one.name: moving for one in rungs if (moving := _moving(one))}
+    for name, moving in differing.items():
+        console().print(f"- {name}: differs between experiments: {moving}")
+    if differing:
+        console().print(UNDER_STATED_ERRORS)
+
+
+def _moving(one: Rung) -> str:
+    """`n_b (p = 1e-08), k_s (p = 0.002)`: parameters that differ between experiments, '' for none."""
+    return ", ".join(f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < TOLD_TO_DIFFER)
 
 
 def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:

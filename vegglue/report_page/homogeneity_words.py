@@ -47,7 +47,21 @@ def homogeneity_in_words(posterior: Posterior, transfer: Transfer, others: Mappi
         least = min(transfer.p[j] for j in alike)
         sentences.append(f"One value for all will do as well for {rest} (p = {least:.2g} or more).")
     names = [posterior.parameters[j] for j in order if moves[j]]
-    return [*sentences, _misfits(transfer), _meaning(names, homogeneity_rejected(transfer))]
+    under = _under_which_errors(posterior, transfer)
+    return [*sentences, f"{_misfits(transfer)} {under}", _meaning(names, homogeneity_rejected(transfer))]
+
+
+def _under_which_errors(posterior: Posterior, transfer: Transfer) -> str:
+    """`compare` asks the same of linear steps under the errors as stated, and may find what larger errors hide."""
+    estimated = posterior.refinement is not None and posterior.refinement.error_model.errors == "estimated"
+    if estimated:
+        return "All of this is under errors that are estimated from what the experiments alone leave."
+    if transfer.scale <= 1.0:
+        return "All of this is under the errors as stated, with those of grid and model."
+    return (
+        f"All of this is under errors {transfer.scale:.2f} times as large as stated; `vegglue compare` asks it under "
+        "those stated, and may find more that differ."
+    )
 
 
 def _parameter(posterior: Posterior, transfer: Transfer, j: int, moves: bool, others: Mapping[str, object]) -> str:
