@@ -117,7 +117,23 @@ def test_a_question_names_its_best_measurements() -> None:
         "To tell wind from waves (D2 now 2 squared standard errors):",
         *(f"- section {n}: 9, 3 stations, 1.5 h" for n in range(4)),
     ]
+    surer = Question("wind from waves", (replace(best, now=5.0),))
+    assert "(D2 now 5 squared standard errors: the data at hand should tell, what is listed makes it" in repr(surer)
     useless = Question("wind from waves", (replace(best, then=2.1),))
     assert repr(useless).endswith(
         "none of 1 measurements would by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
     )
+
+
+@pytest.mark.parametrize(("now", "answered"), [(12.0, False), (26.0, True)])
+def test_what_these_data_would_have_shown_is_answered(now: float, answered: bool) -> None:
+    """Field work was ranked for what a diagnosis had looked for and not seen."""
+    section = ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, now, 60.0)
+    hidden = Question("bed_trend from a change of n_b", (section,), 25.0)
+    assert (hidden.answered, hidden.useful) == (answered, () if answered else (section,))
+    told = (
+        "To tell bed_trend from a change of n_b: answered, as D2 is 26 already, and from 25 on a diagnosis sees it."
+        if answered
+        else "To tell bed_trend from a change of n_b (D2 now 12 squared standard errors; a diagnosis sees it from 25 on"
+    )
+    assert repr(hidden).splitlines()[0].startswith(told)

@@ -207,6 +207,12 @@ def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
     assert list(map(plain, steps)) == [f"No single measurement would do {said}"]
 
 
+def test_no_field_work_is_proposed_for_what_is_answered(toy: Run) -> None:
+    answered = Question("eddies from a change of k_s", (replace(GAUGE, now=30.0, then=60.0),), 25.0)
+    steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(answered,))))
+    assert list(map(plain, steps)) == ["No further measurement is needed."]
+
+
 def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:
     hidden = Question("steep_bank from a change of k_s", (GAUGE,))
     (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden,))))

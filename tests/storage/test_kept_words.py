@@ -27,7 +27,8 @@ HASH, OTHER = "a" * 64, "b" * 64
 STEP = LadderStep("brook", "brook.yaml", HASH, ("Größe",), 4, 0.011, 0.02, 0.03, 0.04, 0.012)
 LADDER = Ladder((STEP,), 2, "Added: eddies.", "Missing: eddies.", ("eddies",))
 ASIDE = [("June", "velocity", "Größe", 1.0, 0.1 + 0.2, 0.5)]
-QUESTIONS = (Question("eddies from wind", (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)),)
+GAUGE = (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)
+QUESTIONS = (Question("eddies from wind", GAUGE), Question("eddies from a change of n_b", GAUGE, 25.0))
 
 
 def test_what_is_kept_is_read_back(tmp_path: Path) -> None:

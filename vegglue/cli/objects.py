@@ -169,7 +169,10 @@ def _comparison(found: Comparison) -> Told:
 
 def _question(question: Question) -> Told:
     """What is to be told apart, and the measurements that could."""
-    return {"tells_apart": question.tells_apart, "measurements": [_worth(one) for one in question.measurements]}
+    return {
+        "tells_apart": question.tells_apart, "answered": question.answered,
+        "measurements": [_worth(one) for one in question.measurements],
+    }  # fmt: skip
 
 
 def _worth(one: ProposedMeasurement) -> Told:

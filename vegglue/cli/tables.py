@@ -11,6 +11,7 @@ from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.in_short import in_digits, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
+from vegglue.report_page.homogeneity_words import REJECTED_BELOW
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import Question
 from vegglue.results.rung import Rung
@@ -23,9 +24,6 @@ UNDER_STATED_ERRORS = (
 )
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
-# p-value [-] of one parameter below which the ladder says that it differs between experiments: of five parameters, one
-# does by chance in one model of twenty. The words on a posterior are stricter, they count how many were compared.
-TOLD_TO_DIFFER = 0.01
 # Suspects in the table, the strongest: they fit on a screen with what is said of them, and the page has all.
 SUSPECTS_SHOWN = 10
 
@@ -138,7 +136,8 @@ def show_ladder(found: Comparison) -> None:
 
 def _moving(one: Rung) -> str:
     """`n_b (p = 1e-08), k_s (p = 0.002)`: parameters that differ between experiments, '' for none."""
-    return ", ".join(f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p < TOLD_TO_DIFFER)
+    compared = len(one.homogeneity)
+    return ", ".join(f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p * compared < REJECTED_BELOW)
 
 
 def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:

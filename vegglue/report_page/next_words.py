@@ -61,7 +61,7 @@ def _measurements(run: Run) -> Iterator[str]:
         return
     if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
         yield "What was found needs no further measurement. What that model leaves open stands in its report."
-    elif not questions:
+    elif all(one.answered for one in questions):
         yield "No further measurement is needed."
     settled = [one for one in questions if one.useful]
     measurements = {one.useful[0].name: one.useful[0] for one in reversed(settled)}
@@ -71,7 +71,7 @@ def _measurements(run: Run) -> Iterator[str]:
             f"Measure <b>{html.escape(best.name)}</b>, {', and '.join(purposes)}: {count(best.stations, 'station')}, "
             f"some {short(best.hours, 2)}{NARROW}hours of field work."
         )
-    left = [_to_see(one) for one in questions if one not in settled]
+    left = [_to_see(one) for one in questions if one not in settled and not one.answered]
     if left:
         yield f"No single measurement would do {'; nor '.join(left)}."
 

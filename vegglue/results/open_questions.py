@@ -1,5 +1,6 @@
 """What is still to be told apart, and the measurements that could: as `vegglue next` tells it, and keeps it."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,14 +39,29 @@ class ProposedMeasurement:
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be told apart, in words, and the measurements that could, by what they add in an hour."""
+    """What is to be told apart, in words, and the measurements that could, by what they add in an hour; seen_from: D^2
+    from which on a diagnosis sees what is asked for 19 times of 20 [-], infinite where that is no matter of size.
+    """
 
     tells_apart: str
     measurements: tuple[ProposedMeasurement, ...]
+    seen_from: float = math.inf
+
+    @property
+    def of_one(self) -> bool:
+        """Whether one effect is asked for, that calibration hides, and not which of several it is."""
+        return HIDDEN_BEHIND in self.tells_apart
+
+    @property
+    def answered(self) -> bool:
+        """Whether the data at hand would have shown it."""
+        return any(one.now >= self.seen_from for one in self.measurements)
 
     @property
     def useful(self) -> tuple[ProposedMeasurement, ...]:
-        """Those that would tell it apart by themselves, the few that are worth a thought."""
+        """Those that would tell it apart by themselves, the few that are worth a thought; none where it is answered."""
+        if self.answered:
+            return ()
         enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
         return tuple(enough)[:SHOWN]
 
@@ -57,11 +73,22 @@ class Question:
     def __repr__(self) -> str:
         if not self.useful:
             return f"To tell {self.tells_apart}: {self._why_none()}."
-        heading = f"To tell {self.tells_apart} (D2 now {in_digits(self.useful[0].now, 2)} squared standard errors):"
+        heading = f"To tell {self.tells_apart} (D2 now {self._now_in_words(self.useful[0].now)}):"
         return "\n".join([heading, *(f"- {_in_short(one)}" for one in self.useful)])
+
+    def _now_in_words(self, now: float) -> str:
+        """What the data at hand say, and why that is no answer yet where it is much."""
+        told = f"{in_digits(now, 2)} squared standard errors"
+        if math.isfinite(self.seen_from):
+            return f"{told}; a diagnosis sees it from {in_digits(self.seen_from, 2)} on"
+        return f"{told}: the data at hand should tell, what is listed makes it surer" if now >= SEPARATES else told
 
     def _why_none(self) -> str:
         """Why no measurement is proposed: they add little to what is known, or are not enough."""
+        if self.answered:
+            now = max(one.now for one in self.measurements)
+            seen = in_digits(self.seen_from, 2)
+            return f"answered, as D2 is {in_digits(now, 2)} already, and from {seen} on a diagnosis sees it"
         many = f"none of {len(self.measurements)} measurements"
         if not self.nearest:
             return f"{many} would by itself"
@@ -74,7 +101,13 @@ class Question:
 
 def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
     """The questions of a list of JSON. Errors: KeyError, TypeError or ValueError where it is none."""
-    return tuple(Question(str(one["tells_apart"]), tuple(map(_proposed_from, one["measurements"]))) for one in tree)
+    return tuple(map(_question_from, tree))
+
+
+def _question_from(tree: Mapping[str, Any]) -> Question:
+    """null for no number: a size that is never seen."""
+    seen_from = math.inf if tree["seen_from"] is None else float(tree["seen_from"])
+    return Question(str(tree["tells_apart"]), tuple(map(_proposed_from, tree["measurements"])), seen_from)
 
 
 def _proposed_from(tree: Mapping[str, Any]) -> ProposedMeasurement:

@@ -17,7 +17,7 @@ from vegglue.results.open_questions import Question, questions_from
 from vegglue.results.rung import Rung, rung_from
 from vegglue.whole_files import MAKE_ROOM
 
-RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 2"
+RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 3"
 RUNG_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
 Kept = TypeVar("Kept")
 # A measurement that is left out: where it stands, and its value.

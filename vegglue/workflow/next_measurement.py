@@ -66,9 +66,15 @@ def next_measurement(
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         answered = zip(asked, worths, strict=True)
         questions = [one for (what, rivals), worth in answered for one in _answers(what, rivals, worth)]
+        questions = [replace(one, seen_from=_seen_from(found)) if one.of_one else one for one in questions]
     if not between:
         write_questions(folder_of(runs, case), questions, wanted)
     return questions
+
+
+def _seen_from(found: Diagnosis) -> float:
+    """D^2 of an effect that passes the alarm over all effects 19 times of 20 [-]."""
+    return (found.first_screening.threshold + POWER_QUANTILE) ** 2
 
 
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
