@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import a_diagnosis
+from diagnoses import a_diagnosis, a_location, a_suspect
 from open_cases import imported
 from reach import write_reach
 from report_runs import a_toy
@@ -15,6 +15,8 @@ from verdicts import grounds, said, step
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.cli.tables import show_carried
+from vegglue.diagnosis.verdict import OF_DISCHARGES
+from vegglue.effects.library import library
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
 from vegglue.measurements.observations import read_observations
@@ -128,15 +130,40 @@ def test_values_that_no_flow_can_have_are_said_instead(tmp_path: Path) -> None:
     assert carried_otherwise(case, build_site(case), faster(table, 100.0)) == []
 
 
-def test_a_name_stands_beside_the_doubt() -> None:
-    named = grounds(step("wind"), carried=(HIGHER,))
-    _, sentence, remarks = said(named)
-    doubt = "sections carry 1.5 times the stated discharge in experiment low"
-    assert sentence.endswith(f"But {doubt}, and what is said of the model may only make up for that.")
+DOUBT = "sections carry 1.5 times the stated discharge in experiment low"
+
+
+@pytest.mark.parametrize(("name", "value"), [("wind", 0.3), ("partial_depth", 2.5), ("discharge_error[low]", -2.5)])
+def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str, value: float) -> None:
+    """Of a scale of 0.5, the second and third are five times what is plausible."""
+    there = [a_suspect(name, amplitude={"value": value})]
+    kind, sentence, _ = said(grounds(step(name), carried=(HIGHER,)), there)
+    assert kind == "cannot-tell"
+    assert sentence.startswith(f"These data cannot tell: {DOUBT}, and what was found may only make up for that.")
+    assert name.partition("[")[0] in sentence
+    assert sentence.count(DOUBT) == 1
+    assert said(grounds(step(name)), there)[0] == "identified"
+
+
+@pytest.mark.parametrize("name", ["discharge_error[low]", "partial_depth", "lateral_inflow", "device_gain"])
+def test_a_name_that_explains_it_stands_beside_the_doubt(name: str) -> None:
+    named = grounds(step(name), carried=(HIGHER,))
+    kind, sentence, remarks = said(named, [a_suspect(name)])
+    assert kind == "identified"
+    assert sentence.endswith(f"But {DOUBT}, and what is said of the model may only make up for that.")
     assert remarks.startswith(
         "The velocities of 1 section in experiment low carry 1.5 times the stated discharge (A, x"
     )
-    assert "But sections" not in said(grounds(step("wind")))[1]
+    assert "But sections" not in said(grounds(step(name)), [a_suspect(name)])[1]
+
+
+def test_water_that_enters_at_a_place_explains_it() -> None:
+    assert said(grounds(places=(a_location(term="inflow"),), carried=(HIGHER,)))[0] == "none-of-these"
+    assert said(grounds(places=(a_location(term="drag"),), carried=(HIGHER,)))[0] == "cannot-tell"
+
+
+def test_effects_of_discharges_are_listed() -> None:
+    assert set(OF_DISCHARGES) <= set(library())
 
 
 def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,10 @@ UNSEEN_RATIO = 1.3
 ABSURD = 4.0
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 FAR_OFF = 4.0
+# Effects of the library that let sections read another discharge than stated: water that comes or goes, and readings
+# that are off as a whole. Larger than this over what is plausible they only make up for it. Chosen, as for a parameter.
+OF_DISCHARGES = ("discharge_error", "lateral_inflow", "device_gain", "partial_depth")
+MOST_OF_DISCHARGES = FAR_OFF
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = START_OFF_ENDS
@@ -56,7 +60,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     statement = replace(statement, tells_errors=bool(left_over) and grounds.errors.clearly_larger)
     return Verdict(
         kind=statement.kind,
-        sentence=" ".join(one for one in (statement.sentence, left_over, _carried(grounds)) if one),
+        sentence=" ".join(one for one in (statement.sentence, left_over, _carried(grounds, statement)) if one),
         remarks=tuple(remarks_of(grounds, suspects, statement)),
         location=places[0] if places else None,
         not_excluded=grounds.not_excluded,
@@ -67,10 +71,22 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     )
 
 
-def _carried(grounds: Grounds) -> str:
-    """That sections carry another discharge than stated, behind whatever is said of the model; '' where none does."""
+def _carried(grounds: Grounds, statement: Statement) -> str:
+    """That sections carry another discharge than stated, behind what is said of the model; '' where none does, or it
+    was said as the reason to believe no name.
+    """
     off = carried_in_short(grounds.carried)
-    return f"But {off}, and what is said of the model may only make up for that." if off else ""
+    untold = off and off not in statement.sentence
+    return f"But {off}, and what is said of the model may only make up for that." if untold else ""
+
+
+def _explains_discharges(grounds: Grounds, suspects: Sequence[Suspect]) -> bool:
+    """Whether something accepted may be why sections carry another discharge than stated."""
+    found = grounds.findings
+    accepted = [one for one in suspects if one.name in found.effects]
+    believed = [one for one in accepted if one.amplitude.relative_size <= MOST_OF_DISCHARGES]
+    of_water = any(place.term == "inflow" for place in found.places)
+    return of_water or any(one.name.partition("[")[0] in OF_DISCHARGES for one in believed)
 
 
 def _left_over(grounds: Grounds, statement: Statement) -> str:
@@ -143,6 +159,8 @@ def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> Statement:
 def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
     """Why no name can be believed, '' when it can."""
     misfit, (parameter, far) = grounds.misfit, grounds.strained
+    if grounds.carried and not _explains_discharges(grounds, suspects):
+        return f"{carried_in_short(grounds.carried)}, and what was found may only make up for that"
     ratio = misfit.chi2 / max(misfit.freedom, 1)
     if ratio > ABSURD:
         return (
