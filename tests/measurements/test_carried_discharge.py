@@ -139,7 +139,9 @@ def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str
     there = [a_suspect(name, amplitude={"value": value})]
     kind, sentence, _ = said(grounds(step(name), carried=(HIGHER,)), there)
     assert kind == "cannot-tell"
-    assert sentence.startswith(f"These data cannot tell: {DOUBT}, and what was found may only make up for that.")
+    assert sentence.startswith(
+        f"Before anything can be said of the model: {DOUBT}: check the discharge, the velocities"
+    )
     assert name.partition("[")[0] in sentence
     assert sentence.count(DOUBT) == 1
     assert said(grounds(step(name)), there)[0] == "identified"

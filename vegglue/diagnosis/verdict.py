@@ -23,7 +23,7 @@ from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
-from vegglue.measurements.carried_in_words import carried_in_short
+from vegglue.measurements.carried_in_words import CHECK, carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 from vegglue.results.suspect import counted_in_words
@@ -43,9 +43,14 @@ UNSEEN_RATIO = 1.3
 ABSURD = 4.0
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 FAR_OFF = 4.0
-# Effects of the library that let sections read another discharge than stated: water that comes or goes, and readings
-# that are off as a whole. Larger than this over what is plausible they only make up for it. Chosen, as for a parameter.
-OF_DISCHARGES = ("discharge_error", "lateral_inflow", "device_gain", "partial_depth")
+# Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes or
+# goes, readings that are off as a whole, a bed or a level that is not there. Larger than this over what is plausible they
+# only make up for it. Chosen, as for a parameter.
+OF_DISCHARGES = (
+    "discharge_error", "lateral_inflow", "outlet_level_error", "gauge_datum", "device_gain", "probe_gain", "zero_offset",
+    "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
+)  # fmt: skip
+TERMS_OF_DISCHARGES = ("inflow", "bed")
 MOST_OF_DISCHARGES = FAR_OFF
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
@@ -73,7 +78,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
 
 def _carried(grounds: Grounds, statement: Statement) -> str:
     """That sections carry another discharge than stated, behind what is said of the model; '' where none does, or it
-    was said as the reason to believe no name.
+    was said before.
     """
     off = carried_in_short(grounds.carried)
     untold = off and off not in statement.sentence
@@ -85,14 +90,15 @@ def _explains_discharges(grounds: Grounds, suspects: Sequence[Suspect]) -> bool:
     found = grounds.findings
     accepted = [one for one in suspects if one.name in found.effects]
     believed = [one for one in accepted if one.amplitude.relative_size <= MOST_OF_DISCHARGES]
-    of_water = any(place.term == "inflow" for place in found.places)
-    return of_water or any(one.name.partition("[")[0] in OF_DISCHARGES for one in believed)
+    at_place = any(place.term in TERMS_OF_DISCHARGES for place in found.places)
+    return at_place or any(one.name.partition("[")[0] in OF_DISCHARGES for one in believed)
 
 
 def _left_over(grounds: Grounds, statement: Statement) -> str:
     """What the model asks for with what was accepted, where that is what the statement names."""
     found = grounds.findings
-    if not found.accepted or found.absurd or statement.tells_laws or grounds.field is not None:
+    unnamed = found.absurd or statement.kind == "cannot-tell" or statement.tells_laws
+    if not found.accepted or unnamed or grounds.field is not None:
         return ""
     return left_over_in_words(grounds.errors, grounds.standing_out, grounds.remainder)
 
@@ -101,8 +107,11 @@ def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     found, misfit = grounds.findings, grounds.misfit
     if found.absurd:
         return Statement("cannot-tell", BEFORE_ALL_ELSE + found.absurd[0])
-    doubt = _doubt(grounds, suspects)
     named = causes_in_words(found, suspects)
+    if grounds.carried and not _explains_discharges(grounds, suspects):
+        made_up = f" What may make up for it: {named}." if named else ""
+        return Statement("cannot-tell", f"{BEFORE_ALL_ELSE}{carried_in_short(grounds.carried)}: {CHECK}.{made_up}")
+    doubt = _doubt(grounds, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)
     if grounds.laws is not None and (nothing or (not doubt and law_goes_first(grounds.laws, found))):
         return _with_a_law(grounds.laws, grounds, doubt)
@@ -159,8 +168,6 @@ def _with_a_law(laws: LawsSuspected, grounds: Grounds, doubt: str) -> Statement:
 def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
     """Why no name can be believed, '' when it can."""
     misfit, (parameter, far) = grounds.misfit, grounds.strained
-    if grounds.carried and not _explains_discharges(grounds, suspects):
-        return f"{carried_in_short(grounds.carried)}, and what was found may only make up for that"
     ratio = misfit.chi2 / max(misfit.freedom, 1)
     if ratio > ABSURD:
         return (

@@ -31,6 +31,8 @@ def _better_model(run: Run) -> Iterator[str]:
     """The command that adds what is missing; where the loop has done so, the page of the model that has it."""
     ladder, found = run.loop.ladder, run.behind
     assert found is not None
+    if found.verdict.doubts_the_data:
+        return
     if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
         yield f"{command_about(run, 'discover')} calibrates laws that are in no list, and writes the best."
     if ladder is None:

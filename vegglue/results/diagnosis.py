@@ -64,7 +64,8 @@ class Step:
 # Errors over those stated above which they, and not the model, would explain the misfit: stated errors are good to a
 # quarter. Chosen, not measured.
 LARGEST_SCALE = 1.25
-# How a sentence begins that tells of measurements which no flow of the case can show.
+# How a sentence begins that tells of measurements which no flow of the case can show, or of sections that carry another
+# discharge than stated.
 BEFORE_ALL_ELSE = "Before anything can be said of the model: "
 
 
@@ -90,7 +91,7 @@ class Verdict:
 
     @property
     def doubts_the_data(self) -> bool:
-        """Whether measurements that no flow of the case can show stand before all else."""
+        """Whether doubts about the measurements stand before all else."""
         return self.sentence.startswith(BEFORE_ALL_ELSE)
 
 
