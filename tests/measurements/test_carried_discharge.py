@@ -147,7 +147,7 @@ def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str
     assert said(grounds(step(name)), there)[0] == "identified"
 
 
-@pytest.mark.parametrize("name", ["discharge_error[low]", "partial_depth", "lateral_inflow", "device_gain"])
+@pytest.mark.parametrize("name", ["discharge_error[low]", "partial_depth", "lateral_inflow", "floor_level_error"])
 def test_a_name_that_explains_it_stands_beside_the_doubt(name: str) -> None:
     named = grounds(step(name), carried=(HIGHER,))
     kind, sentence, remarks = said(named, [a_suspect(name)])
@@ -159,8 +159,12 @@ def test_a_name_that_explains_it_stands_beside_the_doubt(name: str) -> None:
     assert "But sections" not in said(grounds(step(name)), [a_suspect(name)])[1]
 
 
-def test_water_that_enters_at_a_place_explains_it() -> None:
-    assert said(grounds(places=(a_location(term="inflow"),), carried=(HIGHER,)))[0] == "none-of-these"
+@pytest.mark.parametrize("term", ["inflow", "bed"])
+def test_water_that_enters_at_a_place_or_another_bed_explains_it(term: str) -> None:
+    assert said(grounds(places=(a_location(term=term),), carried=(HIGHER,)))[0] == "none-of-these"
+
+
+def test_drag_at_a_place_does_not() -> None:
     assert said(grounds(places=(a_location(term="drag"),), carried=(HIGHER,)))[0] == "cannot-tell"
 
 

@@ -43,12 +43,12 @@ UNSEEN_RATIO = 1.3
 ABSURD = 4.0
 # Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
 FAR_OFF = 4.0
-# Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes or
-# goes, readings that are off as a whole, a bed or a level that is not there. Larger than this over what is plausible they
-# only make up for it. Chosen, as for a parameter.
+# Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes
+# or goes, readings that are off as a whole, a bed or a level that is not there. Larger than this over what is plausible
+# they only make up for it. Chosen, as for a parameter.
 OF_DISCHARGES = (
-    "discharge_error", "lateral_inflow", "outlet_level_error", "gauge_datum", "device_gain", "probe_gain", "zero_offset",
-    "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
+    "discharge_error", "lateral_inflow", "outlet_level_error", "gauge_datum", "device_gain", "probe_gain",
+    "zero_offset", "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
 )  # fmt: skip
 TERMS_OF_DISCHARGES = ("inflow", "bed")
 MOST_OF_DISCHARGES = FAR_OFF
