@@ -225,3 +225,27 @@ def test_names_of_sections_that_are_not_used_are_told(tmp_path: Path) -> None:
     case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
     assert case.imported is not None
     assert "sections told by x, as 1 row lacks its name" in case.imported[0].taken
+
+
+@pytest.mark.parametrize(
+    ("headings", "number", "kept"),
+    [
+        ("x,y,u", "7777", False),
+        ("x,y,u (mm/s)", "-8888", False),
+        ("x,y,level", "7777", False),
+        ("x,y,level (mm)", "7777", True),
+        ("x,y,level (ft)", "7777", True),
+        ("u,y,x", "7777", True),
+        ("x,y,depth (cm)", "8888", False),
+        ("x,y,discharge", "7777", True),
+    ],
+)
+def test_sevens_and_eights_are_marks_where_nothing_measured_is_so_large(
+    tmp_path: Path, headings: str, number: str, kept: bool
+) -> None:
+    """A check doubted them, an import kept them."""
+    (tmp_path / "a.csv").write_text(f"{headings}\n1,2,0.4\n2,2,{number}\n", encoding="utf-8")
+    taken = read_rows(tmp_path / "a.csv", FileWords())
+    last = list(taken.numbers)[-1]
+    assert np.isfinite(taken.numbers[last]).tolist() == [True, kept]
+    assert any("1 mark for no value" in one for one in taken.said) == (not kept)

@@ -12,8 +12,9 @@ from reach import write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
+from vegglue.measurements.missing_marks import MARKS_OF_ANY_COLUMN, MARKS_OR_VALUES, is_mark
 from vegglue.measurements.observations import read_observations
-from vegglue.measurements.suspicious_values import absurd_values, is_mark
+from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.site.gridded_site import build_site
 
 LEVELS = [(8.0, 0.97), (14.5, 0.965), (20.0, 0.955)]  # x, level [m]
@@ -180,6 +181,7 @@ def test_a_steep_reach_above_a_pond_may_be_fast(tmp_path: Path) -> None:
         (-9.99, True),
         (1e30, True),
         (-32768, True),
+        *((mark, True) for mark in (*MARKS_OF_ANY_COLUMN, *MARKS_OR_VALUES)),
         (0.99, False),
         (98.9, False),
     ],

@@ -1,5 +1,6 @@
 """A column of a table as numbers: what marks no value, and numbers that no reading can be."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,19 +8,40 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import Role
 from vegglue.importers.loose_table import LooseTable
 from vegglue.in_short import so_many
-from vegglue.measurements.suspicious_values import is_of_nines
+from vegglue.measurements.missing_marks import (
+    LARGEST_COORDINATE,
+    MARKS_OF_ANY_COLUMN,
+    MARKS_OR_VALUES,
+    is_of_nines,
+)
 
-# Numbers that loggers write for a missing value whatever was measured; nines are marks where they are negative, as
-# 99 m may be a level. Others are named by `missing` in the site file.
-MARKS_OF_LOGGERS = (9999.0, 99999.0, -32768.0, 32767.0, 32768.0, 2147483647.0)
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
-LARGEST_OF_ALL = 1e9  # no coordinate and no measurement is larger
+# What no reading of a quantity or a role exceeds [SI]: no stream among plants runs at 7 m/s, a direction is less than
+# two turns, plants grow in no 50 m of water, and no river lies 7 km above the sea. 7777 mm is a level in a flume, 7777
+# ft one in the mountains. Places along and across, times and discharges have no such bound.
+LARGEST_OF = {
+    "velocity": 7.0, "angle": 720.0, "depth": 50.0, "height": 50.0, "below": 50.0, "level_se": 50.0, "level": 7e3,
+    "z": 7e3,
+}  # fmt: skip
+
+
+def marks_of_role(role: Role, factor: float) -> tuple[float, ...]:
+    """Numbers that mark no value in a column of this role, as no reading of it is so large; factor: SI value of its
+    unit.
+    """
+    largest = LARGEST_OF.get(role.name, LARGEST_OF.get(role.quantity, math.inf))
+    return tuple(sign * mark for mark in MARKS_OR_VALUES if mark * factor > largest for sign in (1.0, -1.0))
 
 
 def numbers_of_column(path: Path, table: LooseTable, place: int, missing: Sequence[float]) -> tuple[Array, list[str]]:
-    """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty."""
+    """A column as numbers, NaN where there is none, and how often that is so: by marks, words or numbers, or empty.
+
+    missing: numbers that are marks there beside those of any column. Nines are where they are negative, as 99 m may be
+    a level.
+    """
     values = np.full(len(table.rows), np.nan)
     for i, (line, row) in enumerate(table.rows):
         try:
@@ -32,8 +54,8 @@ def numbers_of_column(path: Path, table: LooseTable, place: int, missing: Sequen
             ) from None
         values[i] = np.nan if number is None else number
     marked = (
-        np.isin(values, [*MARKS_OF_LOGGERS, *missing])
-        | (np.abs(values) > LARGEST_OF_ALL)
+        np.isin(values, [*MARKS_OF_ANY_COLUMN, *missing])
+        | (np.abs(values) > LARGEST_COORDINATE)
         | np.array([_nines(one) for one in values], dtype=bool)
     )
     empty = sum(not row[place].strip() for _, row in table.rows)

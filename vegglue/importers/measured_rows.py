@@ -9,7 +9,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES
-from vegglue.importers.column_numbers import doubted_nines, numbers_of_column, refuse_negative
+from vegglue.importers.column_numbers import doubted_nines, marks_of_role, numbers_of_column, refuse_negative
 from vegglue.importers.columns_of_table import columns_of_table, taken_as_si, unit_of_column
 from vegglue.importers.copied_rows import without_copies
 from vegglue.importers.file_words import FileWords
@@ -120,8 +120,9 @@ def rows_of_table(path: Path, table: LooseTable, words: FileWords) -> MeasuredRo
             texts[role] = fields
             continue
         units[role] = unit_of_column(path, table, columns, role, words)
-        values, absent = numbers_of_column(path, table, place, words.missing)
-        numbers[role] = values * si_factor(units[role], ROLES[role].quantity, shown_path(path))
+        factor = si_factor(units[role], ROLES[role].quantity, shown_path(path))
+        values, absent = numbers_of_column(path, table, place, [*words.missing, *marks_of_role(ROLES[role], factor)])
+        numbers[role] = values * factor
         if role.endswith(("_se", "_std")):
             refuse_negative(path, table, place, values)
         if ROLES[role].quantity == "velocity":

@@ -12,6 +12,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
+from vegglue.measurements.missing_marks import is_mark
 from vegglue.measurements.plausible_flow import PlausibleFlow, plausible_flow
 from vegglue.measurements.suspicion_in_words import outlet_in_words, suspicions_in_words
 from vegglue.site.gridded_site import Site, in_experiment
@@ -43,8 +44,6 @@ NEAR_THE_OUTLET = 0.25
 DEEPEST_CHANNEL = 2.0
 # Q / A at the outlet [m/s] below which water stands: few probes tell less from nothing.
 STANDING_WATER = 3e-3
-# Numbers that loggers write for a missing value, beside those of nines only; and what is larger than any measurement.
-MISSING_MARKS, LARGEST_NUMBER = (7777.0, 8888.0, 32767.0, 32768.0), 1e6
 # Standard errors of a velocity over Q / A [-]. Smaller: the mean of an hour at 5 % turbulence is known to 0.2 %, and no
 # probe is calibrated better than that. Larger: it tells nothing about the flow.
 VELOCITY_ERRORS = (1e-3, 1.0)
@@ -206,16 +205,3 @@ def _error_bounds(flow: PlausibleFlow, group: pd.DataFrame) -> tuple[Array, Arra
 
 def _unit_of(ratio: float, units: dict[str, Bounds]) -> str:
     return next((unit for unit, (low, high) in units.items() if low <= ratio <= high), "")
-
-
-def is_mark(value: float) -> bool:
-    """Whether a number is one that stands for a missing value: of nines only (-999, 99.9, 9999), 1e30 and the like."""
-    size = abs(value)
-    if size >= LARGEST_NUMBER or size in MISSING_MARKS:
-        return True
-    return size >= 9.0 and is_of_nines(size)
-
-
-def is_of_nines(value: float) -> bool:
-    """Whether a number is written with nines alone: 9, 99.9, 9999."""
-    return set(f"{value:g}") <= set("9.")
