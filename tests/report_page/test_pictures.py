@@ -1,11 +1,15 @@
 """What is drawn of a posterior."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from report_runs import a_toy
 
 from vegglue.flow.sensor import FlowFields
 from vegglue.report_page.flow_pictures import channel_caption, scale_in_words
-from vegglue.report_page.pictures import range_of_figure
+from vegglue.report_page.pictures import range_of_figure, references_of
+from vegglue.report_page.tables import parameter_rows
 
 
 @pytest.mark.parametrize(("bounds", "logarithmic", "wanted"), [
@@ -42,3 +46,25 @@ def test_the_water_of_a_flume_falls_by_millimetres() -> None:
     caption = channel_caption(flow, "low", "")
     assert "the water level falls 0.0058 m over 7.80 m" in caption
     assert "the greatest depth goes from 0.0979 to 0.0999 m." in caption
+
+
+@pytest.mark.parametrize(
+    ("table", "value", "sd", "told"),
+    [
+        ({"phi": [30.0, 3.0], "log10_phi": [1.6, 0.2]}, 10**1.6, 0.2, "10<sup>1.6 ± 0.2</sup>"),
+        ({"phi": [30.0, 3.0]}, 10**1.477, 0.043, "10<sup>1.477 ± 0.043</sup>"),
+        ({"phi": 30.0}, 10**1.48, np.nan, "10<sup>1.48</sup>"),
+        ({"n_b": [0.03, 0.01], "log10_n_b": [-1.0, 0.1]}, 0.03, 0.01, "0.03 ± 0.01"),
+        ({"log10_n_b": [-1.0, 0.1]}, 0.1, 0.023, "0.100 ± 0.023"),
+    ],
+)
+def test_a_figure_marks_the_value_that_the_table_tells(
+    tmp_path: Path, table: dict[str, object], value: float, sd: float, told: str
+) -> None:
+    """Of a study that gives a parameter and its power of ten, the figure marked one and the table told the other."""
+    run = a_toy(tmp_path, reference={"source": "A study", "table": table})
+    name = next(iter(table)).removeprefix("log10_")
+    marked = references_of(run, name)[0]
+    assert (marked.value, marked.sd) == pytest.approx((value, sd), nan_ok=True)
+    row = {"n_b": 0, "phi": 1}[name]
+    assert parameter_rows(run)[row].reference.study.replace("\u00a0", " ") == told

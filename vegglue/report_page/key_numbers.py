@@ -1,5 +1,6 @@
 """The top of the page: the verdict, a few key numbers, and what other parts of the page write in the same way."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import scipy.special
 
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.schema import Case
-from vegglue.figures.typography import NARROW, count, percent, plus_minus, short, symbol_html, unit_html
+from vegglue.figures.typography import NARROW, count, decimals, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.in_short import listed
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
@@ -128,10 +129,38 @@ def as_power(posterior: Posterior, name: str) -> bool:
 
 
 def study_value(case: Case, posterior: Posterior, name: str) -> tuple[float, float] | None:
-    """Median and standard deviation another study gives, NaN where it gives none, as a power where ours is told so."""
+    """Median and standard deviation another study gives, NaN where it gives none, as a power where ours is told so.
+
+    What it gives in that form comes first; what it gives in the other alone is turned into it.
+    """
     table = case.reference.table if case.reference else {}
-    stated = table.get(f"log10_{name}" if as_power(posterior, name) else name)
-    return None if stated is None else stated if isinstance(stated, tuple) else (stated, np.nan)
+    powers, plain = table.get(f"log10_{name}"), table.get(name)
+    own, other = (powers, plain) if as_power(posterior, name) else (plain, powers)
+    if own is not None:
+        return _with_sd(own)
+    if other is None or (other is plain and _with_sd(other)[0] <= 0.0):
+        return None
+    return _to_power(*_with_sd(other)) if other is plain else _from_power(*_with_sd(other))
+
+
+def _with_sd(stated: float | tuple[float, float]) -> tuple[float, float]:
+    return stated if isinstance(stated, tuple) else (stated, math.nan)
+
+
+def _to_power(value: float, sd: float) -> tuple[float, float]:
+    """log10 of value ± sd, as the sd is small."""
+    return _rounded(math.log10(value), sd / (value * math.log(10.0)))
+
+
+def _from_power(exponent: float, sd: float) -> tuple[float, float]:
+    """10^(exponent ± sd), as the sd is small."""
+    return _rounded(10.0**exponent, sd * 10.0**exponent * math.log(10.0))
+
+
+def _rounded(value: float, sd: float) -> tuple[float, float]:
+    """Both to two significant figures of sd, or value to three of its own: nobody gave more."""
+    places = decimals(sd) if math.isfinite(sd) else decimals(value, 3)
+    return round(value, places), round(sd, places)
 
 
 def estimate(posterior: Posterior, name: str) -> str:

@@ -25,6 +25,7 @@ from vegglue.report_page.key_numbers import (
     estimate,
     identified_width,
     plant_parameter,
+    study_value,
     symbol,
 )
 from vegglue.report_page.measured_pictures import canopy_profiles, discharges, residuals, verticals
@@ -93,18 +94,16 @@ def _prior_values(run: Run, name: str) -> np.ndarray:
     return run.posterior.refinement.draws.prior_theta[name]
 
 
-def _references(run: Run, name: str) -> list[ReferenceValue]:
+def references_of(run: Run, name: str) -> list[ReferenceValue]:
+    """Values of others that a figure marks: those that the table tells, and what a synthetic record was made with."""
     reference = run.case.reference
     if reference is None:
         return []
     found = []
-    stated = reference.table.get(name, reference.table.get(f"log10_{name}"))
-    if stated is not None:
-        value, sd = stated if isinstance(stated, tuple) else (stated, np.nan)
-        if name not in reference.table:
-            value, sd = 10**value, sd * 10**value * np.log(10.0)
-        on_axis = sd / (value * np.log(10.0)) if as_power(run.posterior, name) else sd
-        found.append(ReferenceValue(_source(reference), value, on_axis, "D"))
+    if (stated := study_value(run.case, run.posterior, name)) is not None:
+        on_axis, sd = stated
+        value = 10.0**on_axis if as_power(run.posterior, name) else on_axis
+        found.append(ReferenceValue(_source(reference), value, sd, "D"))
     if name in reference.made_with:
         found.append(ReferenceValue("made with", reference.made_with[name], np.nan, "X"))
     return found
@@ -117,7 +116,7 @@ def _source(reference: Reference) -> str:
 
 def _marginal(run: Run, name: str) -> Picture:
     canopy = run.posterior.canopy
-    references = [] if canopy is not None and canopy.parameter == name else _references(run, name)
+    references = [] if canopy is not None and canopy.parameter == name else references_of(run, name)
     figure = draw_marginal(_drawn_parameter(run, name), run.posterior.sample.weights, references)
     identified = identified_width(run.posterior, name)
     caption = f"{symbol(run.case, name)} = {estimate(run.posterior, name)}: {identified}."
@@ -134,7 +133,7 @@ def _canopy_corrected(run: Run) -> Iterator[Picture]:
     uncorrected = _drawn_parameter(run, canopy.parameter)
     kept = (canopy.phi > 0) & np.isfinite(canopy.phi)
     phi, weights = canopy.phi[kept], run.posterior.sample.weights[kept]
-    references = _references(run, canopy.parameter)
+    references = references_of(run, canopy.parameter)
     marked = [reference.value for reference in references]
     low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
     prior = phi if np.array_equal(run.posterior.sample.theta[canopy.parameter], uncorrected.prior) else np.zeros(0)
@@ -157,8 +156,8 @@ def _joint_posteriors(run: Run) -> Iterator[Picture]:
         r = run.posterior.marginals.correlation[i, j]
         marks = [
             (first.name, first.value, second.value, first.marker.lower())
-            for first in _references(run, names[i])
-            for second in _references(run, names[j])
+            for first in references_of(run, names[i])
+            for second in references_of(run, names[j])
             if first.name == second.name
         ]
         dependence = "rise together" if r > 0 else "trade off: one rises as the other falls"
