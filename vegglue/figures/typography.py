@@ -63,11 +63,6 @@ def interval(low: float, high: float) -> str:
     return f"{fixed(low, places)} to {fixed(high, places)}"
 
 
-def count(number: int, one: str, many: str | None = None) -> str:
-    """'1 member', '12 members', '5,000 members'."""
-    return f"{number:,} {one if number == 1 else many or one + 's'}"
-
-
 def percent(share: float) -> str:
     """A share as '37 %'; small ones as '0.4 %' or '< 0.1 %'."""
     if 0 < share < 0.0005:

@@ -3,8 +3,8 @@
 import html
 from collections.abc import Iterator
 
-from vegglue.figures.typography import NARROW, count, decimals, fixed, interval, percent, unit_html
-from vegglue.in_short import listed
+from vegglue.figures.typography import NARROW, decimals, fixed, interval, percent, unit_html
+from vegglue.in_short import listed, so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.carried_in_words import carried_in_short, carried_otherwise
 from vegglue.measurements.kinds import KINDS
@@ -175,7 +175,7 @@ def _of_discharges(run: Run) -> Iterator[str]:
 def _of_posterior(posterior: Posterior) -> Iterator[str]:
     size = posterior.weighting.effective_size
     if not posterior.claimed:
-        members = f"the weights are worth {max(size, 1.0):.0f} of {count(posterior.sample.members, 'member')}"
+        members = f"the weights are worth {max(size, 1.0):.0f} of {so_many(posterior.sample.members, 'member')}"
         yield f"{members}, too few to say how sure the parameters are"
     elif posterior.weighting.pareto_k > TRUSTED_K_HAT:
         yield "a few members carry most of the weight, so that the parameters are less sure than they look"
@@ -186,7 +186,7 @@ def _of_ensemble(ensemble: Ensemble | None) -> Iterator[str]:
         return
     failed = members_with(ensemble.status, FAILED)
     if failed > FAILED_TOLERATED * len(ensemble.status):
-        yield f"{failed:,} of {count(len(ensemble.status), 'member')} failed"
+        yield f"{failed:,} of {so_many(len(ensemble.status), 'member')} failed"
     if not ensemble.by_command and largest_mass_error(ensemble) >= MASS_LIMIT:
         yield f"a member loses or gains {percent(largest_mass_error(ensemble))} of its discharge"
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.figures.places import TERM_SIGNS
-from vegglue.figures.typography import NARROW, count, fixed, interval, percent, short, unit_html
+from vegglue.figures.typography import NARROW, fixed, interval, percent, short, unit_html
+from vegglue.in_short import so_many
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 
@@ -167,7 +168,7 @@ def instrument_rows(diagnosis: Diagnosis) -> list[InstrumentRow]:
         InstrumentRow(
             what=INSTRUMENT_WORDS[one.kind],
             where=where(one.x, one.y),
-            readings=count(len(one.stations), "reading"),
+            readings=so_many(len(one.stations), "reading"),
             offset=_offset(one),
             interval=interval(*one.interval95),
             odds=odds_in_words(float(np.exp(min(one.log_factor, np.log(2 * TOLD_ODDS))))),

@@ -16,8 +16,8 @@ from vegglue.figures.places import paint_places
 from vegglue.figures.plan_view import Outline
 from vegglue.figures.style import Picture, save, styled
 from vegglue.figures.suspects import draw_alike, draw_fingerprint, draw_suspects, paint_alike, paint_suspects
-from vegglue.figures.typography import count, fixed, short
-from vegglue.in_short import listed
+from vegglue.figures.typography import fixed, short
+from vegglue.in_short import listed, so_many
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.report_page.cause_pictures import field_picture, outlines, place_picture, plan_marks
 from vegglue.report_page.cause_words import accepted_causes
@@ -111,7 +111,7 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     out = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.suspects)
     left = [diagnosis.last_score(one) for one in diagnosis.suspects]
     caption = (
-        f"<b>Suspects.</b> Of {count(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
+        f"<b>Suspects.</b> Of {so_many(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
         f"errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
     )
     if accepted_causes(diagnosis):

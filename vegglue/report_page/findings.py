@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.case.schema import Case
-from vegglue.figures.typography import NARROW, Notation, count, fixed, html_notation, plus_minus, short
+from vegglue.figures.typography import NARROW, Notation, fixed, html_notation, plus_minus, short
+from vegglue.in_short import so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
@@ -184,7 +185,7 @@ def _homogeneity(case: Case, posterior: Posterior) -> Iterator[Finding]:
 def _set_aside_since(run: Run) -> Iterator[Finding]:
     """Readings of the posterior that a diagnosis made after it set aside."""
     if many := run.set_aside_since:
-        of = f"{count(many, 'reading')} that the diagnosis set aside {'is' if many == 1 else 'are'}"
+        of = f"{so_many(many, 'reading')} that the diagnosis set aside {'is' if many == 1 else 'are'}"
         again = f"{command_about(run, 'infer')} makes one without"
         yield Finding("stations", f"{of} still in this posterior; {again}.", doubt=True)
 
@@ -230,8 +231,8 @@ def _weights(posterior: Posterior, notation: Notation) -> Finding:
 
 def _members(ensemble: Ensemble) -> Finding:
     newton, marched, failed, run = (members_with(ensemble.status, number) for number in STATUS_WORDS)
-    own = f"{count(newton, 'member')} solved by Newton's method, {marched:,} by marching in time"
-    text = f"{count(run, 'member')} run by the command" if ensemble.by_command else own
+    own = f"{so_many(newton, 'member')} solved by Newton's method, {marched:,} by marching in time"
+    text = f"{so_many(run, 'member')} run by the command" if ensemble.by_command else own
     return Finding(
         "members",
         f"{text}, {failed:,} failed{'; they have no weight' if failed else ''}.",

@@ -8,8 +8,8 @@ import scipy.special
 
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.schema import Case
-from vegglue.figures.typography import NARROW, count, decimals, percent, plus_minus, short, symbol_html, unit_html
-from vegglue.in_short import listed
+from vegglue.figures.typography import NARROW, decimals, percent, plus_minus, short, symbol_html, unit_html
+from vegglue.in_short import listed, so_many
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
 from vegglue.report_page.posterior_words import identification
@@ -44,7 +44,7 @@ def verdict_of(case: Case, posterior: Posterior) -> str:
         return f"A first look only: {few}. {_how_well(posterior)}"
     known = [name for name in posterior.parameters if posterior.marginals.identified[name]]
     unknown = [name for name in posterior.parameters if not posterior.marginals.identified[name]]
-    by = f"by these {count(posterior.fit.used, 'station')}"
+    by = f"by these {so_many(posterior.fit.used, 'station')}"
     sentence = f"{_in_a_list(case, known)} {_are(known)} identified {by}" if known else f"Nothing is identified {by}"
     if unknown:
         sentence += f"; {_in_a_list(case, unknown)} {_are(unknown)} not"

@@ -16,7 +16,8 @@ from vegglue.figures.measured import (
     draw_verticals,
 )
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import as_given, count, fixed, plus_minus, short, unit_html, unit_math
+from vegglue.figures.typography import as_given, fixed, plus_minus, short, unit_html, unit_math
+from vegglue.in_short import so_many
 from vegglue.inference.glue import member_weights
 from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
@@ -99,8 +100,8 @@ def verticals(run: Run) -> Iterator[Picture]:
     """All verticals of each ADV section, as wide as the page."""
     for one in _surveyed_sections(run):
         caption = (
-            f"{one.heading}: {count(one.points, 'point')} in {count(len(one.verticals), 'vertical')}, each drawn where "
-            "it stands, with the profile fitted to it; z in the datum of the file."
+            f"{one.heading}: {so_many(one.points, 'point')} in {so_many(len(one.verticals), 'vertical')}, each drawn "
+            "where it stands, with the profile fitted to it; z in the datum of the file."
         )
         figure = draw_verticals(one.verticals, one.canopy, _stretch(one.verticals))
         alt = f"Point velocities over height in the verticals of section {one.section}."

@@ -4,7 +4,8 @@ import html
 from collections.abc import Iterator
 
 from vegglue.effects.library import library
-from vegglue.figures.typography import NARROW, count, short
+from vegglue.figures.typography import NARROW, short
+from vegglue.in_short import so_many
 from vegglue.report_page.cause_words import instrument_at
 from vegglue.report_page.run import Run, command_about
 from vegglue.results.diagnosis import Diagnosis
@@ -70,7 +71,7 @@ def _measurements(run: Run) -> Iterator[str]:
     for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
         purposes = [_to_see(one) for one in settled if one.useful[0].name == best.name]
         yield (
-            f"Measure <b>{html.escape(best.name)}</b>, {', and '.join(purposes)}: {count(best.stations, 'station')}, "
+            f"Measure <b>{html.escape(best.name)}</b>, {', and '.join(purposes)}: {so_many(best.stations, 'station')}, "
             f"some {short(best.hours, 2)}{NARROW}hours of field work."
         )
     left = [_to_see(one) for one in questions if one not in settled and not one.answered]

@@ -14,7 +14,8 @@ from vegglue.arrays import Array
 from vegglue.case.text_files import unused
 from vegglue.figures.section_panels import DrawnPanel, Edges, PanelGround, SectionPanel, draw_panel, value_range
 from vegglue.figures.style import Picture
-from vegglue.figures.typography import as_given, count, short
+from vegglue.figures.typography import as_given, short
+from vegglue.in_short import so_many
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.sections import section_in_words
 from vegglue.normal_range import NORMAL95
@@ -165,7 +166,7 @@ def panel_words(panel: SectionPanel) -> str:
 
 def _held(panel: SectionPanel, total: Edges) -> str:
     inside = int(np.sum(~panel.aside & (panel.measured >= total[0]) & (panel.measured <= total[1])))
-    return f"{inside} of {count(int(np.sum(~panel.aside)), 'station')} lie within the dotted lines"
+    return f"{inside} of {so_many(int(np.sum(~panel.aside)), 'station')} lie within the dotted lines"
 
 
 def _numbers(name: str, kind: Kind, panel: SectionPanel, drawn: DrawnPanel) -> dict[str, Any]:

@@ -11,8 +11,8 @@ import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.figures.typography import NARROW, as_given, count, fixed, percent, plus_minus, short
-from vegglue.in_short import telling_digits
+from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
+from vegglue.in_short import so_many, telling_digits
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, study_value, symbol
@@ -227,9 +227,9 @@ def health_in_words(run: Run) -> str:
     """How many members there are, or draws without an ensemble, and how many failed (text)."""
     if run.ensemble is None:
         sample = run.posterior.sample
-        return f"{count(sample.members, 'draw')}, {sample.failed or 'none'} of them failed"
+        return f"{so_many(sample.members, 'draw')}, {sample.failed or 'none'} of them failed"
     failed = members_with(run.ensemble.status, FAILED)
-    return f"{count(len(run.ensemble.status), 'member')}, {failed or 'none'} of them failed"
+    return f"{so_many(len(run.ensemble.status), 'member')}, {failed or 'none'} of them failed"
 
 
 def failure_reasons(ensemble: Ensemble) -> list[tuple[str, int]]:
