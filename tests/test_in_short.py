@@ -16,7 +16,7 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.tables import show_ladder
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
-from vegglue.in_short import in_digits, in_short, interval_in_short, so_many
+from vegglue.in_short import duration_in_short, in_digits, in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.solver.status import FAILED
@@ -137,3 +137,9 @@ def test_what_these_data_would_have_shown_is_answered(now: float, answered: bool
         else "To tell bed_trend from a change of n_b (D2 now 12 squared standard errors; a diagnosis sees it from 25 on"
     )
     assert repr(hidden).splitlines()[0].startswith(told)
+
+
+def test_a_time_is_told_in_the_unit_that_it_is_twice() -> None:
+    """A terminal told minutes from 90 s on, a page from 120 s on."""
+    told = [duration_in_short(seconds) for seconds in (0.4, 119.0, 120.0, 7199.0, 7200.0, 9000.0)]
+    assert told == ["0 s", "119 s", "2 min", "120 min", "2.0 h", "2.5 h"]

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable, Sequence
 
+# Of a unit of time, from which it is told in the next: below two, whole ones may be off by more than a quarter.
+LEAST_OF_A_UNIT = 2.0
 # Sizes up to which a number is written in full; beyond, as a power of ten.
 LARGEST_IN_FULL = 1e5
 
@@ -15,6 +17,13 @@ def in_short(heading: str, lines: Iterable[str]) -> str:
 def so_many(number: int, one: str, many: str = "") -> str:
     """`1 station`, `1,024 stations`; many: where it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def duration_in_short(seconds: float) -> str:
+    """`119 s`, `2 min`, `2.0 h`."""
+    if seconds < LEAST_OF_A_UNIT * 60.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < LEAST_OF_A_UNIT * 3600.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def listed(parts: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from vegglue.cli.output import console
+from vegglue.in_short import duration_in_short
 from vegglue.progress import Progress, Watch, silent
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
         return ""
     rate, waiting = done / seconds, progress.total - progress.done
     told = waiting > 0 and (done >= LEFT_TOLD_FROM * (done + waiting) or seconds >= LEFT_TOLD_AFTER)
-    return f", {_rate(rate)}, {_duration(waiting / rate)} left" if told else f", {_rate(rate)}"
+    return f", {_rate(rate)}, {duration_in_short(waiting / rate)} left" if told else f", {_rate(rate)}"
 
 
 def _rate(each_second: float) -> str:
@@ -109,9 +110,3 @@ def _rate(each_second: float) -> str:
     seconds, words = next((span for span in spans if each_second * span[0] >= 1.0), spans[-1])
     count = each_second * seconds
     return f"{count:,.0f} {words}" if count >= 10.0 else f"{count:.1f} {words}"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

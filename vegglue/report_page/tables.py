@@ -12,7 +12,7 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, as_given, fixed, percent, plus_minus, short
-from vegglue.in_short import so_many, telling_digits
+from vegglue.in_short import duration_in_short, so_many, telling_digits
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report_page.key_numbers import as_power, estimate, largest_mass_error, study_value, symbol
@@ -263,17 +263,7 @@ def _work_done(ensemble: Ensemble) -> Iterator[tuple[str, str]]:
     seconds = ensemble.seconds[np.isfinite(ensemble.seconds)]
     yield (
         "time of the runs" if ensemble.by_command else "time of all processes together",
-        f"{_duration(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
-    )
-
-
-def _duration(seconds: float) -> str:
-    return (
-        f"{seconds:.0f} s"
-        if seconds < 120
-        else f"{seconds / 60:.0f} min"
-        if seconds < 7200
-        else f"{seconds / 3600:.1f} h"
+        f"{duration_in_short(float(seconds.sum()))}, {short(float(np.median(seconds)), 2)} s a member",
     )
 
 
