@@ -57,9 +57,14 @@ def as_given(value: float, sd: float = math.nan) -> str:
     return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
 
 
+def decimals_between(low: float, high: float) -> int:
+    """Decimal places of both ends of a 95 % range and of what lies in it: two figures of its standard deviation."""
+    return decimals((high - low) / 4) if high > low else 3
+
+
 def interval(low: float, high: float) -> str:
     """low to high, to as many decimals as their distance deserves."""
-    places = decimals((high - low) / 4) if high > low else 3
+    places = decimals_between(low, high)
     return f"{fixed(low, places)} to {fixed(high, places)}"
 
 

@@ -3,7 +3,7 @@
 import html
 from collections.abc import Iterator
 
-from vegglue.figures.typography import NARROW, decimals, fixed, interval, percent, unit_html
+from vegglue.figures.typography import NARROW, decimals_between, fixed, interval, percent, unit_html
 from vegglue.in_short import listed, so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.carried_in_words import carried_in_short, carried_otherwise
@@ -127,8 +127,7 @@ def _amplitude_in_words(amplitude: AmplitudeEstimate) -> str:
     """'size −0.67, 95 % in −0.79 to −0.54' (HTML)."""
     unit = unit_html(amplitude.unit)
     low, high = amplitude.interval95
-    places = decimals((high - low) / 4) if high > low else 3  # as the interval has them
-    value = f"size {fixed(amplitude.value, places)}"
+    value = f"size {fixed(amplitude.value, decimals_between(low, high))}"
     return f"{value}{f'{NARROW}{unit}' if unit else ''}, 95{NARROW}% in {interval(low, high)}"
 
 
