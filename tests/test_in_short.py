@@ -120,9 +120,12 @@ def test_a_question_names_its_best_measurements() -> None:
     surer = Question("wind from waves", (replace(best, now=5.0),))
     assert "(D2 now 5 squared standard errors: the data at hand should tell, what is listed makes it" in repr(surer)
     useless = Question("wind from waves", (replace(best, then=2.1),))
-    assert repr(useless).endswith(
-        "none of 1 measurements would by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
-    )
+    few = "by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
+    assert repr(useless).endswith(f"the one measurement would not {few}")
+    assert repr(Question("wind from waves", 2 * useless.measurements)).endswith(f"none of 2 measurements would {few}")
+    known = repr(Question("wind from waves", (replace(best, now=9.0, then=9.1),)))
+    assert "and the one measurement does not add a tenth to it" in known
+    assert repr(Question("wind from waves", ())).endswith(": no measurement would by itself.")
 
 
 @pytest.mark.parametrize(("now", "answered"), [(12.0, False), (26.0, True)])

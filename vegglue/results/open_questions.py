@@ -89,14 +89,21 @@ class Question:
             now = max(one.now for one in self.measurements)
             seen = in_digits(self.seen_from, 2)
             return f"answered, as D2 is {in_digits(now, 2)} already, and from {seen} on a diagnosis sees it"
-        many = f"none of {len(self.measurements)} measurements"
         if not self.nearest:
-            return f"{many} would by itself"
+            return "no measurement would by itself"
+        would, adds = self._none_of_them()
         best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
         most = f"D2 at most {in_digits(best.then, 2)}: {best.name}"
         if best.then >= SEPARATES:
-            return f"D2 is {in_digits(best.now, 2)} already, where {enough}, and {many} adds a tenth to it ({most})"
-        return f"{many} would by itself, where {enough} ({most})"
+            return f"D2 is {in_digits(best.now, 2)} already, where {enough}, and {adds} a tenth to it ({most})"
+        return f"{would} by itself, where {enough} ({most})"
+
+    def _none_of_them(self) -> tuple[str, str]:
+        """`none of 3 measurements would` and `.. adds`; of a single one, that it would not."""
+        if len(self.measurements) == 1:
+            return "the one measurement would not", "the one measurement does not add"
+        many = f"none of {len(self.measurements)} measurements"
+        return f"{many} would", f"{many} adds"
 
 
 def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
