@@ -11,9 +11,12 @@ from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from verdicts import grounds, step
 
 from vegglue.calibration.noise import GRID_ERROR_SHARE, with_correlation, with_grid_error
+from vegglue.case.parameter_space import theta_at
 from vegglue.diagnosis import conclusion
+from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, standing_out
 from vegglue.diagnosis.findings import Findings, Undecided
+from vegglue.screening.candidates import with_effect
 from vegglue.screening.residual_screening import Screening
 
 
@@ -50,6 +53,19 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
     found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None)
     assert judged == [(first, Findings())]  # what competed beside the place was told beside the law
     assert (found.places, found.suspects) == ((), (tested[True],))
+
+
+def test_a_place_is_told_with_its_amplitude_in_the_last_model() -> None:
+    """The sentence told that of its refit, and the table of parameters that of the last calibration."""
+    place = a_location()
+    one = candidate_at(CASE_OF_TWINS, place)
+    case = with_effect(CASE_OF_TWINS, one, place.shapes)
+    slopes = np.zeros((12, len(case.parameters)))
+    base = at_best(case, stations_of(case, ("A",), 4), np.full(12, 0.1), slopes)
+    found = conclusion.as_calibrated(place, base)
+    assert found.amplitude == pytest.approx(float(theta_at(case, base.fitted.point.z)[one.parameter][0]))
+    assert found.amplitude != place.amplitude
+    assert found.interval95[0] < found.amplitude < found.interval95[1]
 
 
 def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:

@@ -10,6 +10,7 @@ from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, i
 from vegglue.calibration.noise import with_correlation
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.diagnosis.between_sections import largest_error_between
+from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds
@@ -30,6 +31,7 @@ from vegglue.results.diagnosis import (
     FieldFound,
     FieldMapKept,
     FirstScreening,
+    Location,
     Misfit,
     ModelErrorUsed,
     ParameterEstimates,
@@ -67,6 +69,7 @@ def concluded(
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), charges=(), of_shape=0.0, undecided=None)
         last, suspects = first, suspects_of(first)
+    found = replace(found, places=tuple(as_calibrated(one, last.base) for one in found.places))
     ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit = misfit_of(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
@@ -96,6 +99,13 @@ def concluded(
         field_map=field_map,
         laws=laws,
     )
+
+
+def as_calibrated(place: Location, base: Baseline) -> Location:
+    """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too."""
+    parameter = candidate_at(base.model.case, place).parameter
+    value, low, high = interval95(base.model, base.fitted, parameter)
+    return replace(place, amplitude=value, interval95=(low, high))
 
 
 def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | None) -> Grounds:
