@@ -73,9 +73,12 @@ def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPat
     assert inside.refinement is not None
     assert command.refinement is not None
     np.testing.assert_array_equal(command.refinement.draws.drawn, inside.refinement.draws.drawn)
-    np.testing.assert_allclose(command.refinement.modes.mode_theta, inside.refinement.modes.mode_theta, rtol=1e-3)
+    # Searches end where less than NEGLIGIBLE_DECREASE is promised: 0.14 standard errors, and a few thousandths here.
+    spread = {name: float(np.std(inside.sample.theta[name])) for name in inside.parameters}
+    apart = command.refinement.modes.mode_theta - inside.refinement.modes.mode_theta
+    assert np.abs(apart / np.array([*spread.values()])).max() < 0.01
     for name, median in inside.marginals.median.items():
-        assert command.marginals.median[name] == pytest.approx(median, rel=2e-3)
+        assert command.marginals.median[name] == pytest.approx(median, abs=0.01 * spread[name])
         np.testing.assert_allclose(np.std(command.sample.theta[name]), np.std(inside.sample.theta[name]), rtol=0.02)
 
 
