@@ -87,7 +87,7 @@ class _Round:
 
     def names(self, screening: Screening) -> list[str]:
         candidates = screening.fingerprints.candidates
-        return [candidates[j].name for j in self.effects] + [f"{one.term} at a place" for one, _ in self.places]
+        return [candidates[j].name for j in self.effects] + [one.name for one, _ in self.places]
 
 
 def _round(screening: Screening, linear: Array, best: float, tried: set[str]) -> _Round:
@@ -97,7 +97,7 @@ def _round(screening: Screening, linear: Array, best: float, tried: set[str]) ->
     places = [
         (one, promising_spots(screening, one, best))
         for one in screening.fingerprints.places
-        if f"{one.term} at a place" not in tried and _within_reach(kind_named(screening.kinds, one.term).total, best)
+        if one.name not in tried and _within_reach(kind_named(screening.kinds, one.term).total, best)
     ]
     return _Round(effects, places)
 
@@ -107,7 +107,7 @@ def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[floa
     candidates = screening.fingerprints.candidates
     of_each = _of_each(screening, linear)
     effects = [float(of_each[j]) for j in _most_promising(of_each) if candidates[j].name not in tried]
-    terms = [one.term for one in screening.fingerprints.places if f"{one.term} at a place" not in tried]
+    terms = [one.term for one in screening.fingerprints.places if one.name not in tried]
     return effects + [kind_named(screening.kinds, term).total for term in terms]
 
 

@@ -62,6 +62,11 @@ class Places:
     plausible: float
     fingerprints: Array
 
+    @property
+    def name(self) -> str:
+        """What all of them are called together, `drag at a place`, in messages and among what was tried."""
+        return f"{self.term} at a place"
+
     def shapes(self, spot: int) -> dict[str, float]:
         """The shapes of the effect at one of them, rounded to a centimetre."""
         return {name: round(float(getattr(self, name)[spot]), 2) for name in ("x", "y", "length", "width")}
