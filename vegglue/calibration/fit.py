@@ -40,7 +40,7 @@ DAMPINGS = (0.0, *np.geomspace(1e-2, 1e10, 49))
 # h [-] and the largest t |a| / |v| [-], as in the source.
 BEND_STEP, LARGEST_BEND = 0.1, 0.75
 # Predicted decrease of the objective [-] below which the bend is not asked for: steps are then within a standard error.
-# Chosen, not measured: each bend costs a flow without slopes, a fifth of one with them.
+# Chosen, not measured: each bend costs a flow without slopes, a quarter of one with them.
 STRAIGHT_DECREASE = 1.0
 
 
