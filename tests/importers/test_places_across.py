@@ -99,3 +99,19 @@ def test_depths_that_read_as_names_of_experiments_are_depths(tmp_path: Path) -> 
     folder = folder_of(tmp_path / "brook", site, a__csv="x;y;depth;u\n10;-1;1;0.41\n10;0;2;0.52\n")
     with pytest.raises(InputError, match="expected a column with the experiment of each row"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+SURVEY = "x;y;z\n" + "".join(f"{x};{y};{abs(y - 3) / 4}\n" for x in (0, 20) for y in range(7))
+POINTS = "x;Dist. from left bank (m);height above bed;u\n" + "".join(
+    f"10;{y};{height};0.4\n" for y in (2, 3, 4) for height in (0.1, 0.2)
+)
+
+
+def test_verticals_beside_a_survey_are_told_as_such(tmp_path: Path) -> None:
+    """Without `zero` the bed of a temporary file was said to give no level to 6 of 6 cells."""
+    zero = "zero: [0, 10], columns: {y: 'Dist. from left bank (m)'}"
+    site = f"bed: {{file: bed.csv, sections: true}}\n{JUNE}files: {{adv.csv: {{{zero}}}}}\n"
+    folder = folder_of(tmp_path / "brook", site, bed__csv=SURVEY, adv__csv=POINTS)
+    with pytest.raises(InputError, match=r"y = 0 and 6 m, got 3 verticals beside it, the first at y = 12 m") as told:
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert "brook-data/adv.csv: expected verticals" in str(told.value)

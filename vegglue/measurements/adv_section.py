@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_digits
+from vegglue.in_short import in_digits, so_many
 from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
@@ -216,7 +216,7 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
     Of heights above the bed below each point, z is that of the bed of the case and the height.
     """
     x, y = points["x"].iloc[0], points["y"].to_numpy()
-    bed = _bed(case, observation, x, y)
+    bed = _bed_below(case, observation, x, y)
     points = points if "z" in points else points.assign(z=bed + points["height"])
     reason = np.select([points["z"] <= bed, points["z"] > surface], [BELOW_BED, ABOVE_SURFACE], "")
     if (reason != "").all():
@@ -230,6 +230,22 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface:
         plants=_among_plants(case, observation, x, y),
         used=reason == "",
         reason=reason,
+    )
+
+
+def _bed_below(case: Case, observation: Observation, x: float, y: Array) -> Array:
+    """Bed level below verticals. Errors: InputError where there is none; beside the grid it is they that are told."""
+    try:
+        return _bed(case, observation, x, y)
+    except InputError:
+        low, high = case.grid.y
+        beside = np.unique(y[(y < low) | (y > high)])
+        if not beside.size:
+            raise
+    raise InputError(
+        f"{shown_path(observation.file)}: expected verticals of case {observation.case!r} over the surveyed bed, "
+        f"between y = {low:g} and {high:g} m, got {so_many(beside.size, 'vertical')} beside it, the first at y = "
+        f"{beside[0]:g} m; correct y (`flip` and `zero` of a file say from where it counts), or the grid."
     )
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer, Trapezoid
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.site.grid import Grid, places_on_map
 from vegglue.site.terrain import levels_at, read_raster, survey_levels
 
@@ -24,8 +24,8 @@ def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
     if np.isnan(bed).any():
         i, j = np.argwhere(np.isnan(bed))[0]
         raise InputError(
-            f"{case.source}: `bed` gives no level to {np.isnan(bed).sum()} of {bed.size} cells, the first at "
-            f"x = {grid.x[i]:g}, y = {grid.y[j]:g} m: add a layer that covers them, or shrink `grid`."
+            f"{shown_path(case.source)}: `bed` gives no level to {np.isnan(bed).sum()} of {bed.size} cells, the first "
+            f"at x = {grid.x[i]:g}, y = {grid.y[j]:g} m: add a layer that covers them, or shrink `grid`."
         )
     return bed
 
