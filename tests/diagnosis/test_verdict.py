@@ -202,6 +202,13 @@ def test_what_is_of_another_kind_may_be_it_instead() -> None:
     assert "likeliest" not in sentence
 
 
+def test_an_instrument_that_may_be_it_instead_is_told_in_words() -> None:
+    """The terminal said `or position (4%)`, which is how the program calls it."""
+    alone = step("a", chances=(0.9,), others={"position": 0.04, "reading": 0.03})
+    sentence = said(grounds(alone), (a_suspect("a"),))[1]
+    assert "or else a probe that is off in all experiments (4%) or one reading that is off (3%)" in sentence
+
+
 def test_a_place_that_is_likelier_comes_first_and_in_words() -> None:
     """Of two that may be it the likelier is told first; what is less likely is told as what it does, and where."""
     bed, inflow = a_location(term="bed", unit="m", x=12.0), a_location(term="inflow", unit="m3/s")

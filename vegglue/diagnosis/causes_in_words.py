@@ -164,10 +164,10 @@ def _likelier_words(step: Step, name: str) -> str:
 
 
 def _other_words(step: Step, name: str) -> str:
-    """One of another kind with its chance; of something at a place, what it does and where."""
+    """One of another kind with its chance; of something at a place, what it does and where; of an instrument, which."""
     chance = f"({_percent(step.others[name])})"
     if name not in step.places:
-        return f"{name} {chance}"
+        return f"{FAULT_WORDS.get(name, name)} {chance}"
     place = step.places[name]
     return f"{_briefly(place.term, place.amplitude, place.x, place.y)} {chance}"
 
