@@ -30,6 +30,10 @@ LARGEST_SIZE = 4.0
 SIZING_STEPS, SIZE_TOLERANCE = 6, 0.02
 # Effects and places that are tried where chance decides.
 DRAWN = 20
+# Shares of the length of the grid between which something unlisted stands, and the share of the measured half width up
+# to which it lies off the middle [-]. Chosen, not measured: nearer its inflow water has not found its shape; nearer
+# the outlet the level is given, and little of a wake is left to be seen; at a bank half of it would be on land.
+PLACED_ALONG, PLACED_ACROSS = (0.15, 0.8), 0.8
 # Excess of a bad probe [standard errors].
 BAD_PROBE_EXCESS = 10.0
 
@@ -153,11 +157,12 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
         return drawn | dict(candidate.fixed)
     used = model.station[model.station["used"].to_numpy(bool)]
     low, high = model.case.grid.x
-    x = random.uniform(low + 0.15 * (high - low), low + 0.8 * (high - low))
+    first, last = (low + share * (high - low) for share in PLACED_ALONG)
+    x = random.uniform(first, last)
     velocity = used[velocity_rows(used)]["y"]
     middle, half = 0.5 * (velocity.max() + velocity.min()), 0.5 * (velocity.max() - velocity.min())
     radius = next(shape.default for shape in candidate.effect.shapes if shape.name == "radius")
-    return {"x": float(x), "y": float(middle + 0.8 * half * random.uniform(-1.0, 1.0)), "radius": radius}
+    return {"x": float(x), "y": float(middle + PLACED_ACROSS * half * random.uniform(-1.0, 1.0)), "radius": radius}
 
 
 def _sized(
