@@ -87,7 +87,12 @@ def parameters_at(case: Case, points: Array) -> dict[str, Array]:
 
 def middle_value(case: Case, value: Value) -> float:
     """The number, or the median of the prior of the parameter of that name [its unit]."""
-    return float(quantile(case.parameters[value], 0.5)) if isinstance(value, str) else value
+    return value_at(case, value, 0.5)
+
+
+def value_at(case: Case, value: Value, share: float) -> float:
+    """The number, or what so much of the prior of the parameter of that name lies below [its unit]."""
+    return float(quantile(case.parameters[value], share)) if isinstance(value, str) else value
 
 
 def prior_range(case: Case, value: Value) -> Bounds:

@@ -18,6 +18,9 @@ from vegglue.site.zones import centres_within, inflow_cells
 
 # Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
 LEAST_TURN = 0.02
+# Froude number [-] of an outlet above which it is said that its level may not hold: chosen, not measured. At 1 no wave
+# carries the level upstream; 0.7 leaves room for the fastest part of a section, some 1.4 times as fast as its mean.
+LARGEST_FROUDE = 0.7
 
 
 def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
@@ -33,7 +36,7 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[str]:
             yield "The outlet holds no cell centre: no water can leave."
         elif name in dry:
             continue
-        elif (froude := _froude(case, experiment, wet, site.grid.dy)) > 0.7:
+        elif (froude := _froude(case, experiment, wet, site.grid.dy)) > LARGEST_FROUDE:
             yield f"Experiment {name} leaves at a Froude number of {froude:.2g}: the outlet level may not hold near 1."
         if case.friction.walls is None and (depth[:, [0, -1]] > 0).any():
             yield (

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds
+from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds, value_at
 from vegglue.case.parts import Value
-from vegglue.case.prior import quantile
 from vegglue.case.schema import Case, Experiment
 from vegglue.checks.boundaries import dry_outlets
 from vegglue.in_short import in_digits
@@ -25,7 +24,15 @@ DRAG_OF_EMERGENT = {
 # Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
 MANY_STEEP = 0.1
-
+# Share of the area of a patch [-] by which its cells may miss it, chosen, not measured: the drag of a patch goes with
+# its area, and a tenth of it is less than the stems counted in a few frames tell.
+LARGEST_MISS = 0.1
+# Height [m] by which a canopy may differ from what verticals show, beside twice their error. Chosen, not measured:
+# tops of plants end within some centimetres of each other, and a profile bends over as much.
+UNEVEN_CANOPY = 0.05
+# Share of a prior [-] whose end stands for its largest value: many lognormal ones have none, and of a million members
+# one is rougher.
+NEARLY_ALL = 0.999999
 # Share of the height of a cross-section by which its middle stands above both sides in a ridge [-], at least so much
 # [m], and share of the sections that are one [-]. Chosen, not measured.
 OF_A_RIDGE, LEAST_RIDGE, MOST_RIDGE = 0.5, 0.02, 0.8
@@ -40,7 +47,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
         covered, hidden = alone.sum() * cell, int((alone & (site.patch != index)).sum())
         if not alone.any():
             yield f"Patch {patch.name} covers no cell centre: {_why_none(case, site, corners_of(case, patch))}."
-        elif abs(covered - meant) > 0.1 * meant:
+        elif abs(covered - meant) > LARGEST_MISS * meant:
             remedy = _beyond_grid(case, corners_of(case, patch)) or "take finer cells"
             yield f"Patch {patch.name} of {in_digits(meant)} m2 becomes {in_digits(covered)} m2 of cells: {remedy}."
         if hidden:
@@ -158,7 +165,7 @@ def _canopy_height(case: Case, experiment: Experiment, stand: str) -> Value:
 
 def _measured_canopy(observations: Observations, name: str, stand: str, height: Bounds) -> Iterator[str]:
     for (experiment, section), canopy in observations.canopy_height.items():
-        margin = 2.0 * canopy.standard_error + 0.05
+        margin = 2.0 * canopy.standard_error + UNEVEN_CANOPY
         # Nothing compares with NaN, so a canopy that does not show raises no question.
         if experiment == name and max(height[0] - canopy.value, canopy.value - height[1]) > margin:
             yield (
@@ -173,7 +180,7 @@ def remarks_on_bank_law(case: Case, site: Site) -> Iterator[str]:
     for index, (class_name, friction_class) in enumerate(case.friction.classes.items()):
         if friction_class.k_s is None:
             continue
-        roughest = _largest(case, friction_class.k_s)
+        roughest = value_at(case, friction_class.k_s, NEARLY_ALL)
         up_to = "up to " if isinstance(friction_class.k_s, str) else ""
         shares = {name: _share_held(case, site, name, index, roughest) for name in case.experiments}
         held = ", ".join(f"{100 * share:.0f} % in {name}" for name, share in shares.items() if share > 0)
@@ -191,7 +198,3 @@ def _share_held(case: Case, site: Site, experiment: str, friction_class: int, k_
     depth = expected_depth(case, now, case.experiments[experiment])
     wet = depth[(now.friction_class == friction_class) & (site.patch < 0) & (depth > 0)]
     return float(np.mean(12.0 * wet / k_s < case.numerics.bank_argument_minimum)) if wet.size else 0.0
-
-
-def _largest(case: Case, value: Value) -> float:
-    return float(quantile(case.parameters[value], 0.999999)) if isinstance(value, str) else value
