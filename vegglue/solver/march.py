@@ -16,7 +16,7 @@ from vegglue.flow.equations import Faces, faces, residual_of, side_fluxes, stora
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
 from vegglue.solver import sweeps
-from vegglue.solver.newton import newton
+from vegglue.solver.newton import FROM_A_MARCH, newton
 
 # Newton tries to finish a march after each of so many equal parts [-]: chosen, not measured. More tries end sooner
 # where one succeeds, and cost up to 25 factorisations each where none does.
@@ -90,7 +90,7 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
         steps = tried * per_try
         if not np.isfinite(state).all():
             return Marched(state, False, steps, f"not finite within {steps * how.step:g} s of marching")
-        polished = newton(problem, state, tolerance, most=25, time_step=50.0)
+        polished = newton(problem, state, tolerance, FROM_A_MARCH)
         if polished.converged[0]:
             return Marched(polished.state, True, steps, "")
     rate = float(np.abs(advance(problem, state, how.step, 1.0)).max()) / how.step

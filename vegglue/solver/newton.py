@@ -5,7 +5,7 @@ Keyes 1998, doi:10.1137/S0036142996304796). However a member was reached, it is 
 largest correction J^-1 R, in m/s and m, is below the tolerance.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,36 @@ from vegglue.solver.jacobian import Factors, eliminate, factors, jacobian, solve
 # Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there: chosen, not
 # measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).
 CLOSE = 2e-2
+# By how much the pseudo-time step grows after a correction below so much [m, m/s], the nearest first, and its longest
+# [s]. Chosen, not measured: faster growth saves factorisations where the root is near, and throws a member off where it
+# is not, which costs every cut of the step that follows.
+GROWTHS, LONGEST_TIME_STEP = ((0.02, 8.0), (0.12, 2.0)), 1e9
+# The pseudo-time step [s] from which a small correction is that of the steady state, at most: chosen, not measured. In
+# less time a member that is far from rest moves little, too.
+STEADY_TIME_STEP = 1e4
+# How often the pseudo-time step is cut at most, and by what. Chosen, not measured: twelve such cuts make 10 s a
+# millionth of a second, and no more would help; smaller cuts cost more factorisations, larger ones iterations after.
+MOST_CUTS, CUT = 12, 4.0
+# Chord steps with one set of factors, and sets of factors, at most. Chosen, not measured: fewer steps factorise more
+# often, more are wasted where factors made too far away do not pull; four sets leave a member that is not near to
+# Newton early.
+STEPS_PER_FACTORS, MOST_FACTORS = 14, 4
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Iterations of Newton at most, and its first pseudo-time step [s].
+
+    Chosen, not measured: a longer first step saves iterations where the root is near, and is cut again, at a
+    factorisation each, where it is not; more iterations seldom find what another way finds at their price.
+    """
+
+    most: int
+    time_step: float
+
+
+# From a backwater curve, from a member nearby, and from where a march stands.
+FROM_AFAR, FROM_NEARBY, FROM_A_MARCH = Beginning(60, 10.0), Beginning(12, 200.0), Beginning(25, 50.0)
 
 
 def _stored(problem: Problem, state: Array) -> Single:
@@ -29,12 +59,12 @@ def _stored(problem: Problem, state: Array) -> Single:
     return stored.reshape(nx, 3 * ny)
 
 
-def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, time_step: float = 10.0) -> ChordSolution:
+def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FROM_AFAR) -> ChordSolution:
     """One member (m = 1) from a start that may be far away."""
-    state, size = start, np.inf
+    state, size, time_step = start, np.inf, how.time_step
     # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
     nowhere = np.zeros(start.shape[2], dtype=bool)
-    for iteration in range(1, most + 1):
+    for iteration in range(1, how.most + 1):
         slope = slope_of_friction(problem, state)
         rates, columns_far = eased(problem, state, slope, nowhere), jacobian(problem, state)
         stored = _stored(problem, state)
@@ -43,21 +73,22 @@ def newton(problem: Problem, start: Array, tolerance: float, most: int = 60, tim
         if not size < LONGEST_CORRECTION:
             return _alone(state, size, iteration, False)
         state = state + step
-        if size < tolerance and time_step > min(1e4, 1.0 / tolerance):
+        if size < tolerance and time_step > min(STEADY_TIME_STEP, 1.0 / tolerance):
             return _alone(state, size, iteration, True)
-        time_step = min(time_step * (8.0 if size < 0.02 else 2.0 if size < 0.12 else 1.0), 1e9)
-    return _alone(state, size, most, False)
+        growth = next((growth for below, growth in GROWTHS if size < below), 1.0)
+        time_step = min(time_step * growth, LONGEST_TIME_STEP)
+    return _alone(state, size, how.most, False)
 
 
-def finish(problem: Problem, near: Array, tolerance: float, rounds: int = 4) -> tuple[ChordSolution, Factors | None]:
+def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None]:
     """One member from a start near its root: chord steps, the factors renewed while they help (Shamanskii 1967).
 
     The factors handed back are those of a state that lies within CLOSE of the root, or none if there was no root.
     """
     state, spent, largest = near, 0, np.inf
-    for _ in range(rounds):
+    for _ in range(MOST_FACTORS):
         shared = factors(problem, state)
-        end = chord(problem, state, shared, tolerance, most=14)
+        end = chord(problem, state, shared, tolerance, most=STEPS_PER_FACTORS)
         spent += int(end.iterations[0])
         moved = float(np.abs(end.state - state).max())
         end = replace(end, iterations=np.array([spent]))
@@ -75,14 +106,14 @@ def _bounded_step(
     """-(D/dt + J)^-1 R with dt cut until no entry is as long as LONGEST_CORRECTION; the last one tried if none is."""
     columns, far = columns_far
     diagonal = np.arange(far.shape[1])
-    for _ in range(12):
+    for _ in range(MOST_CUTS):
         shifted = columns.copy()
         shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
         eliminate(shifted, far)
         step = -solved(shifted, far, rates)
         if np.abs(step).max() < LONGEST_CORRECTION:
             break
-        time_step /= 4.0
+        time_step /= CUT
     return step, time_step
 
 

@@ -14,7 +14,7 @@ from vegglue.flow.problem import Problem, crop
 from vegglue.solver.chord import ChordSolution
 from vegglue.solver.jacobian import Factors, factors
 from vegglue.solver.march import FallBack, march_to_rest
-from vegglue.solver.newton import CLOSE, finish, newton
+from vegglue.solver.newton import CLOSE, FROM_AFAR, FROM_NEARBY, Beginning, finish, newton
 from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.solver.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
 
@@ -120,7 +120,7 @@ def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
     """
     attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
     if warm is not None:
-        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance)]
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance, FROM_NEARBY)]
     spent = 0
     for attempt in attempts:
         solution, shared, band = attempt()
@@ -137,10 +137,10 @@ def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
     return _checked(problem, solution, shared, band, tolerance)
 
 
-def _by_newton(problem: Problem, warm: Array, tolerance: float, most: int = 12, time_step: float = 200.0) -> Attempt:
+def _by_newton(problem: Problem, warm: Array, tolerance: float, how: Beginning) -> Attempt:
     band = wet_band(problem, warm)
     part = crop(problem, *band)
-    near = newton(part, rows_inside(warm, band), CLOSE, most, time_step)
+    near = newton(part, rows_inside(warm, band), CLOSE, how)
     if not near.converged[0]:
         return near, None, band
     solution, shared = finish(part, near.state, tolerance)
@@ -149,7 +149,7 @@ def _by_newton(problem: Problem, warm: Array, tolerance: float, most: int = 12, 
 
 
 def _from_cold(problem: Problem, tolerance: float) -> Attempt:
-    return _by_newton(problem, backwater(problem), tolerance, most=60, time_step=10.0)
+    return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)
 
 
 def _checked(
