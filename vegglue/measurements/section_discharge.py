@@ -37,18 +37,10 @@ class CrossSection:
 
 @dataclass(frozen=True)
 class Discharge:
-    """Discharge and its standard error [m3/s], and what the error is made of.
-
-    standard_error^2 = max(sampling, spacing)^2 + rule^2.
-    sampling: from the standard errors of the verticals; spacing: from how far each vertical lies from what its
-    neighbours predict, which contains the sampling error; rule: from the profile assumed where nothing was measured.
-    """
+    """Discharge and its standard error [m3/s], see `combine`."""
 
     value: float
     standard_error: float
-    sampling: float
-    spacing: float
-    rule: float
 
 
 def grid_weights(section: CrossSection, position: Array, columns: Sequence[Column], step: float) -> list[Array]:
@@ -126,8 +118,12 @@ def _lagrange(nodes: Array, at: float) -> Array:
 
 
 def combine(value: float, sampling: float, spacing: float, rule: float) -> Discharge:
-    """standard_error^2 = max(sampling, spacing)^2 + rule^2 [m3/s]; an unknown (NaN) spacing error is left out."""
-    return Discharge(value, float(np.hypot(np.fmax(sampling, spacing), rule)), sampling, spacing, rule)
+    """standard_error^2 = max(sampling, spacing)^2 + rule^2 [m3/s]; an unknown (NaN) spacing error is left out.
+
+    sampling: from the standard errors of the verticals; spacing: from how far each vertical lies from what its
+    neighbours predict, which contains the sampling error; rule: from the profile assumed where nothing was measured.
+    """
+    return Discharge(value, float(np.hypot(np.fmax(sampling, spacing), rule)))
 
 
 def section_discharges(
