@@ -132,7 +132,7 @@ def test_what_cannot_be_judged_is_not_added() -> None:
 def test_levels_alone_are_not_called_one_section() -> None:
     gauges = a_rung((np.nan, np.nan), {"a": 9.0}, seen=1.0)
     gauges = replace(gauges, held_out=replace(gauges.held_out, velocity=np.zeros(STATIONS, bool)))
-    assert why_not_kept(gauges, gauges) == "there is nothing to hold out: no velocity"
+    assert why_not_kept(gauges, gauges, False, {}) == "there is nothing to hold out: no velocity"
 
 
 @pytest.mark.parametrize(

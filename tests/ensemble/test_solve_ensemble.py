@@ -18,6 +18,7 @@ from vegglue.errors import InputError
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.measurements.observations import Observations, read_observations
+from vegglue.progress import silent
 from vegglue.storage.result_files import read_ensemble
 
 FEW = 16  # members of the problems that tangents and strides are made with, at most
@@ -46,7 +47,7 @@ def test_more_predictions_than_memory_is_laid_out_for_are_refused_first(
     case = load_case(write_reach(tmp_path, COARSE, ("members: 1024", "members: 1048576")))
     monkeypatch.setattr("vegglue.ensemble.solve_ensemble.MOST_PREDICTIONS", 2**20)
     with pytest.raises(InputError, match=r"1,048,576 members of .* stations have .* predictions; expected"):
-        solve_ensemble(case, read_observations(case), tmp_path / "ensemble.h5", 1)
+        solve_ensemble(case, read_observations(case), tmp_path / "ensemble.h5", 1, watch=silent)
     assert not list(tmp_path.glob("*.h5*"))
 
 

@@ -9,6 +9,7 @@ from vegglue.inference.map_and_errors import modes_and_errors
 from vegglue.inference.refine import refine
 from vegglue.inference.tried_members import members_of
 from vegglue.parallel import at_most
+from vegglue.progress import silent
 from vegglue.results.posterior import Posterior
 
 
@@ -28,4 +29,4 @@ def refined(reach: SolvedReach) -> Posterior:
 def noise(reach: SolvedReach) -> Noise:
     case, observations, ensemble = reach
     model = model_of(case, observations)
-    return modes_and_errors(model, members_of(ensemble, model), "known").noise
+    return modes_and_errors(model, members_of(ensemble, model), "known", watch=silent).noise

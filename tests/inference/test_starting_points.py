@@ -21,6 +21,7 @@ from vegglue.inference.refine import log_posterior, refine
 from vegglue.inference.tried_members import points_of_prior
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
+from vegglue.progress import silent
 from vegglue.report_page.posterior_words import posterior_in_words
 from vegglue.results.posterior import Posterior
 
@@ -104,8 +105,8 @@ def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(
     model, noise = model_of(case, observations), noise_of(observations.table)
     with at_most(1):
         tried = points_of_prior(model)
-        usual = find_modes(model, noise, tried)
+        usual = find_modes(model, noise, tried, watch=silent)
         monkeypatch.setattr(map_and_errors, "_refine", lambda *_: None)
-        anew = find_modes(model, noise, tried)
+        anew = find_modes(model, noise, tried, watch=silent)
     assert usual.on_coarse, "there are coarse cells to begin with"
     assert anew.fits[0].objective == pytest.approx(usual.fits[0].objective, abs=0.1)

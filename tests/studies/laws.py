@@ -31,6 +31,7 @@ from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.parallel import at_most
+from vegglue.progress import silent
 from vegglue.screening.candidates import Candidate, start_amplitude, with_effect
 
 ROOT = Path(__file__).parents[2]
@@ -51,12 +52,12 @@ def study_of_laws(trial: LawTrial, truths: Path) -> dict[str, Any]:
     began = time.process_time()
     try:
         base = baseline(data.model)
-        found = laws_beyond(base)
+        found = laws_beyond(base, without=(), watch=silent)
         record |= _found_in(found)
         record["seconds"] = time.process_time() - began
         record["held_out"] = _errors_held_out(trial, data, base, found)
         if trial.group == "listed":
-            without = laws_beyond(base, [trial.hide])
+            without = laws_beyond(base, [trial.hide], watch=silent)
             record["without"] = _found_in(without)
             record["held_out_without"] = _errors_held_out(trial, data, base, without)
     except Exception as error:  # a crash is counted, and stops no study of hours

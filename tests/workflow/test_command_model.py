@@ -20,6 +20,7 @@ from vegglue.engine.interface import Model, Point, linearise, predict, responses
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
+from vegglue.progress import silent
 from vegglue.screening.candidates import Candidate, candidates_of, cause_of, with_effect
 from vegglue.workflow.command_model import _beside_what_was_reckoned, _kept_place, command_tried, with_command
 from vegglue.workflow.run_folder import validation_of
@@ -39,7 +40,7 @@ def case(tmp_path: Path) -> Case:
 def models(case: Case, folder: Path) -> tuple[Model, Model]:
     """The built-in model and that of the command, corrected at HERE."""
     own, runs = model_of(case, read_observations(case)), command_runs(case, folder)
-    return own, replace(own, engine=corrected(correction_at(runs, own, HERE), runs))
+    return own, replace(own, engine=corrected(correction_at(runs, own, HERE, watch=silent), runs, watch=silent))
 
 
 def of_the_command(model: Model, z: np.ndarray) -> np.ndarray:
@@ -131,7 +132,9 @@ def test_the_place_is_where_the_command_fits_best(case: Case, tmp_path: Path) ->
     """The measurements are those of the command at a place that the built-in engine would put elsewhere."""
     own = model_of(case, read_observations(case))
     wanted = of_the_command(own, np.array([[1.0, 0.4]]))[0]
-    found = command_place(command_runs(case, tmp_path), replace(own, station=own.station.assign(value=wanted)))
+    found = command_place(
+        command_runs(case, tmp_path), replace(own, station=own.station.assign(value=wanted)), watch=silent
+    )
     assert found.settled
     left = wanted - of_the_command(own, found.z[None])[0]
     assert np.abs(left).max() < 0.02
@@ -140,10 +143,10 @@ def test_the_place_is_where_the_command_fits_best(case: Case, tmp_path: Path) ->
 @pytest.mark.slow
 def test_the_place_is_kept_for_the_next_verb(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own = model_of(case, read_observations(case))
-    first = linearise(with_command(own, tmp_path), HERE)
+    first = linearise(with_command(own, tmp_path, watch=silent), HERE)
     monkeypatch.setattr("vegglue.workflow.command_model.command_place", None)
     monkeypatch.setattr("vegglue.engine.command_runs.run_command_once", None)
-    again = linearise(with_command(own, tmp_path), HERE)
+    again = linearise(with_command(own, tmp_path, watch=silent), HERE)
     assert first is not None
     assert again is not None
     np.testing.assert_array_equal(first.prediction, again.prediction)
@@ -154,7 +157,7 @@ def test_a_start_that_fails_is_left_for_another(tmp_path: Path) -> None:
     picky = f"{SMOOTH}\nif abs(n - 0.06) < 0.005: raise SystemExit('dry')\n"
     case = commanded(tmp_path, picky, "", COARSE, SMALL, WITH_ERROR)
     own = model_of(case, read_observations(case))
-    assert command_place(command_runs(case, tmp_path), own).model.engine.name == "command"
+    assert command_place(command_runs(case, tmp_path), own, watch=silent).model.engine.name == "command"
 
 
 def test_a_parameter_without_slope_is_named(tmp_path: Path) -> None:
@@ -162,7 +165,7 @@ def test_a_parameter_without_slope_is_named(tmp_path: Path) -> None:
     case = commanded(tmp_path, picky, "", COARSE, SMALL, WITH_ERROR)
     own = model_of(case, read_observations(case))
     with pytest.raises(InputError, match=r"failed on both sides of its best place for phi.*said: dry"):
-        correction_at(command_runs(case, tmp_path), own, np.zeros(2))
+        correction_at(command_runs(case, tmp_path), own, np.zeros(2), watch=silent)
 
 
 def test_a_slope_may_be_of_one_side(tmp_path: Path) -> None:
@@ -170,7 +173,10 @@ def test_a_slope_may_be_of_one_side(tmp_path: Path) -> None:
     case = commanded(tmp_path, picky, "", COARSE, SMALL, WITH_ERROR)
     own = model_of(case, read_observations(case))
     runs = command_runs(case, tmp_path)
-    point = linearise(replace(own, engine=corrected(correction_at(runs, own, np.zeros(2)), runs)), np.zeros(2))
+    point = linearise(
+        replace(own, engine=corrected(correction_at(runs, own, np.zeros(2), watch=silent), runs, watch=silent)),
+        np.zeros(2),
+    )
     assert point is not None
     steps = 1e-4 * np.eye(2)
     slope = (of_the_command(own, steps) - of_the_command(own, -steps)).T / 2e-4
@@ -208,7 +214,7 @@ def test_slopes_of_a_code_that_does_not_rest_are_told_to_be_rough(
     restless = SMOOTH.replace("/ 1000!r}", f"/ 1000 + {noise} * math.sin(1e6 * n * phi * float(row['x']))!r}}")
     case = commanded(tmp_path, f"import math\n{restless}", f", step: {step}", COARSE, SMALL)
     own = model_of(case, read_observations(case))
-    assert correction_at(command_runs(case, tmp_path), own, HERE).rough == rough
+    assert correction_at(command_runs(case, tmp_path), own, HERE, watch=silent).rough == rough
 
 
 @pytest.mark.parametrize(

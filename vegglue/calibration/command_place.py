@@ -16,7 +16,7 @@ from vegglue.engine.command_runs import CommandRuns
 from vegglue.engine.corrected import Correction, DeafCommandError, corrected, correction_at
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
-from vegglue.progress import Watch, silent
+from vegglue.progress import Watch
 
 # Places at which the command is linearised at most, and how often a step that fits worse is halved. Chosen, not
 # measured: most cases need three places, and each costs two runs for each parameter.
@@ -37,7 +37,7 @@ class CommandPlace:
     rough: tuple[str, ...]
 
 
-def command_place(runs: CommandRuns, model: Model, watch: Watch = silent) -> CommandPlace:
+def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace:
     """The search, from the first place of the prior where the command runs: it hangs on nothing but the case.
 
     Errors: InputError when it runs at none of them, or the built-in engine finds no flow.

@@ -177,12 +177,11 @@ def is_off(one: Nominee, rung: Rung) -> bool:
     return is_near_off(rung.values[one.parameter], one.off)
 
 
-def why_not_kept(before: Rung, after: Rung | None, clearly: bool = False, untold: Untold | None = None) -> str:
+def why_not_kept(before: Rung, after: Rung | None, clearly: bool, untold: Untold) -> str:
     """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
     and rise by neither, but for those that do not judge, and the misfit with all that was seen falls. They may rise one
     way where that is not clear, and less than they fall the other.
     """
-    untold = untold or {}
     if after is None:
         return "the model finds no steady flow with it"
     gains = _gains(before, after, untold)

@@ -24,7 +24,7 @@ from vegglue.effects.grammar import SAME_AS
 from vegglue.effects.law import Law
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
-from vegglue.progress import Progress, Watch, silent
+from vegglue.progress import Progress, Watch
 from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
 from vegglue.screening.score_test import ALIKE
 
@@ -35,7 +35,7 @@ MOST_QUANTITIES, SEVERAL_FORMS, FORMS_REFITTED = 8, 2, 2
 HELD = 0.95
 
 
-def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
+def discover_laws(model: Model, without: Sequence[str], watch: Watch) -> Discovery:
     """The shortest laws that explain what a calibrated model leaves; without: listed effects that do not compete.
 
     Errors: InputError when the model finds no flow, or a station has no standard error.
@@ -44,7 +44,7 @@ def discover_laws(model: Model, without: Sequence[str] = (), watch: Watch = sile
     return laws_beyond(baseline(model), without, watch)
 
 
-def laws_beyond(base: Baseline, without: Sequence[str] = (), watch: Watch = silent) -> Discovery:
+def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discovery:
     """The same of a model that is calibrated."""
     watch(Progress("looking for a law"))
     traces = law_fingerprints(base, tuple(without))

@@ -23,7 +23,7 @@ from vegglue.engine.command_runs import CommandRuns, command_predictions, own_pa
 from vegglue.engine.interface import Cause, Engine, Model, Point, Wanted, linearise
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
-from vegglue.progress import Watch, silent
+from vegglue.progress import Watch
 
 # Share of a difference [-] that is bend or noise, above which a slope is told to be rough: root mean square over
 # stations of f(h) + f(-h) - 2 f(0) over f(h) - f(-h). A flow that bends as much as it slopes has a twentieth at a step
@@ -54,7 +54,7 @@ class DeafCommandError(InputError):
     """A command that predicts the same whatever its parameters are."""
 
 
-def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) -> Engine:
+def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine:
     """The engine; its predictions at many points are runs of the command."""
     return Engine(
         name="command",
@@ -68,7 +68,7 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch = silent) 
     )
 
 
-def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch = silent, slopes: bool = True) -> Correction:
+def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:
     """The correction at z (p,) of a model; slopes: whether to run the command for them, twice for each parameter.
 
     Errors: InputError when the command fails there, or the built-in engine finds no flow.

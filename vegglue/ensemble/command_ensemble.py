@@ -16,13 +16,13 @@ from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
 from vegglue.ensemble.solve_chunk import Rows, section_positions
 from vegglue.ensemble.solve_ensemble import left_to_do, make_header, refuse_too_many, solved_members
 from vegglue.measurements.observations import Observations
-from vegglue.progress import Progress, Watch, silent
+from vegglue.progress import Progress, Watch
 from vegglue.solver.status import FAILED, RUN_BY_COMMAND
 from vegglue.storage.resume import ensemble_writer
 
 
 def run_ensemble(
-    case: Case, observations: Observations, path: Path, runs: CommandRuns, jobs: int, watch: Watch = silent
+    case: Case, observations: Observations, path: Path, runs: CommandRuns, jobs: int, watch: Watch
 ) -> None:
     """Run all members of the case and write them to `path`; what an earlier run of the same case has run is kept.
 

@@ -27,7 +27,7 @@ from vegglue.ensemble.solve_chunk import (
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.observations import Observations
 from vegglue.parallel import as_finished
-from vegglue.progress import Progress, Watch, silent
+from vegglue.progress import Progress, Watch
 from vegglue.results.ensemble import Header
 from vegglue.results.fields import FieldWindow, excess, window_of
 from vegglue.site.gridded_site import Site, build_site
@@ -48,7 +48,7 @@ LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
 
 
-def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch = silent) -> None:
+def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
     Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;

@@ -21,7 +21,7 @@ from vegglue.errors import InputError, shown_command
 from vegglue.inference.likelihood import fit_members, sizes_as_stated
 from vegglue.inference.tried_members import TriedMembers, grids_of
 from vegglue.parallel import in_threads, side_by_side
-from vegglue.progress import Progress, Watch, counted, silent
+from vegglue.progress import Progress, Watch, counted
 from vegglue.screening.residual_screening import noise_given_all
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
@@ -48,7 +48,7 @@ class FoundModes:
         return linearise_from(coarse, z, near)
 
 
-def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch = silent) -> FoundModes:
+def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) -> FoundModes:
     """The modes of the posterior under given errors. Where none is refined on finer cells, the members start there.
 
     Errors: InputError when no steady flow is found from any of the members.
@@ -158,7 +158,7 @@ class ModesAndErrors:
     grid_error_known: bool
 
 
-def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch = silent) -> ModesAndErrors:
+def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch) -> ModesAndErrors:
     """The modes from the best of the members that were tried; then the errors, and the modes under these.
 
     rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the

@@ -22,7 +22,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.in_short import in_digits, so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
-from vegglue.progress import Watch, silent
+from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis, Verdict
 from vegglue.whole_files import MAKE_ROOM
 
@@ -38,7 +38,7 @@ OF_ANOTHER_UNIT = 5.0
 TO_CALM = "let its flow come to rest, or set `engine.step` larger"
 
 
-def with_command(model: Model, folder: Path, watch: Watch = silent) -> Model:
+def with_command(model: Model, folder: Path, watch: Watch) -> Model:
     """The model with the engine of its command, if its case has one; folder: of the results of the case.
 
     Errors: InputError when the command cannot be run, or fails where it fits best.
@@ -46,7 +46,7 @@ def with_command(model: Model, folder: Path, watch: Watch = silent) -> Model:
     return model if model.case.engine is None else _place_of(model, folder, watch).model
 
 
-def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch = silent) -> Model:
+def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch) -> Model:
     """The model at stations that no calibration sees, with the command corrected there at the place of `model`."""
     if model.case.engine is None:
         return unseen
@@ -55,7 +55,7 @@ def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch 
     return replace(unseen, engine=corrected(correction, runs, watch))
 
 
-def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: Watch = silent) -> Diagnosis:
+def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: Watch) -> Diagnosis:
     """The diagnosis with a remark, its first, on what the command said and what the built-in engine did; the command is
     run once more for it, at the last parameters that were found.
     """

@@ -109,7 +109,7 @@ def _measured(case: Case) -> pd.DataFrame:
     return read_observations(case).table[ALIKE_IN_ALL]
 
 
-def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch = silent) -> Rung:
+def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch) -> Rung:
     """The case where it predicts best, without the measurements set aside; kept for the next command."""
     kept = kept_rung(case, runs, aside)
     if kept is not None:
