@@ -121,6 +121,15 @@ def test_what_is_said(refined: Posterior) -> None:
     assert "no posterior is claimed" not in said
 
 
+def test_errors_of_the_model_are_not_said_to_be_those_of_the_data(refined: Posterior) -> None:
+    """Where the model was allowed large errors, `0.311 m/s` was called stated with data of 0.041 m/s."""
+    larger = replace(refined, fit=replace(refined.fit, sigma={"velocity": 0.311}))
+    said = " ".join(posterior_in_words(larger))
+    stated = "those stated with the data, 0.01 m/s for velocity; "
+    assert stated in said
+    assert "of the model itself, as far as it is allowed to err, they are 0.311 m/s for velocity." in said
+
+
 def test_a_group_of_smaller_errors_is_not_told_better_for_them(refined: Posterior) -> None:
     station = pd.DataFrame(
         {"experiment": "June", "section": ["A", "A", "", ""], "kind": ["velocity"] * 2 + ["level"] * 2, "used": True}

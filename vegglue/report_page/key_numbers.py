@@ -10,9 +10,8 @@ from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, decimals, percent, plus_minus, short, symbol_html, unit_html
 from vegglue.in_short import listed, so_many
-from vegglue.inference.likelihood import root_mean_square
 from vegglue.measurements.kinds import kind_of
-from vegglue.report_page.posterior_words import identification
+from vegglue.report_page.posterior_words import identification, measurement_error
 from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.validation_words import DOUBTED, UNBELIEVED
 from vegglue.results.ensemble import Ensemble
@@ -177,13 +176,6 @@ def plant_parameter(case: Case) -> str | None:
     """The parameter that is phi of a stand growing in a patch, if there is one."""
     stands = [case.plants.stands[patch.stand] for patch in case.plants.patches]
     return next((stand.phi for stand in stands if isinstance(stand.phi, str)), None)
-
-
-def measurement_error(posterior: Posterior, kind: str) -> float:
-    """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
-    station = posterior.station
-    error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
-    return root_mean_square(error)
 
 
 def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:

@@ -23,7 +23,7 @@ from vegglue.inference.likelihood import fit_members
 from vegglue.inference.weighted_statistics import weighted_quantile
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import fitted_curve
-from vegglue.report_page.key_numbers import measurement_error
+from vegglue.report_page.posterior_words import measurement_error
 from vegglue.report_page.run import Run, published_picture, station_zones
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior

@@ -8,7 +8,7 @@ import numpy as np
 
 from vegglue.figures.typography import PLAIN_TEXT, Notation
 from vegglue.in_short import in_digits, so_many, telling_digits
-from vegglue.inference.likelihood import sizes_as_stated
+from vegglue.inference.likelihood import root_mean_square, sizes_as_stated
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import SET_ASIDE
@@ -59,6 +59,13 @@ def errors_by_kind(errors: Mapping[str, float], preposition: str, notation: Nota
     return " and ".join(
         f"{notation.number(value, 3)}{notation.unit(kind.unit)} {preposition} {kind.words}" for kind, value in known
     )
+
+
+def measurement_error(posterior: Posterior, kind: str) -> float:
+    """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
+    station = posterior.station
+    error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
+    return root_mean_square(error)
 
 
 def weights_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
@@ -206,11 +213,16 @@ def _errors(posterior: Posterior, model: ErrorModel) -> list[str]:
         )
         return [estimate, *_neighbours(model)]
     grid = (
-        f"that of the grid ({in_digits(model.grid_error, 2)} on the whole) among them"
+        f"with that of the grid ({in_digits(model.grid_error, 2)} on the whole) and that"
         if math.isfinite(model.grid_error)
-        else "without that of the grid, whose cells cannot be doubled"
+        else "without that of the grid, whose cells cannot be doubled, with that"
     )
-    sentences = [f"The errors are those stated with the data, {sizes}, {grid}.", *_neighbours(model)]
+    stated = errors_by_kind({kind: measurement_error(posterior, kind) for kind in posterior.fit.sigma}, "for")
+    sentences = [
+        f"The errors are those stated with the data, {stated}; {grid} of the model itself, as far as it is allowed "
+        f"to err, they are {sizes}.",
+        *_neighbours(model),
+    ]
     if model.scale > 1.0:
         sentences.append(
             f"They had to be multiplied by {model.scale:.2f}: stations beside each other scatter more than is stated."
