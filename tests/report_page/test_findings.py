@@ -8,6 +8,7 @@ import pytest
 from posteriors import a_posterior, changed
 from report_runs import MEMBERS
 
+from vegglue.case.schema import EffectEntry
 from vegglue.case.site_schema import Inflow
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report_page.findings import findings
@@ -136,6 +137,20 @@ def test_a_stream_that_joins_below_a_section_is_not_missing_in_it(d3a: tuple[Run
         case = run.case.model_copy(update={"inflows": inflows, "experiments": {"D3a": joined}})
         told = [one.text for one in findings(replace(run, case=case)) if one.subject == "discharge"]
         assert any(f"the model was given {total}" in text for text in told), told
+
+
+@pytest.mark.parametrize(("x", "changed"), [(20.0, True), (420.0, False)])
+def test_what_an_effect_lets_in_is_not_missing_from_the_discharge(
+    d3a: tuple[Run, str], x: float, changed: bool
+) -> None:
+    """A model with an inflow that had been found was said to be given too little, by 8.8 standard errors."""
+    run, _ = d3a
+    entry = EffectEntry(effect="unlisted_inflow", values={"discharge": "n_b", "x": x, "y": 0.0})
+    case = run.case.model_copy(update={"effects": {"spring": entry}})
+    told = [one for one in findings(replace(run, case=case)) if one.subject == "discharge"]
+    assert told
+    assert all(("spring changes that" in one.text) == changed for one in told), told
+    assert not changed or not any(one.doubt for one in told)
 
 
 def test_a_residual_names_its_experiment(toy: tuple[Run, str]) -> None:

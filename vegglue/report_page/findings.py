@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, Notation, fixed, html_notation, plus_minus, short
 from vegglue.in_short import so_many
@@ -50,6 +51,8 @@ from vegglue.solver.status import STATUS_WORDS, members_with
 FAILED_TOLERATED = 0.01
 # Standard errors [-] between measured and prescribed discharge, beyond which chance explains it 1 time in 20.
 DISCHARGE_DOUBTED = 2.0
+# Effects with which a section carries another discharge than stated.
+CHANGE_DISCHARGE = ("discharge_error", "lateral_inflow", "unlisted_inflow")
 
 
 @dataclass(frozen=True)
@@ -201,9 +204,8 @@ def _flagged(observations: Observations) -> Iterator[Finding]:
 
 def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
     for (experiment, section), rules in observations.discharge.items():
-        given = discharges_upstream_of(
-            case, case.experiments[experiment], section_place(observations.table, experiment, section)
-        )
+        x = section_place(observations.table, experiment, section)
+        given = discharges_upstream_of(case, case.experiments[experiment], x)
         if given is None:
             continue
         prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
@@ -215,6 +217,10 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
         if prescribed is None:
             yield Finding("discharge", f"{text}; the discharge is itself a parameter.")
             continue
+        if changed := _changing_discharge(case, experiment, x):
+            more = f"; the model was given {short(prescribed)}{NARROW}m³/s, and {changed} changes that"
+            yield Finding("discharge", f"{text}{more}.")
+            continue
         off = (measured.value - prescribed) / measured.standard_error
         yield Finding(
             "discharge",
@@ -222,6 +228,17 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
             f"{'less' if off > 0 else 'more'}.",
             doubt=abs(off) > DISCHARGE_DOUBTED,
         )
+
+
+def _changing_discharge(case: Case, experiment: str, x: float) -> str:
+    """An effect in the model by which another discharge than stated passes x [m]; '' for none."""
+    for name, entry in case.effects.items():
+        place = entry.values.get("x")
+        is_below = not isinstance(place, str) and place is not None and place > x
+        acts = entry.experiments is None or experiment in entry.experiments
+        if effect_of(case, name).name in CHANGE_DISCHARGE and acts and not is_below:
+            return html.escape(name)
+    return ""
 
 
 def _weights(posterior: Posterior, notation: Notation) -> Finding:
