@@ -105,6 +105,13 @@ def test_a_unit_that_nobody_gave_is_said(tmp_path: Path, heading: str, said: str
     assert said in told_of(tmp_path / "brook", heading, *ROWS, "none")
 
 
+def test_a_unit_may_name_the_datum_of_a_level(tmp_path: Path) -> None:
+    """`m a.s.l.` in a row of units made that row the heading, and no column was known."""
+    table = read_loosely(table_of(tmp_path, "Gauge;Chainage;Level", ";m;m a.s.l.", "A;2;47,748", "B;17;47,736"))
+    assert table.headings == ("Gauge", "Chainage", "Level")
+    assert table.units == ("", "m", "m a.s.l.")
+
+
 def test_two_titles_above_two_rows_are_no_table(tmp_path: Path) -> None:
     table = read_loosely(table_of(tmp_path, "Levels", "May", "experiment,x,level,note", "low,2.0,0.5,", "low,3.0,0.6,"))
     assert table.headings == ("experiment", "x", "level")

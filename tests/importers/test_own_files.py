@@ -308,6 +308,8 @@ def test_words_for_units_and_columns() -> None:
     assert unit_named("cfs", "discharge") == "ft3/s"
     assert unit_named("feet", "length") == "ft"
     assert unit_named("m", "velocity") is None
+    assert [unit_named(word, "length") for word in ("m a.s.l.", "m+NAP", "m ü. NN", "ft NAVD88")] == [*"mmm", "ft"]
+    assert unit_named("min", "length") is None
     assert in_si("42 l/s", "discharge", "Q") == pytest.approx(0.042)
     assert role_of("U_depthavg_ms") == ("u", "m/s")
     assert role_of("Water level [cm]") == ("level", "cm")

@@ -33,11 +33,16 @@ SPELLINGS = {
     "lps": "l/s", "gpm": "gal/min", "m3/day": "m3/d", "yards": "yd", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s",
     "qm3/s": "m3/s",
 }  # fmt: skip
+# What stands behind the unit of a level and says of which datum it is: `m a.s.l.`, `m+NAP`, `m ü. NN`.
+OF_A_DATUM = re.compile(
+    r"(m|ft)[\s+]*(a\.?\s?s\.?\s?l\.?|above sea level|aod|nap|(ü\.?\s?)?nh?n|ahd|navd88|ngvd29|ngf|taw|dvr90)"
+)
 
 
 def unit_named(word: str, quantity: str) -> str | None:
     """The unit of a quantity that a word means, `cm/s` for `cm s^-1`; None when it means none."""
     plain = _plain(word)
+    plain = of_datum[1] if (of_datum := OF_A_DATUM.fullmatch(plain)) else plain
     plain = SPELLINGS.get(plain, plain)
     return plain if plain in UNITS[quantity] else None
 
