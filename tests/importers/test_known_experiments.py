@@ -64,3 +64,21 @@ def test_a_column_with_other_names_of_the_experiments_is_shown(tmp_path: Path, n
     assert f"got none, but 'Messtermin' with {name}, flood (write the names of the site file there); " in str(
         refused.value
     )
+
+
+@pytest.mark.parametrize("heading", ["low;mid", "level low;level mid (m)"])
+def test_experiments_side_by_side_are_told_as_such(tmp_path: Path, heading: str) -> None:
+    """Of a column of levels for each experiment the advice was to name one experiment of all rows."""
+    folder = field_folder(tmp_path / "brook", experiments=dict.fromkeys(("low", "mid"), FLOW))
+    (folder / "gauges.txt").write_text(f"Gauge;x;{heading}\nA;2;0.93;1.04\nB;12;0.92;1.03\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"got a column of values for each, .*; write them one below the other"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+def test_a_column_of_remarks_here_and_there_is_not_shown(tmp_path: Path) -> None:
+    """It was `'Remarks' with , in reeds (write the names of the site file there)`."""
+    folder = field_folder(tmp_path / "brook", experiments=dict.fromkeys(("low", "mid"), FLOW))
+    rows = "x;y;u;Remarks\n12;0;0.4;\n12;1;0.3;in reeds\n12;2;0.4;\n"
+    (folder / "survey.txt").write_text(rows, encoding="utf-8")
+    with pytest.raises(InputError, match=r"got none; add one"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

@@ -21,7 +21,7 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
 from vegglue.importers.told_apart_repeats import refuse_told_apart
-from vegglue.in_short import so_many
+from vegglue.in_short import listed, so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
@@ -142,6 +142,12 @@ def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[st
     if len(experiments) == 1:
         return [experiments[0]] * taken.size
     file = where.removesuffix(":").rpartition("/")[2]
+    if side_by_side := [heading for heading in taken.others if {heading, *heading.split()} & set(experiments)]:
+        raise InputError(
+            f"{where} expected a row for each place and experiment, with the name of the experiment ("
+            f"{', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
+            f"{listed(side_by_side)}; write them one below the other."
+        )
     raise InputError(
         f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{_alike(taken)}"
         f"; add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
@@ -151,7 +157,7 @@ def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[st
 def _alike(taken: MeasuredRows) -> str:
     """What an unread column of repeated words holds, which may be experiments by other names; else nothing."""
     for heading, texts in taken.others.items():
-        names = list(dict.fromkeys(texts))
+        names = list(dict.fromkeys(text for text in texts if text))
         if 1 < len(names) < len(texts) and numbers_of(texts) is None:
             shown = ", ".join([*names[:OTHER_NAMES_SHOWN], *(["..."] if len(names) > OTHER_NAMES_SHOWN else [])])
             return f", but {heading!r} with {shown} (write the names of the site file there)"
