@@ -97,3 +97,13 @@ def test_heights_above_the_bed_are_known_in_german(tmp_path: Path, heading: str)
     case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
     assert case.imported is not None
     assert case.imported[0].columns["height"] == heading
+
+
+@pytest.mark.parametrize("heading", ["height above bed", "z above bed"])
+def test_heights_that_are_not_used_are_said(tmp_path: Path, heading: str) -> None:
+    """The line told `height from Height above bed`, as if it had made averages of points at 0.2 of the depth."""
+    rows = "".join(f"8;{y};0.1;0.4\n" for y in (-1, 0, 1))
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=f"x;y;{heading};u\n{rows}")
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert "3 of velocity, taken for averages over the depth, as few places have several" in case.imported[0].taken

@@ -80,7 +80,8 @@ def station_tables(
     refuse_told_apart(named, _places(named), file)
     found = [_stations(taken, stem, words, kind, place) for kind in kinds]
     no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    return StationTables([table for table in found if table.rows], (*on_axis, *no_place, *no_value, *shares, *once))
+    left_out = (*on_axis, *no_place, *no_value, *shares, *once, *_at_one_height(taken))
+    return StationTables([table for table in found if table.rows], left_out)
 
 
 def _refuse_unknown(
@@ -176,6 +177,14 @@ def _in_verticals(taken: MeasuredRows) -> bool:
             heights.setdefault(place, set()).add(z)
     several = sum(len(some) > 1 for some in heights.values())
     return several > 0 and several >= VERTICALS * len(heights)
+
+
+def _at_one_height(taken: MeasuredRows) -> tuple[str, ...]:
+    """That heights of velocities are not used, where few places have several."""
+    role = vertical_role(taken)
+    if role is None or "u" not in taken.numbers or not np.isfinite(taken.numbers[role]).any():
+        return ()
+    return (f"taken for averages over the depth, as few places have several heights ({role} not used)",)
 
 
 def _places(taken: MeasuredRows) -> list[PlaceKey]:
