@@ -50,17 +50,22 @@ CHOSEN = """(page, document) => {
 }"""
 
 
+# A child as `extend` names it: its command ran off the page, which got a scroll bar at 1,200 pixels.
+CHILD = "toy+unlisted_inflow_x27_22_y2_04+flank_scour+panel_current"
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page with everything on it: a diagnosis, a ladder, words that look like markup."""
     folder = tmp_path_factory.mktemp("page")
     table = a_diagnosis().predictions.station
     found = a_diagnosis(predictions={"station": table.assign(section=table["section"].replace("D3", "</script><b>D3"))})
-    steps = [LadderStep(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", "toy-eddies")]
+    steps = [LadderStep(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", CHILD)]
     loop = LoopResults(
         ladder=Ladder((steps[0], replace(steps[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")
     )
     toy = a_toy(folder)
+    toy = replace(toy, case=toy.case.model_copy(update={"title": "A brook, with unlisted_inflow[x27.22,y2.04]"}))
     written(replace(toy, diagnosis=told_of(toy, found), loop=loop))
     return folder / "report.html"
 
