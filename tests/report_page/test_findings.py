@@ -43,6 +43,16 @@ def test_says_what_is_not_identified(d3a: tuple[Run, str]) -> None:
     assert sentence.startswith("nb and ks are identified by these 20 stations; φ is not.")
 
 
+def test_what_ends_at_a_bound_is_not_said_to_be_identified(toy: tuple[Run, str]) -> None:
+    """A drag at the lower bound of its prior was `identified by these stations` above a table that said otherwise."""
+    run, _ = toy
+    marginals = run.posterior.marginals
+    known, hit = dict.fromkeys(marginals.identified, True), marginals.bound_hit | {"phi": np.array([True, False])}
+    told = verdict_of(run.case, changed(run.posterior, identified=known, bound_hit=hit, effective_size=500.0))
+    sentence = re.sub("<[^>]*>", "", told)
+    assert " are identified by these 21 stations; φ is at a bound of the prior, which ends the range." in sentence
+
+
 def test_tells_powers_of_ten_only_over_decades(toy: tuple[Run, str]) -> None:
     posterior = toy[0].posterior
     manning, drag = (row.posterior for row in parameter_rows(toy[0])[:2])

@@ -41,10 +41,13 @@ def verdict_of(case: Case, posterior: Posterior) -> str:
         size, members = max(posterior.weighting.effective_size, 1.0), posterior.sample.members
         few = f"the weights are worth {size:.0f} of {members:,} members, too few to say what is identified"
         return f"A first look only: {few}. {_how_well(posterior)}"
-    known = [name for name in posterior.parameters if posterior.marginals.identified[name]]
-    unknown = [name for name in posterior.parameters if not posterior.marginals.identified[name]]
+    at_bound = [name for name in posterior.parameters if pressed_bounds(posterior, name)]
+    known = [name for name in posterior.parameters if posterior.marginals.identified[name] and name not in at_bound]
+    unknown = [name for name in posterior.parameters if name not in {*known, *at_bound}]
     by = f"by these {so_many(posterior.fit.used, 'station')}"
     sentence = f"{_in_a_list(case, known)} {_are(known)} identified {by}" if known else f"Nothing is identified {by}"
+    if at_bound:
+        sentence += f"; {_in_a_list(case, at_bound)} {_are(at_bound)} at a bound of the prior, which ends the range"
     if unknown:
         sentence += f"; {_in_a_list(case, unknown)} {_are(unknown)} not"
     return f"{sentence}. {_how_well(posterior)}"
