@@ -209,6 +209,13 @@ def test_an_instrument_that_may_be_it_instead_is_told_in_words() -> None:
     assert "or else a probe that is off in all experiments (4%) or one reading that is off (3%)" in sentence
 
 
+def test_what_may_be_it_instead_is_told_the_likeliest_first() -> None:
+    """Effects came before all else: `b (7%) or something in no list, as if water enters, ... (21%)`."""
+    found = step("a", "b", chances=(0.6, 0.07), others={"reading": 0.04, "bed": 0.21})
+    sentence = said(grounds(found), (a_suspect("a"), a_suspect("b")))[1]
+    assert "or else bed (21%) or b (7%) or one reading that is off (4%)" in sentence
+
+
 def test_a_place_that_is_likelier_comes_first_and_in_words() -> None:
     """Of two that may be it the likelier is told first; what is less likely is told as what it does, and where."""
     bed, inflow = a_location(term="bed", unit="m", x=12.0), a_location(term="inflow", unit="m3/s")

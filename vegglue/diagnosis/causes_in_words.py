@@ -151,11 +151,18 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     own = sum(step.chance[name] for name in alike)
     if same:
         words += f", which leaves the same trace in these data as {', '.join(same)}"
-    others = [_other_words(step, name) for name in step.others if name != first]
     if rest or own < STATED_BELOW:
         words += f", {'together ' if same else ''}with a chance of {_percent(own)} among all that was tried"
-    words += f", or else {' or '.join([*with_their_chances(step, rest), *others])}" if rest or others else ""
+    instead = _instead(step, rest, [name for name in step.others if name != first])
+    words += f", or else {' or '.join(instead)}" if instead else ""
     return f"{_likelier_words(step, first)}{words}" if first else words
+
+
+def _instead(step: Step, effects: Sequence[str], others: Sequence[str]) -> list[str]:
+    """What may be it instead, in words, the likeliest first; others: of other kinds."""
+    told = [(step.chance[name], _with_its_chance(step, name)) for name in effects]
+    told += [(step.others[name], _other_words(step, name)) for name in others]
+    return [words for _, words in sorted(told, key=lambda one: -one[0])]
 
 
 def _likelier_words(step: Step, name: str) -> str:
@@ -219,7 +226,11 @@ def _contender_words(one: Contender) -> str:
 
 def with_their_chances(step: Step, names: Sequence[str]) -> list[str]:
     """Names with their chances."""
-    return [f"{name} ({_percent(step.chance[name])})" for name in names]
+    return [_with_its_chance(step, name) for name in names]
+
+
+def _with_its_chance(step: Step, name: str) -> str:
+    return f"{name} ({_percent(step.chance[name])})"
 
 
 def model_error_in_words(used: ModelErrorUsed) -> str:
