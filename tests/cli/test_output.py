@@ -8,7 +8,7 @@ import pytest
 from rungs import a_rung
 
 from vegglue.cli.output import command_line
-from vegglue.cli.tables import show_ladder
+from vegglue.cli.tables import show_ladder, show_questions
 from vegglue.workflow.compare import Comparison
 
 
@@ -31,3 +31,10 @@ def test_differences_between_experiments_are_told_with_the_errors_they_are_under
     assert (
         "- brook-wind: differs between experiments: phi (p = 1e-05) These differences are under the errors as" in said
     )
+
+
+def test_that_no_measurement_is_proposed_claims_no_more_than_was_weighed(capsys: pytest.CaptureFixture[str]) -> None:
+    """`no rivals` stood below a verdict with `or else something in no list ... (8%)`, which is not asked about."""
+    show_questions("brook", [])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no two listed effects to be told apart, and what is in no list is weighed only where it is likelier" in said
