@@ -21,6 +21,7 @@ from vegglue.measurements.carried_discharge import CarriedDischarge, carried_dis
 from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
 from vegglue.measurements.observations import read_observations
 from vegglue.report_page.answer_words import why_not_to_rely
+from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 from vegglue.site.gridded_site import build_site
 
 # Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
@@ -133,9 +134,12 @@ def test_values_that_no_flow_can_have_are_said_instead(tmp_path: Path) -> None:
 DOUBT = "sections carry 1.5 times the stated discharge in experiment low"
 
 
-@pytest.mark.parametrize(("name", "value"), [("wind", 0.3), ("partial_depth", 2.5), ("discharge_error[low]", -2.5)])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("wind", 0.3), ("partial_depth", 2.5), ("discharge_error[low]", -2.5), ("discharge_error[mid]", 0.3)],
+)
 def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str, value: float) -> None:
-    """Of a scale of 0.5, the second and third are five times what is plausible."""
+    """Of a scale of 0.5, the second and third are five times what is plausible; the last acts elsewhere."""
     there = [a_suspect(name, amplitude={"value": value})]
     kind, sentence, _ = said(grounds(step(name), carried=(HIGHER,)), there)
     assert kind == "cannot-tell"
@@ -147,16 +151,36 @@ def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str
     assert said(grounds(step(name)), there)[0] == "identified"
 
 
-@pytest.mark.parametrize("name", ["discharge_error[low]", "partial_depth", "lateral_inflow", "floor_level_error"])
-def test_a_name_that_explains_it_stands_beside_the_doubt(name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["discharge_error[low]", "partial_depth", "lateral_inflow", "probe_gain[A]", "device_gain[adv]"]
+)
+def test_a_name_that_explains_it_is_told_as_such(name: str) -> None:
     named = grounds(step(name), carried=(HIGHER,))
     kind, sentence, remarks = said(named, [a_suspect(name)])
     assert kind == "identified"
-    assert sentence.endswith(f"But {DOUBT}, and what is said of the model may only make up for that.")
+    assert sentence.endswith(f"What was found may be why {DOUBT}.")
     assert remarks.startswith(
         "The velocities of 1 section in experiment low carry 1.5 times the stated discharge (A, x"
     )
-    assert "But sections" not in said(grounds(step(name)), [a_suspect(name)])[1]
+    assert "sections" not in said(grounds(step(name)), [a_suspect(name)])[1]
+
+
+def test_every_section_has_to_be_explained() -> None:
+    """An error of the discharge of one experiment does not let more water through another."""
+    both, name = (HIGHER, replace(HIGHER, experiment="mid")), "discharge_error[mid]"
+    kind, sentence, _ = said(grounds(step(name), carried=both), [a_suspect(name)])
+    assert kind == "cannot-tell"
+    assert f"{DOUBT}: check" in sentence
+
+
+def test_water_of_an_effect_in_the_model_is_no_doubt(tmp_path: Path) -> None:
+    """It is let in above the sections; below x = 40 m only those further down carry it."""
+    case, table = read(imported("open-b", tmp_path))
+    for x, experiments in ((0.0, set()), (40.0, {"D0"}), (60.0, {"D0", "D3", "D5", "D7"})):
+        spring = {"unlisted_inflow": {"values": {"discharge": 0.5, "x": x, "y": 0.0}}}
+        told = Case.model_validate({**case.model_dump(exclude_unset=True), "effects": spring, "source": case.source})
+        off = carried_otherwise(told, build_site(told), faster(table, 1.5))
+        assert {one.section for one in off} == experiments
 
 
 @pytest.mark.parametrize("term", ["inflow", "bed"])
@@ -173,11 +197,13 @@ def test_effects_of_discharges_are_listed() -> None:
 
 
 def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    toy = replace(a_toy(tmp_path), diagnosis=a_diagnosis())
+    doubting = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}{DOUBT}: check it."})
+    explained, toy = (replace(a_toy(tmp_path), diagnosis=one) for one in (a_diagnosis(), doubting))
     before = why_not_to_rely(toy)
     monkeypatch.setattr("vegglue.report_page.answer_words.carried_otherwise", lambda *_: [HIGHER])
     assert carried_in_short([HIGHER]) in why_not_to_rely(toy)
     assert carried_in_short([HIGHER]) not in before
+    assert carried_in_short([HIGHER]) not in why_not_to_rely(explained)  # what was found may be why
 
 
 def test_every_section_stands_in_the_table_of_a_check(capsys: pytest.CaptureFixture[str]) -> None:

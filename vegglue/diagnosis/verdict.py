@@ -23,6 +23,7 @@ from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
+from vegglue.measurements.carried_discharge import CHANGE_DISCHARGE, CarriedDischarge
 from vegglue.measurements.carried_in_words import CHECK, carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
@@ -47,10 +48,10 @@ FAR_OFF = 4.0
 # or goes, readings that are off as a whole, a bed or a level that is not there. Larger than this over what is plausible
 # they only make up for it. Chosen, as for a parameter.
 OF_DISCHARGES = (
-    "discharge_error", "lateral_inflow", "outlet_level_error", "gauge_datum", "device_gain", "probe_gain",
-    "zero_offset", "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
+    *CHANGE_DISCHARGE, "outlet_level_error", "gauge_datum", "device_gain", "probe_gain", "zero_offset",
+    "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
 )  # fmt: skip
-TERMS_OF_DISCHARGES = ("inflow", "bed")
+TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offset")
 MOST_OF_DISCHARGES = FAR_OFF
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
@@ -65,7 +66,7 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     statement = replace(statement, tells_errors=bool(left_over) and grounds.errors.clearly_larger)
     return Verdict(
         kind=statement.kind,
-        sentence=" ".join(one for one in (statement.sentence, left_over, _carried(grounds, statement)) if one),
+        sentence=" ".join(one for one in (statement.sentence, left_over, _explained(grounds, statement)) if one),
         remarks=tuple(remarks_of(grounds, suspects, statement)),
         location=places[0] if places else None,
         not_excluded=grounds.not_excluded,
@@ -76,22 +77,30 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
     )
 
 
-def _carried(grounds: Grounds, statement: Statement) -> str:
-    """That sections carry another discharge than stated, behind what is said of the model; '' where none does, or it
-    was said before.
-    """
-    off = carried_in_short(grounds.carried)
-    untold = off and off not in statement.sentence
-    return f"But {off}, and what is said of the model may only make up for that." if untold else ""
+def _explained(grounds: Grounds, statement: Statement) -> str:
+    """That what was named may be why sections carry another discharge than stated; '' where none does."""
+    untold = grounds.carried and not statement.sentence.startswith(BEFORE_ALL_ELSE)
+    return f"What was found may be why {carried_in_short(grounds.carried)}." if untold else ""
 
 
-def _explains_discharges(grounds: Grounds, suspects: Sequence[Suspect]) -> bool:
-    """Whether something accepted may be why sections carry another discharge than stated."""
+def _unexplained(grounds: Grounds, suspects: Sequence[Suspect]) -> list[CarriedDischarge]:
+    """Sections that carry another discharge than stated, for no reason among what was accepted."""
     found = grounds.findings
+    if any(place.term in TERMS_OF_DISCHARGES for place in found.places):
+        return []
     accepted = [one for one in suspects if one.name in found.effects]
-    believed = [one for one in accepted if one.amplitude.relative_size <= MOST_OF_DISCHARGES]
-    at_place = any(place.term in TERMS_OF_DISCHARGES for place in found.places)
-    return at_place or any(one.name.partition("[")[0] in OF_DISCHARGES for one in believed)
+    believed = [one.name for one in accepted if one.amplitude.relative_size <= MOST_OF_DISCHARGES]
+    return [one for one in grounds.carried if not any(_may_be_why(name, one) for name in believed)]
+
+
+def _may_be_why(name: str, section: CarriedDischarge) -> bool:
+    """Whether a candidate changes what a section carries: everywhere, in its experiment, or there; of a device nobody
+    says here which sections it measured.
+    """
+    effect, _, where = name.partition("[")
+    places = set(filter(None, where.removesuffix("]").split(",")))
+    acts = not places or effect in OF_DEVICES or bool(places & {section.experiment, section.section})
+    return effect in OF_DISCHARGES and acts
 
 
 def _left_over(grounds: Grounds, statement: Statement) -> str:
@@ -108,9 +117,9 @@ def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     if found.absurd:
         return Statement("cannot-tell", BEFORE_ALL_ELSE + found.absurd[0])
     named = causes_in_words(found, suspects)
-    if grounds.carried and not _explains_discharges(grounds, suspects):
+    if off := _unexplained(grounds, suspects):
         made_up = f" What may make up for it: {named}." if named else ""
-        return Statement("cannot-tell", f"{BEFORE_ALL_ELSE}{carried_in_short(grounds.carried)}: {CHECK}.{made_up}")
+        return Statement("cannot-tell", f"{BEFORE_ALL_ELSE}{carried_in_short(off)}: {CHECK}.{made_up}")
     doubt = _doubt(grounds, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)
     if grounds.laws is not None and (nothing or (not doubt and law_goes_first(grounds.laws, found))):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from vegglue.case.case_effects import effect_of
 from vegglue.case.parameter_space import Bounds, middle_value, prior_range
 from vegglue.case.schema import Case, Experiment
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
@@ -29,6 +30,8 @@ OF_BANKS = 0.5
 # Standard error that all verticals of a section share [-]: of the probe, its direction, the bed and the levels. Chosen:
 # hydrometry takes 2 to 3 %.
 SHARED_ERROR = 0.03
+# Effects of the library with which another discharge passes a section than stated.
+CHANGE_DISCHARGE = ("discharge_error", "lateral_inflow", "unlisted_inflow")
 # Standard errors beyond which a section carries another discharge than stated: sections are many, and a stated error
 # may be half of the true one. Chosen, with the open cases and drawn sites at hand: where no more water really passed,
 # their 244 sections lie within 1.2.
@@ -114,6 +117,17 @@ def _stated(case: Case, experiment: Experiment, x: float) -> Bounds | None:
         return None
     parts = [prior_range(case, value) for value in given]
     return sum(low for low, _ in parts), sum(high for _, high in parts)
+
+
+def changing_discharge(case: Case, experiment: str, x: float) -> str:
+    """The key of an effect of the case by which another discharge than stated passes x [m]; '' for none."""
+    for name, entry in case.effects.items():
+        place = entry.values.get("x")
+        is_below = not isinstance(place, str) and place is not None and place > x
+        acts = entry.experiments is None or experiment in entry.experiments
+        if effect_of(case, name).name in CHANGE_DISCHARGE and acts and not is_below:
+            return name
+    return ""
 
 
 @dataclass(frozen=True)

@@ -7,31 +7,24 @@ import pandas as pd
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.case.schema import Case
 from vegglue.in_short import in_digits, listed, so_many
-from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
+from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges, changing_discharge
 from vegglue.measurements.sections import section_in_words
 from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.site.gridded_site import Site
 
-# The effect of the library that lets another discharge through than stated.
-ERROR_OF_DISCHARGE = "discharge_error"
 CHECK = "check the discharge, the velocities and their unit, the bed and the levels"
 
 
 def carried_otherwise(case: Case, site: Site, station: pd.DataFrame) -> list[CarriedDischarge]:
-    """Sections that clearly carry another discharge than stated; none beside values that no flow can have, and none of
-    experiments whose discharge is calibrated by an effect.
+    """Sections that clearly carry another discharge than stated; none beside values that no flow can have, and none
+    whose discharge an effect of the case changes.
     """
     off = [
         one
         for one in carried_discharges(case, site, station)
-        if one.clearly_off and not _calibrated(case, one.experiment)
+        if one.clearly_off and not changing_discharge(case, one.experiment, one.x)
     ]
     return [] if off and absurd_values(case, site, station) else off
-
-
-def _calibrated(case: Case, experiment: str) -> bool:
-    of_discharge = [entry for name, entry in case.effects.items() if (entry.effect or name) == ERROR_OF_DISCHARGE]
-    return any(entry.experiments is None or experiment in entry.experiments for entry in of_discharge)
 
 
 def carried_in_words(off: Sequence[CarriedDischarge]) -> list[str]:

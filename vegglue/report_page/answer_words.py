@@ -148,7 +148,7 @@ def why_not_to_rely(run: Run) -> str:
     told = run.behind is None and not run.posterior.claimed  # by the headline
     found = run.diagnosis or run.behind
     of_discharges = [*_of_discharges(run)]
-    verdict = [*_of_verdict(found), *(of_discharges if found else [])]
+    verdict = [*_of_verdict(found), *(of_discharges if found and found.verdict.doubts_the_data else [])]
     weights = [] if told else _of_posterior(run.posterior)
     parameters = [*([] if found else of_discharges), *weights, *_of_ensemble(run.ensemble)]
     if verdict and parameters:

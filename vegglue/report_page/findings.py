@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.figures.typography import NARROW, Notation, fixed, html_notation, plus_minus, short
 from vegglue.in_short import so_many
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.measurements.carried_discharge import changing_discharge
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
@@ -51,8 +51,6 @@ from vegglue.solver.status import STATUS_WORDS, members_with
 FAILED_TOLERATED = 0.01
 # Standard errors [-] between measured and prescribed discharge, beyond which chance explains it 1 time in 20.
 DISCHARGE_DOUBTED = 2.0
-# Effects with which a section carries another discharge than stated.
-CHANGE_DISCHARGE = ("discharge_error", "lateral_inflow", "unlisted_inflow")
 
 
 @dataclass(frozen=True)
@@ -217,8 +215,8 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
         if prescribed is None:
             yield Finding("discharge", f"{text}; the discharge is itself a parameter.")
             continue
-        if changed := _changing_discharge(case, experiment, x):
-            more = f"; the model was given {short(prescribed)}{NARROW}m³/s, and {changed} changes that"
+        if changed := changing_discharge(case, experiment, x):
+            more = f"; the model was given {short(prescribed)}{NARROW}m³/s, and {html.escape(changed)} changes that"
             yield Finding("discharge", f"{text}{more}.")
             continue
         off = (measured.value - prescribed) / measured.standard_error
@@ -228,17 +226,6 @@ def _discharge(case: Case, observations: Observations) -> Iterator[Finding]:
             f"{'less' if off > 0 else 'more'}.",
             doubt=abs(off) > DISCHARGE_DOUBTED,
         )
-
-
-def _changing_discharge(case: Case, experiment: str, x: float) -> str:
-    """An effect in the model by which another discharge than stated passes x [m]; '' for none."""
-    for name, entry in case.effects.items():
-        place = entry.values.get("x")
-        is_below = not isinstance(place, str) and place is not None and place > x
-        acts = entry.experiments is None or experiment in entry.experiments
-        if effect_of(case, name).name in CHANGE_DISCHARGE and acts and not is_below:
-            return html.escape(name)
-    return ""
 
 
 def _weights(posterior: Posterior, notation: Notation) -> Finding:
