@@ -181,6 +181,17 @@ def test_an_error_of_shape_does_not_look_like_another_size(
     assert spread < 0.1 * abs(size), "of the size"
 
 
+@pytest.mark.parametrize(("name", "amplitude"), [("unlisted_object", 0.2), ("unlisted_inflow", 0.05)])
+def test_an_error_of_shape_is_no_larger_than_what_has_that_shape(
+    flowing: tuple[Model, Point], name: str, amplitude: float
+) -> None:
+    """Bumps larger than the spot held many times its water: no data were left that anything could be told from."""
+    model, point = flowing
+    there, size, shape = with_a_place(model, point, name, amplitude)
+    whole = np.linalg.norm(there.slope[:, -1] * size)
+    assert 0.0 < np.linalg.norm(shape) < whole
+
+
 def test_stations_that_are_not_in_use_change_no_error_of_shape(flowing: tuple[Model, Point]) -> None:
     model, point = flowing
     used = np.arange(len(model.station)) % 3 > 0

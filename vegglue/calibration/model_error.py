@@ -7,13 +7,19 @@ S: see site_error.py.
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
 deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else
-in nature: its term may differ by SHAPE_ERROR of its size in every bump around it. What of that would look like another
-size of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
+in nature: of all that it does, its force, water or volume A, SHAPE_ERROR may act in the n bumps around it instead,
+
+    S_k = SHAPE_ERROR A / (A_k sqrt(n)) bump_k,   A_k = sum of bump_k over the cells, times their area,
+
+so that in all of them together it has a standard deviation of SHAPE_ERROR A. What of that would look like another size
+of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
 Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
 checked against it); the fields of bumps are a definition of this project.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +45,9 @@ TERM_OF: dict[str, Term] = {
 # Radius of a bump over the half width of the floor [-]: friction differs from one stone, tuft or stem count to the
 # next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
-# What a spot leaves of an object of another shape, over the size of the spot [-], and how far around it, over its size.
-# Chosen, not measured, after open-f: beside the spot two more places were accepted there without it, and none with it.
+# What a spot leaves of an object of another shape, over all that the spot does [-], and how far around it, over its
+# size. Chosen, not measured, after open-f: beside the spot two more places were accepted there without this error, and
+# none with it.
 SHAPE_ERROR, AROUND = 0.5, 2.0
 # Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
 BUMP_CELLS = 1.5
@@ -144,22 +151,36 @@ def unlisted_in(case: Case) -> list[UnlistedObject]:
 
 
 def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one: UnlistedObject) -> Array:
-    """Bumps around a spot, each of SHAPE_ERROR of its size, but for what looks like another size."""
+    """S_k of the bumps around a spot, but for what looks like another size."""
     theta = theta_at(model.case, point.z[None])
     place = {name: float(value_of(value, theta, 1)[0]) for name, value in one.place.items()}
     half, grid = FRICTION_RADIUS * half_width(model.site), model.site.grid
-    over = bumps(grid, half, half)
-    away = ((over.x[:, None] - place["x"]) / (place["length"] + over.length)) ** 2
-    away = away + ((over.y[None] - place["y"]) / (place["width"] + over.width)) ** 2
+    over, spot = bumps(grid, half, half), _spot(grid, place)
+    near = _are_around(over, place)
     size = float(value_of(one.amplitude, theta, 1)[0])
-    if one.term == "inflow":
-        size /= np.pi * place["length"] * place["width"]
-    near = responses_to_bumps(responses, one.term, over)[:, away < AROUND**2]
-    along = np.exp(-(((grid.x - place["x"]) / place["length"]) ** 2))
-    across = np.exp(-(((grid.y - place["y"]) / place["width"]) ** 2))
-    own = np.einsum("i,nij,j->n", along, responses.of[one.term], across)
+    whole = size if one.term == "inflow" else size * float(_areas(grid, spot)[0, 0])
+    in_each = SHAPE_ERROR * whole / np.sqrt(max(int(near.sum()), 1))
+    own = responses_to_bumps(responses, one.term, spot)[:, 0, 0]
     acts = np.ones(len(own)) if one.experiments is None else model.station["experiment"].isin(one.experiments)
-    return SHAPE_ERROR * size * _without(own, near, _weights_of(model) * acts) * np.asarray(acts)[:, None]
+    columns = _without(own, responses_to_bumps(responses, one.term, over)[:, near], _weights_of(model) * acts)
+    return np.asarray(in_each / _areas(grid, over)[near] * columns * np.asarray(acts)[:, None])
+
+
+def _spot(grid: Grid, place: Mapping[str, float]) -> Bumps:
+    """The one bump of a place."""
+    return bumps_at(grid, np.array([place["x"]]), np.array([place["y"]]), place["length"], place["width"])
+
+
+def _are_around(over: Bumps, place: Mapping[str, float]) -> Any:
+    """Which bumps stand around a place (k, j)."""
+    along = ((over.x - place["x"]) / (place["length"] + over.length)) ** 2
+    across = ((over.y - place["y"]) / (place["width"] + over.width)) ** 2
+    return along[:, None] + across[None] < AROUND**2
+
+
+def _areas(grid: Grid, over: Bumps) -> Array:
+    """A_k of a size of one, (k, j) [m2]."""
+    return grid.dx * grid.dy * np.outer(over.along.sum(axis=1), over.across.sum(axis=1))
 
 
 def _weights_of(model: Model) -> Array:
