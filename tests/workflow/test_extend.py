@@ -28,6 +28,7 @@ from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
 from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.screening.places import EFFECT_AT_PLACE
+from vegglue.storage.result_files import write_diagnosis
 from vegglue.workflow.extend import extend, in_words, write_child
 
 ROOT = Path(__file__).parents[2]
@@ -148,6 +149,19 @@ def test_a_place_that_was_found_is_added_as_it_is_spread() -> None:
     assert values[candidate.parameter] == pytest.approx(1.8 / shapes["length"])  # 1.0 in `found_in`
     words = in_words(case, found, Choice(((), (candidate.name,)), {}))
     assert "half length 4.6 m" in words
+
+
+def test_a_place_that_is_added_by_name_is_as_the_diagnosis_found_it(tmp_path: Path) -> None:
+    """It had the default size under the name of the one that was found; what is given by hand holds."""
+    case, name = load_case(ROOT / "configs" / "twin.yaml"), "unlisted_bed[x47.29,y-0.29]"
+    found, key = replace(a_diagnosis(), places=(a_place("bed"),)), "unlisted_bed_x47_29_y_0_29"
+    (tmp_path / case.name).mkdir()
+    write_diagnosis(tmp_path / case.name / "diagnosis.h5", found, "", case_hash(case))
+    known = extend(case, name, to=tmp_path / "known.yaml", runs=tmp_path).effects[key].values
+    given = extend(case, name, shapes={"length": 0.7}, to=tmp_path / "given.yaml", runs=tmp_path).effects[key].values
+    unknown = extend(case, name, to=tmp_path / "unknown.yaml", runs=tmp_path / "none").effects[key].values
+    assert [(one["length"], one["width"]) for one in (known, given)] == [(1.8, 0.45), (0.7, 0.45)]
+    assert unknown["length"] == 0.5
 
 
 @pytest.mark.parametrize("turn", [1, -1])

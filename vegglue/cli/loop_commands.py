@@ -140,7 +140,7 @@ def extend_command(
             extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
         tell(case, runs, extension, as_object)
         return
-    child = vegglue.extend(case, add or [], shapes=shapes, to=to, force=force)
+    child = vegglue.extend(case, add or [], shapes=shapes, to=to, force=force, runs=runs)
     target = shown_path(child.source)
     if as_object:
         print_object({"config": target, "case": child.name, "added": add})

@@ -28,6 +28,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.screening.candidates import Candidate, start_amplitude
 from vegglue.storage.kept_words import write_rung
+from vegglue.storage.result_files import diagnosis_that_fits
 from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
@@ -57,8 +58,11 @@ def extend(
     shapes: Mapping[str, float] | None = None,
     to: Path | str | None = None,
     force: bool = False,
+    runs: Path | str = "runs",
 ) -> Case:
     """Write a config that extends the case by effects, each with a prior for its amplitude, and read it.
+
+    A place that the diagnosis of the case found in the folder of runs is spread there as `extend_stepwise` spreads it.
 
     add: one name or several, such as `streamlining` or `discharge_error[high]`; shapes: values of their shapes by name;
     to: the config to write, beside the parent if not given; force: replace a file there that vegglue did not write,
@@ -67,7 +71,7 @@ def extend(
     names = [add] if isinstance(add, str) else list(dict.fromkeys(add))
     if not names:
         raise InputError("--add: expected the name of an effect or more, got none; `vegglue effects` lists them.")
-    added = named_candidates(case, names, shapes or {})
+    added = named_candidates(case, names, shapes or {}, _places_found(case, runs))
     target = child_path(case.source, [one for one, _ in added]) if to is None else Path(to)
     return write_child(case, target, added, force)
 
@@ -158,15 +162,27 @@ def _unclear_in_words(name: str, fall: str) -> str:
     )
 
 
-def named_candidates(case: Case, names: Sequence[str], shapes: Mapping[str, float]) -> list[Addition]:
-    """Candidates by name, each with those of the shapes that it has; InputError for a shape that none has."""
+def _places_found(case: Case, runs: Path | str) -> dict[str, Addition]:
+    """What the diagnosis of the case as it is found at places, by name, none without such a diagnosis."""
+    found = diagnosis_that_fits(folder_of(runs, case) / "diagnosis.h5", case_hash(case))
+    places = [] if found is None else places_tried(found)
+    at_places = [(candidate_at(case, place), place.shapes) for place in places]
+    return {candidate.name: (candidate, shapes) for candidate, shapes in at_places}
+
+
+def named_candidates(
+    case: Case, names: Sequence[str], shapes: Mapping[str, float], known: Mapping[str, Addition]
+) -> list[Addition]:
+    """Candidates by name, each with those of the shapes that it has, and with those of what is known under its name;
+    InputError for a shape that none has.
+    """
     station = read_observations(case).table
     added: list[Addition] = []
     for name in names:
-        candidate = candidate_named(case, station, name)
+        candidate, of_known = known[name] if name in known else (candidate_named(case, station, name), {})
         own = {shape.name for shape in candidate.effect.shapes}
-        added.append((candidate, {key: value for key, value in shapes.items() if key in own}))
-    stray = set(shapes) - {key for _, given in added for key in given}
+        added.append((candidate, {**of_known, **{key: value for key, value in shapes.items() if key in own}}))
+    stray = set(shapes) - {shape.name for candidate, _ in added for shape in candidate.effect.shapes}
     if stray:
         raise InputError(f"--shape: `{min(stray)}` is no shape of {', '.join(names)}; see `vegglue effects NAME`.")
     return added
