@@ -31,6 +31,11 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
+def experiments_in_words(names: Sequence[str]) -> str:
+    """`experiment low`, `experiments low, mid and high`."""
+    return f"experiment{'s' if len(names) > 1 else ''} {listed(names)}"
+
+
 def in_digits(value: float, digits: int = 3) -> str:
     """A number to so many significant digits, for people: `0.00965`, `1500`, `1.5e+06`; every sentence and table of the
     terminal that may hold a large one asks for it here, the page by `short` of figures/typography.

@@ -125,6 +125,21 @@ def test_an_oddity_is_said(tmp_path, old, new, expected):
         assert [sentence for sentence in said if re.search(expected, sentence)], said
 
 
+@pytest.mark.parametrize(
+    ("high", "depths"),
+    [
+        ("1.1", "reaches above the water of experiments low and high, about 1 to 1.1 m"),
+        ("1.5", "experiment low, about 1 m"),
+    ],
+)
+def test_a_canopy_above_the_water_is_said_once(tmp_path, high, depths):
+    """It was said again of each experiment."""
+    text = SOUND.replace("level: 1.0}", f"level: 1.0}}\n  high: {{discharge: 2.0, level: {high}}}")
+    said = [one for one in odd(tmp_path, text.replace("height: 0.8", "height: 1.3")) if "The canopy of reed" in one]
+    assert len(said) == 1
+    assert depths in said[0]
+
+
 def test_a_prior_in_another_unit_than_its_effect_is_said(tmp_path):
     prior = "  d: {distribution: uniform, low: -0.1, high: 0.1, unit: cm/s}\n"
     text = SOUND.replace("observations:", prior + "effects:\n  zero_offset: {values: {offset: d}}\nobservations:")

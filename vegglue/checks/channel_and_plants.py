@@ -1,6 +1,6 @@
 """Do patches, stands and friction classes hold cells, does the water cover the plants, and does the bank law hold?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds, valu
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, Experiment
 from vegglue.checks.boundaries import dry_outlets
-from vegglue.in_short import in_digits
+from vegglue.in_short import experiments_in_words, in_digits
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment
@@ -135,9 +135,11 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[str]:
 
 
 def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[str]:
-    """Canopies above the water, dry stands, and heights [m] that differ from those measured."""
-    flowing = [name for name in case.experiments if name not in dry_outlets(case, site)]
-    for name in flowing:
+    """Canopies above the water, of all experiments in one sentence; dry stands, and heights [m] that differ from those
+    measured.
+    """
+    emergent: dict[tuple[str, Bounds], dict[str, float]] = {}
+    for name in [name for name in case.experiments if name not in dry_outlets(case, site)]:
         experiment = case.experiments[name]
         depth = expected_depth(case, in_experiment(site, name), experiment)
         for stand in sorted({case.plants.patches[index].stand for index in patches_present(case, name)}):
@@ -145,16 +147,25 @@ def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> I
             if not cells.any():
                 continue
             height = prior_range(case, _canopy_height(case, experiment, stand))
-            canopy, deepest = f"The canopy of {stand}, {shown_bounds(height)} m,", float(depth[cells].max())
+            deepest = float(depth[cells].max())
             if deepest <= 0:
                 yield f"Stand {stand} stands dry in experiment {name}."
             elif height[1] > deepest:
-                reaches = "reaches" if height[0] >= deepest else "may reach"
-                yield (
-                    f"{canopy} {reaches} above the water of experiment {name}, about {deepest:.2g} m deep: "
-                    f"{DRAG_OF_EMERGENT[case.numerics.emergent]}."
-                )
+                emergent.setdefault((stand, height), {})[name] = deepest
             yield from _measured_canopy(observations, name, stand, height)
+    yield from (_emergent_in_words(case, *one, deepest) for one, deepest in emergent.items())
+
+
+def _emergent_in_words(case: Case, stand: str, height: Bounds, deepest: Mapping[str, float]) -> str:
+    """deepest: water of a stand [m], by the name of each experiment in which its canopy reaches above it."""
+    shallow, deep = (f"{end(deepest.values()):.2g}" for end in (min, max))
+    depths = shallow if shallow == deep else f"{shallow} to {deep}"
+    reaches = "reaches" if height[0] >= max(deepest.values()) else "may reach"
+    return (
+        f"The canopy of {stand}, {shown_bounds(height)} m, {reaches} above the water of "
+        f"{experiments_in_words(list(deepest))}, about {depths} m deep: "
+        f"{DRAG_OF_EMERGENT[case.numerics.emergent]}."
+    )
 
 
 def _canopy_height(case: Case, experiment: Experiment, stand: str) -> Value:

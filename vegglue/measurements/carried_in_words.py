@@ -6,7 +6,7 @@ import pandas as pd
 
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.case.schema import Case
-from vegglue.in_short import in_digits, listed, so_many
+from vegglue.in_short import experiments_in_words, in_digits, listed, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges, changing_discharge
 from vegglue.measurements.sections import section_in_words
 from vegglue.measurements.suspicious_values import absurd_values
@@ -50,8 +50,7 @@ def _times(group: Sequence[CarriedDischarge]) -> str:
 
 
 def _experiments(group: Sequence[CarriedDischarge]) -> str:
-    names = [*dict.fromkeys(one.experiment for one in group)]
-    return f"experiment{'s' if len(names) > 1 else ''} {listed(names)}"
+    return experiments_in_words([*dict.fromkeys(one.experiment for one in group)])
 
 
 def _sentence(group: Sequence[CarriedDischarge]) -> str:
