@@ -7,6 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Experiment
+from vegglue.checks.directions import misdirected
 from vegglue.in_short import in_digits
 from vegglue.measurements.carried_in_words import carried_in_words, carried_otherwise
 from vegglue.measurements.observations import Observations
@@ -94,5 +95,8 @@ def _froude(case: Case, experiment: Experiment, depth: Array, width: float) -> f
 
 
 def remarks_on_discharges(case: Case, site: Site, observations: Observations) -> Iterator[str]:
-    """Sections whose velocities clearly carry another discharge than stated; of each experiment in one sentence."""
-    yield from carried_in_words(carried_otherwise(case, site, observations.table))
+    """Sections whose velocities clearly carry another discharge than stated, in one sentence; none of an experiment
+    whose velocities or levels run the wrong way, as that is why.
+    """
+    off, told = carried_otherwise(case, site, observations.table), misdirected(case, observations)
+    yield from carried_in_words([one for one in off if one.experiment not in told])

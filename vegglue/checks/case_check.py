@@ -3,6 +3,8 @@
 Each remark comes from one function of the file of its subject; a new one is added to the list below.
 """
 
+from dataclasses import replace
+
 from vegglue.case.schema import Case
 from vegglue.checks.boundaries import remarks_on_boundaries, remarks_on_discharges, remarks_on_dry_outlets
 from vegglue.checks.channel_and_plants import (
@@ -14,7 +16,7 @@ from vegglue.checks.channel_and_plants import (
     remarks_on_rising_floor,
     remarks_on_unnamed_banks,
 )
-from vegglue.checks.directions import remarks_on_directions
+from vegglue.checks.directions import remarks_on_directions, rising_levels
 from vegglue.checks.ensemble_and_priors import (
     remarks_on_ensemble,
     remarks_on_idle_parameters,
@@ -34,6 +36,7 @@ from vegglue.checks.steep_flow import remarks_on_steep_flow
 from vegglue.checks.units_of_places import remarks_on_units_of_places
 from vegglue.checks.verticals import remarks_on_exchanged_heights, remarks_on_heights, remarks_on_lost_points
 from vegglue.measurements.observations import Observations
+from vegglue.measurements.suspicious_values import with_absurd_levels
 from vegglue.site.gridded_site import Site
 
 
@@ -54,13 +57,27 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_units_of_places(case, observations),
         *remarks_on_dry_velocities(case, site, observations),
         *remarks_on_exchanged_heights(case, observations),
-        *remarks_on_directions(case, observations),
+        *remarks_on_directions(case, _with_possible_levels(case, site, observations)),
         *remarks_on_discharges(case, site, observations),
     ]
 
 
+def _with_possible_levels(case: Case, site: Site, observations: Observations) -> Observations:
+    """Without levels that are told as absurd: that water rises from such a gauge to the next follows from it."""
+    table = observations.table
+    absurd = with_absurd_levels(case, site, table).to_numpy(bool)
+    return replace(observations, table=table.assign(used=table["used"].astype(bool) & ~absurd))
+
+
+def _doubted_levels(case: Case, observations: Observations, possible: Observations) -> set[str]:
+    """Experiments with an absurd level, or whose levels rise downstream. possible: without the former."""
+    absurd = observations.table["used"].astype(bool) & ~possible.table["used"].astype(bool)
+    return {*observations.table.loc[absurd, "experiment"].astype(str), *rising_levels(case, possible)}
+
+
 def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
     """What a user should look at, one sentence each, none when nothing is odd."""
+    possible = _with_possible_levels(case, site, observations)
     remarks = (
         remarks_on_absurd_values(case, site, observations),
         remarks_on_exchanged_axes(case, observations),
@@ -70,8 +87,8 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_shared_places(observations),
         remarks_on_exchanged_heights(case, observations),
         remarks_on_heights(observations),
-        remarks_on_lost_points(observations),
-        remarks_on_directions(case, observations),
+        remarks_on_directions(case, possible),
+        remarks_on_lost_points(observations, _doubted_levels(case, observations, possible)),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
         remarks_on_rising_floor(case),

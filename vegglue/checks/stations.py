@@ -8,6 +8,7 @@ import pandas as pd
 
 from vegglue.case.schema import Case
 from vegglue.checks.boundaries import dry_outlets
+from vegglue.checks.directions import exchanged_components
 from vegglue.checks.units_of_places import fitting_unit
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations
@@ -119,8 +120,12 @@ def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[s
 
 
 def remarks_on_absurd_values(case: Case, site: Site, observations: Observations) -> Iterator[str]:
-    """Marks for missing values, wrong units, another datum, and standard errors without sense."""
-    yield from absurd_values(case, site, observations.table)
+    """Marks for missing values, wrong units, another datum, and standard errors without sense; of no velocities whose
+    components are exchanged, as those along are too slow for that reason.
+    """
+    table, exchanged = observations.table, exchanged_components(case, observations)
+    told = velocity_rows(table) & table["experiment"].isin(exchanged).to_numpy(bool)
+    yield from absurd_values(case, site, table.assign(used=table["used"].astype(bool) & ~told))
 
 
 def station_in_words(row: Mapping[Hashable, Any]) -> str:

@@ -1,6 +1,6 @@
 """Do the points of verticals lie in the water, and do their velocities grow from the bed to the surface?"""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +8,13 @@ import pandas as pd
 
 from vegglue.case.schema import Case
 from vegglue.errors import shown_path
-from vegglue.in_short import so_many
+from vegglue.in_short import experiments_in_words, listed, so_many
 from vegglue.measurements.adv_section import ABOVE_SURFACE, BELOW_BED, upward_column
 from vegglue.measurements.observations import Observations
 
 # Verticals that make a rule, and the share of them that run the other way round [-]. A single one may lie in a wake.
 FEWEST, MOST_OF_ALL = 3, 0.8
+CHECK_HEIGHTS = "check unit and sign of heights, the bed and the levels"
 
 
 def remarks_on_heights(observations: Observations) -> Iterator[str]:
@@ -71,18 +72,25 @@ def _as_if_exchanged(points: pd.DataFrame) -> Iterator[tuple[float, float, bool]
             yield x, y, bool(upward[-1, 1] > 0.0 and (share[:, 1] < share[:, 0]).all())
 
 
-def remarks_on_lost_points(observations: Observations) -> Iterator[str]:
-    """Points outside the water in verticals that others keep in use: nobody would miss them."""
+def remarks_on_lost_points(observations: Observations, doubted: Collection[str] = ()) -> Iterator[str]:
+    """Points outside the water in verticals that others keep in use: nobody would miss them. One sentence for those
+    above the surface, one for those below the bed.
+
+    doubted: experiments of whose levels something is said already.
+    """
     points = observations.points
     if points.empty:
         return
     vertical = ["experiment", "section", "x", "y"]
     kept = points.groupby(vertical)["used"].transform("any").astype(bool)
     lost = points[kept & points["reason"].isin((BELOW_BED, ABOVE_SURFACE))]
-    for (experiment, section, reason), some in lost.groupby(["experiment", "section", "reason"], sort=False):
+    for reason, some in lost.groupby("reason", sort=False):
         first = some.iloc[0]
+        experiments = [str(name) for name in some["experiment"].unique()]
+        follows = any(name in doubted for name in experiments)
+        advice = "correct the levels told of above first" if follows else CHECK_HEIGHTS
         yield (
-            f"{so_many(len(some), 'point')} of {section} in experiment {experiment} not used: {reason}, the first at "
-            f"x = {first['x']:g}, y = {first['y']:g} m, {first['height']:.2g} m above the bed in {first['depth']:.2g} "
-            "m of water; check unit and sign of heights, the bed and the levels."
+            f"{so_many(len(some), 'point')} of {listed([str(one) for one in some['section'].unique()])} in "
+            f"{experiments_in_words(experiments)} not used: {reason}, the first at x = {first['x']:g}, "
+            f"y = {first['y']:g} m, {first['height']:.2g} m above the bed in {first['depth']:.2g} m of water; {advice}."
         )

@@ -62,7 +62,20 @@ def absurd_values(case: Case, site: Site, station: pd.DataFrame) -> list[str]:
     `plausible_flow`. station: a table of stations, columns as in Observations.table [SI].
     """
     used = station[station["used"].astype(bool)]
-    sentences, judged = [], []
+    sentences, judged = _judged(case, site, used)
+    return sentences + (suspicions_in_words(judged, used) if len(judged) else [])
+
+
+def with_absurd_levels(case: Case, site: Site, station: pd.DataFrame) -> pd.Series:
+    """Whether each row is a level that its experiment cannot have, by itself, whatever its error."""
+    _, judged = _judged(case, site, station[station["used"].astype(bool)])
+    levels = judged[(judged["kind"] == WATER_LEVEL) & ~judged["problem"].astype(str).str.endswith("error")]
+    return station.index.to_series().isin(levels.index)
+
+
+def _judged(case: Case, site: Site, used: pd.DataFrame) -> tuple[list[str], pd.DataFrame]:
+    """What is said of outlets, and the rows of the table that are wrong, with `problem` and `times`."""
+    sentences, judged = [], [_with_verdicts(used[:0], []).assign(depth=0.0)]
     for name, rows in used.groupby("experiment", sort=False):
         flow = plausible_flow(case, in_experiment(site, str(name)), case.experiments[str(name)])
         if flow.depth > DEEPEST_CHANNEL * flow.width or flow.fastest[-1] < STANDING_WATER:
@@ -74,7 +87,8 @@ def absurd_values(case: Case, site: Site, station: pd.DataFrame) -> list[str]:
         doubted = _of_doubted_scale(rows, wrong)
         sound = [group[~group.index.isin(doubted)] for _, group in groups]
         judged += [_with_verdicts(group, _errors_judged(flow, group)) for group in sound]
-    return sentences + (suspicions_in_words(_of_one_datum(pd.concat(judged)), used) if judged else [])
+    wrong = pd.concat(judged)
+    return sentences, wrong if wrong.empty else _of_one_datum(wrong)
 
 
 def _with_verdicts(group: pd.DataFrame, verdicts: list[Judged]) -> pd.DataFrame:
