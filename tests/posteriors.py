@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy.special
 from stored import HASH, MEMBERS, a_header
 
 from vegglue.results.posterior import (
@@ -17,6 +18,15 @@ from vegglue.results.posterior import (
     PredictiveDistribution,
     WeightedSample,
     WeightStatistics,
+)
+from vegglue.results.refinement import (
+    ErrorModel,
+    GroupsLeftOut,
+    ImportanceDraws,
+    LeaveOneOut,
+    MisfitTest,
+    PosteriorModes,
+    Refinement,
 )
 
 
@@ -74,3 +84,16 @@ def a_posterior(canopy: bool) -> Posterior:
         settings=settings, sample=sample, weighting=WeightStatistics(11, 7.5, 0.3, 0.4), marginals=marginals, fit=fit,
         predicted=predicted, station=station, canopy=corrected if canopy else None, refinement=None, transfer=None,
     )  # fmt: skip
+
+
+def a_refinement(chi2: float = 50.0, freedom: int = 50, errors: str = "stated") -> Refinement:
+    """Draws around one mode under errors that leave this chi2; no number of the other parts means anything."""
+    few, none = np.array([0.0]), np.array([False])
+    return Refinement(
+        error_model=ErrorModel(errors, 0.0, 1.0, np.nan),
+        modes=PosteriorModes(1, np.zeros((1, 2)), few, np.ones(1)),
+        draws=ImportanceDraws(np.array([MEMBERS]), few, np.zeros(MEMBERS), {}),
+        leave_one_out=LeaveOneOut(0.0, 1.0, 0.5, 0.95, 0.5, few, few, few),
+        misfit=MisfitTest(chi2, freedom, float(scipy.special.chdtrc(freedom, chi2)), few, none),
+        groups=GroupsLeftOut(np.array([], dtype=str), np.array([], dtype=int), few[:0], few[:0]),
+    )

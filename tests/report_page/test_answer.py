@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, a_location, an_instrument, laws_suspected_of
-from posteriors import changed
+from posteriors import a_refinement, changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
 from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
 from vegglue.report_page.diagnosis_words import diagnosis_section
+from vegglue.report_page.findings import findings
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words
 from vegglue.report_page.next_words import next_steps
 from vegglue.report_page.run import LoopResults, Run
@@ -21,6 +22,7 @@ from vegglue.report_page.tables import station_rows
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.solver.status import FAILED
 
 FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
 LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
@@ -244,6 +246,24 @@ def test_what_forbids_using_the_answer_is_one_sentence(toy: Run) -> None:
     assert said.startswith("Neither the verdict nor the parameters below are")
     assert "larger than the errors allow; the weights" in said
     assert said.count(".") == 1
+
+
+def test_members_that_failed_are_no_doubt_of_draws_that_were_solved(toy: Run) -> None:
+    """2 of 64 failed where the search for the best began, and the parameters were not to be relied on."""
+    assert toy.ensemble is not None
+    status = toy.ensemble.status.copy()
+    status[: len(status) // 10] = FAILED
+    run = replace(toy, posterior=changed(toy.posterior, effective_size=900.0, pareto_k=0.1, failed=0),
+                  ensemble=replace(toy.ensemble, status=status))  # fmt: skip
+    assert "204 of 2,048 members failed" in why_not_to_rely(run)
+    drawn = replace(run, posterior=replace(run.posterior, refinement=a_refinement()))
+    assert why_not_to_rely(drawn) == ""
+    assert "40 of 2,048 members failed" in why_not_to_rely(
+        replace(drawn, posterior=changed(drawn.posterior, failed=40))
+    )
+    (told,) = (one for one in findings(drawn) if one.subject == "members")
+    assert "204 failed; the posterior is of 2,048 draws of its own, of which none failed." in told.text
+    assert not told.doubt
 
 
 @pytest.mark.slow

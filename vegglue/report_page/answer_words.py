@@ -16,16 +16,14 @@ from vegglue.report_page.cause_words import (
     place_in_headline,
 )
 from vegglue.report_page.diagnosis_words import standard_errors
-from vegglue.report_page.findings import FAILED_TOLERATED
+from vegglue.report_page.findings import failed_of_weighed, too_many_failed
 from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
 from vegglue.report_page.page_file import set_as_code
 from vegglue.report_page.run import Run
 from vegglue.report_page.validation_words import UNBELIEVED
 from vegglue.results.diagnosis import Diagnosis, Step
-from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.results.suspect import AmplitudeEstimate
-from vegglue.solver.status import FAILED, members_with
 
 # Rivals that the headline names, the likeliest: more are in the table.
 RIVALS_NAMED = 2
@@ -150,7 +148,7 @@ def why_not_to_rely(run: Run) -> str:
     of_discharges = [*_of_discharges(run)]
     verdict = [*_of_verdict(found), *(of_discharges if found and found.verdict.doubts_the_data else [])]
     weights = [] if told else _of_posterior(run.posterior)
-    parameters = [*([] if found else of_discharges), *weights, *_of_ensemble(run.ensemble)]
+    parameters = [*([] if found else of_discharges), *weights, *_of_members(run)]
     if verdict and parameters:
         subject = "Neither the verdict nor the parameters below are"
     else:
@@ -180,13 +178,12 @@ def _of_posterior(posterior: Posterior) -> Iterator[str]:
         yield "a few members carry most of the weight, so that the parameters are less sure than they look"
 
 
-def _of_ensemble(ensemble: Ensemble | None) -> Iterator[str]:
-    if ensemble is None:
-        return
-    failed = members_with(ensemble.status, FAILED)
-    if failed > FAILED_TOLERATED * len(ensemble.status):
-        yield f"{failed:,} of {so_many(len(ensemble.status), 'member')} failed"
-    if not ensemble.by_command and largest_mass_error(ensemble) >= MASS_LIMIT:
+def _of_members(run: Run) -> Iterator[str]:
+    if too_many_failed(run.ensemble, run.posterior):
+        failed, members = failed_of_weighed(run.ensemble, run.posterior)
+        yield f"{failed:,} of {so_many(members, 'member')} failed"
+    ensemble = run.ensemble
+    if ensemble is not None and not ensemble.by_command and largest_mass_error(ensemble) >= MASS_LIMIT:
         yield f"a member loses or gains {percent(largest_mass_error(ensemble))} of its discharge"
 
 

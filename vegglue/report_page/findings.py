@@ -45,7 +45,7 @@ from vegglue.report_page.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.site.channel_geometry import discharges_upstream_of
-from vegglue.solver.status import STATUS_WORDS, members_with
+from vegglue.solver.status import FAILED, STATUS_WORDS, members_with
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.
 FAILED_TOLERATED = 0.01
@@ -80,7 +80,7 @@ def findings(run: Run) -> list[Finding]:
         *_set_aside_since(run),
         *_discharge(case, observations),
         _weights(posterior, notation),
-        *([] if run.ensemble is None else [_members(run.ensemble), *_mass(run.ensemble)]),
+        *([] if run.ensemble is None else [_members(run.ensemble, posterior), *_mass(run.ensemble)]),
         *_engine(case),
     ]
     return sorted(found, key=lambda finding: not finding.doubt)
@@ -233,15 +233,30 @@ def _weights(posterior: Posterior, notation: Notation) -> Finding:
     return Finding("weights", set_as_code(" ".join(weights_in_words(posterior, notation))), doubt)
 
 
-def _members(ensemble: Ensemble) -> Finding:
+def failed_of_weighed(ensemble: Ensemble | None, posterior: Posterior) -> tuple[int, int]:
+    """How many of the members that a posterior weighs failed, and how many these are: draws of its own where it was
+    refined, as the ensemble then only says where to begin.
+    """
+    if posterior.refinement is not None or ensemble is None:
+        return posterior.sample.failed, posterior.sample.members
+    return members_with(ensemble.status, FAILED), len(ensemble.status)
+
+
+def too_many_failed(ensemble: Ensemble | None, posterior: Posterior) -> bool:
+    """Whether so many of them failed that it is a doubt."""
+    failed, members = failed_of_weighed(ensemble, posterior)
+    return failed > FAILED_TOLERATED * members
+
+
+def _members(ensemble: Ensemble, posterior: Posterior) -> Finding:
     newton, marched, failed, run = (members_with(ensemble.status, number) for number in STATUS_WORDS)
     own = f"{so_many(newton, 'member')} solved by Newton's method, {marched:,} by marching in time"
     text = f"{so_many(run, 'member')} run by the command" if ensemble.by_command else own
-    return Finding(
-        "members",
-        f"{text}, {failed:,} failed{'; they have no weight' if failed else ''}.",
-        doubt=failed > FAILED_TOLERATED * len(ensemble.status),
-    )
+    told = "; they have no weight" if failed else ""
+    if failed and posterior.refinement is not None:
+        of_draws, draws = failed_of_weighed(ensemble, posterior)
+        told = f"; the posterior is of {so_many(draws, 'draw')} of its own, of which {of_draws or 'none'} failed"
+    return Finding("members", f"{text}, {failed:,} failed{told}.", doubt=too_many_failed(ensemble, posterior))
 
 
 def _mass(ensemble: Ensemble) -> Iterator[Finding]:
