@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from diagnoses import a_diagnosis
 from rungs import a_rung
 
 from vegglue.cli.output import command_line
-from vegglue.cli.tables import show_ladder, show_questions
+from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
+from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 from vegglue.workflow.compare import Comparison
 
 
@@ -38,3 +40,13 @@ def test_that_no_measurement_is_proposed_claims_no_more_than_was_weighed(capsys:
     show_questions("brook", [])
     said = " ".join(capsys.readouterr().out.split())
     assert "no two listed effects to be told apart, and what is in no list is weighed only where it is likelier" in said
+
+
+def test_a_verdict_that_doubts_the_data_is_followed_by_no_table_of_effects(capsys: pytest.CaptureFixture[str]) -> None:
+    """Effects followed with chances and amplitudes, as if these meant something."""
+    show_diagnosis(a_diagnosis())
+    assert "detectable from" in capsys.readouterr().out
+    show_diagnosis(a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."}))
+    said = capsys.readouterr().out
+    assert "detectable from" not in said
+    assert "Mend them, or find them right, first" in " ".join(said.split())

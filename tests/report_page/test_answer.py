@@ -195,6 +195,15 @@ def test_no_field_work_is_proposed_before_wrong_measurements_are_mended(toy: Run
     assert not any("field work" in step for step in steps)
 
 
+def test_what_is_found_with_doubtful_measurements_is_folded_and_says_so(toy: Run) -> None:
+    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    sound, section = diagnosis_section(a_diagnosis()), diagnosis_section(doubted)
+    assert sound.condition == ""
+    assert "found with the measurements as they stand" in section.condition
+    assert section.suspects == []
+    assert sorted(one.name for one in section.other_suspects) == sorted(one.name for one in sound.suspects)
+
+
 def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:
     found = replace(NOTHING, laws=laws_suspected_of("law_bank_speed_step"))
     assert "vegglue discover toy.yaml" in next_steps(replace(toy, diagnosis=found))[0]

@@ -24,19 +24,28 @@ UNDER_STATED_ERRORS = (
 )
 # Columns of the ladder that are left out last where a window is narrow: errors of what no calibration saw go first.
 FIRST_OF_LADDER = ("held out (section)", "validation", "RMSE", "held out (exp.)", "chi2 / n")
+# Said instead of the table where the verdict doubts the data.
+HELD_BACK = (
+    "No table of effects: with these measurements it would only tell what makes up for what is wrong with them. Mend "
+    "them, or find them right, first; the page of the run (`vegglue report`) has the table, as far as it goes."
+)
 # Suspects in the table, the strongest: they fit on a screen with what is said of them, and the page has all.
 SUSPECTS_SHOWN = 10
 
 
 def show_diagnosis(found: Diagnosis) -> None:
-    """The verdict and its sentence, remarks, the ten strongest suspects as a table, stations set aside."""
+    """The verdict and its sentence, remarks, the ten strongest suspects as a table, stations set aside.
+
+    No table where the verdict doubts the data: effects would only make up for what is wrong with them.
+    """
     console().print(found.verdict.kind, style="bold", end=": ")
     console().print(found.verdict.sentence)
     for remark in found.verdict.remarks:
         console().print(f"- {remark}")
-    rows = [_suspect_cells(found, one) for one in found.suspects[:SUSPECTS_SHOWN]]
-    headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
-    print_table(headings, rows, headings[1:5])
+    if found.verdict.doubts_the_data:
+        console().print(HELD_BACK)
+    else:
+        _show_suspects(found)
     for off in found.instruments:
         at = ", ".join(f"{name} = {value:g}" for name, value in (("x", off.x), ("y", off.y)) if np.isfinite(value))
         console().print(f"- set aside: the {off.kind} at {at} m, {so_many(len(off.stations), 'reading')}")
@@ -45,6 +54,12 @@ def show_diagnosis(found: Diagnosis) -> None:
         station = found.predictions.station.iloc[row]
         place = f"{station['experiment']} {station['section']} x = {station['x']:g}, y = {station['y']:g} m"
         console().print(f"- set aside: {place}, measured {station['value']:g}")
+
+
+def _show_suspects(found: Diagnosis) -> None:
+    rows = [_suspect_cells(found, one) for one in found.suspects[:SUSPECTS_SHOWN]]
+    headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
+    print_table(headings, rows, headings[1:5])
 
 
 def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:

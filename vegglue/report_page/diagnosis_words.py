@@ -16,6 +16,11 @@ from vegglue.results.suspect import effects_among
 
 # Effects in the open table, a screen of a laptop; the others stand below it, folded.
 SUSPECTS_LISTED = 8
+# Said below a verdict that doubts the data.
+AS_THEY_STAND = (
+    "All that follows here was found with the measurements as they stand: it tells what makes up for what is wrong "
+    "with them, and means something of the flow only if they turn out to be right."
+)
 
 
 @dataclass(frozen=True)
@@ -50,9 +55,12 @@ class FlaggedRow:
 
 @dataclass(frozen=True)
 class DiagnosisSection:
-    """The part of the page about a diagnosis, without its pictures; sentence and remarks are text, the rest is HTML."""
+    """The part of the page about a diagnosis, without its pictures; sentence, condition and remarks are text, the rest
+    is HTML. condition: under which all but the sentence holds, '' for none.
+    """
 
     sentence: str
+    condition: str
     remarks: tuple[str, ...]
     numbers: list[KeyNumber]
     suspects: list[SuspectRow]
@@ -70,6 +78,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     verdict, numbers = diagnosis.verdict, _numbers(diagnosis)
     return DiagnosisSection(
         sentence=verdict.sentence,
+        condition=AS_THEY_STAND if verdict.doubts_the_data else "",
         remarks=verdict.remarks,
         numbers=numbers,
         suspects=first,
@@ -121,9 +130,9 @@ def rms_residual(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE
 
 
 def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectRow]]:
-    """The effects worth reading first, and all others."""
+    """The effects worth reading first, none where the verdict doubts the data, and all others."""
     rows = [_row(diagnosis, suspect) for suspect in ranked_suspects(diagnosis)]
-    shown = max(SUSPECTS_LISTED, len(diagnosis.set))
+    shown = 0 if diagnosis.verdict.doubts_the_data else max(SUSPECTS_LISTED, len(diagnosis.set))
     return rows[:shown], rows[shown:]
 
 
