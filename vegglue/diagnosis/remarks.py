@@ -7,6 +7,7 @@ from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_
 from vegglue.measurements.carried_in_words import carried_in_words
 from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
+from vegglue.results.small_misfit import small_misfit_in_words
 from vegglue.results.suspect import counted_in_words
 from vegglue.screening.places import LEAST_DEPTH
 
@@ -25,7 +26,7 @@ TOO_SHALLOW = (
 def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
     """All of them, those on what is carried and on what is named first; statement: beside which they stand."""
     found, misfit = grounds.findings, grounds.misfit
-    remarks = carried_in_words(grounds.carried)
+    remarks = [*carried_in_words(grounds.carried), *filter(None, [small_misfit_in_words(misfit.chi2, misfit.freedom)])]
     remarks += _implausible(found.steps, suspects)
     remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     remarks += _besides(grounds, suspects, statement)

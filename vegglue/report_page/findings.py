@@ -44,6 +44,7 @@ from vegglue.report_page.run import Run, command_about, median_plants
 from vegglue.report_page.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.results.small_misfit import is_too_small
 from vegglue.site.channel_geometry import discharges_upstream_of
 from vegglue.solver.status import FAILED, STATUS_WORDS, members_with
 
@@ -172,8 +173,9 @@ def _refinement(posterior: Posterior) -> Iterator[Finding]:
     search, *errors = search_in_words(posterior, refined)
     yield Finding("errors", _html(errors), doubt=estimated)
     yield Finding("draws", _html([search]))
-    missing = not estimated and refined.misfit.p_misfit < UNBELIEVED
-    doubt = missing or bool(refined.misfit.outlier.any())
+    misfit = refined.misfit
+    odd = not estimated and (misfit.p_misfit < UNBELIEVED or is_too_small(misfit.chi2, misfit.freedom))
+    doubt = odd or bool(refined.misfit.outlier.any())
     yield Finding("validation", _html(validation_in_words(posterior, refined)), doubt)
 
 

@@ -16,6 +16,7 @@ from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
 from vegglue.report_page.validation_words import DOUBTED, UNBELIEVED
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
+from vegglue.results.small_misfit import is_too_small
 from vegglue.solver.status import FAILED
 
 # Largest |Q - Q_in| over all that enters [-] of a sound member: a hundredth of what a flow meter can tell.
@@ -69,7 +70,8 @@ def against_measurement_error(posterior: Posterior, kind: str, miss: float) -> s
         return f", {short(miss / error, 2)} times the measurement error of {with_unit(error, kind)}"
     if miss > error and _misfit_below(posterior, DOUBTED):
         return f", which the measurement error of {with_unit(error, kind)} hardly explains"
-    return f", no more than the measurement error of {with_unit(error, kind)} explains"
+    less = "far less" if _misfit_too_small(posterior) else "no more"
+    return f", {less} than the measurement error of {with_unit(error, kind)} explains"
 
 
 def key_numbers(case: Case, posterior: Posterior) -> list[KeyNumber]:
@@ -197,6 +199,13 @@ def _misfit_below(posterior: Posterior, chance: float) -> bool:
     """Whether stated errors leave so much at all stations together less often than that; unknown counts as no."""
     refined = posterior.refinement
     return refined is not None and refined.error_model.errors == "stated" and refined.misfit.p_misfit < chance
+
+
+def _misfit_too_small(posterior: Posterior) -> bool:
+    """Whether stated errors leave so little at all stations together by chance hardly ever; unknown counts as no."""
+    refined = posterior.refinement
+    stated = refined is not None and refined.error_model.errors == "stated"
+    return stated and refined is not None and is_too_small(refined.misfit.chi2, refined.misfit.freedom)
 
 
 def with_unit(value: float, kind: str) -> str:

@@ -17,6 +17,7 @@ from vegglue.report_page.prior_words import against_prior_in_words
 from vegglue.report_page.validation_words import validation_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, Posterior
 from vegglue.results.refinement import ErrorModel, PosteriorModes, Refinement
+from vegglue.results.small_misfit import small_misfit_in_words
 
 # |r| [-] above which a pair is told of: the other parameter then explains half the variance of each (r² = 0.49).
 STRONG_CORRELATION = 0.7
@@ -162,6 +163,8 @@ def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[
             "Against the standard errors of the data, the best member has chi2 = "
             f"{notation.number(fit.chi2, 3)} over {fit.used} stations."
         )
+        small = small_misfit_in_words(fit.chi2, fit.used - len(posterior.parameters))
+        sentences += [f"{small[:1].upper()}{small[1:]}"] if small else []
     return sentences
 
 

@@ -7,6 +7,7 @@ from vegglue.inference.refinement_summary import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut, LeaveOneOut, MisfitTest, Refinement
+from vegglue.results.small_misfit import is_too_small, why_too_small
 
 # p-values [-]: below the first, the customary 1 in 20, its words are guarded; below the second, something
 # is said to be missing, which a run should not say by chance.
@@ -40,6 +41,8 @@ def chi2_in_words(misfit: MisfitTest, missing: str) -> str:
     result = f"chi2 = {in_digits(misfit.chi2, 4)} with {degrees} of freedom (p = {misfit.p_misfit:.2g})"
     if misfit.p_misfit < UNBELIEVED:
         return f"{result}: {missing}"
+    if is_too_small(misfit.chi2, misfit.freedom):
+        return f"{result}, less than chance makes it: {why_too_small(misfit.chi2, misfit.freedom)}."
     return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."
 
 

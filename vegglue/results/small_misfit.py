@@ -1,0 +1,36 @@
+"""A misfit that is far smaller than its errors make it: these are too large, or readings are no separate ones."""
+
+import math
+
+from scipy.special import chdtr
+
+from vegglue.in_short import in_digits
+
+# Chance of a chi2 as small under errors alone [-], below which something is said: as rare as what is called missing.
+TOO_SMALL = 0.001
+# What is likely then, and what to do; {times} as large the errors would fit.
+TOO_LARGE = (
+    "errors as stated, or as allowed for the model, are too large ({times} times as large would fit), or readings are "
+    "copies, or smoothed, and count as separate ones; check which, as ranges are too wide until then and an effect may "
+    "hide in them"
+)
+
+
+def is_too_small(chi2: float, freedom: int) -> bool:
+    """Whether P(chi2_f <= chi2) of a misfit with f degrees of freedom is below TOO_SMALL; False without any."""
+    return freedom > 0 and bool(chdtr(freedom, chi2) < TOO_SMALL)
+
+
+def why_too_small(chi2: float, freedom: int) -> str:
+    """What is likely of a misfit that is too small, and what to do: errors (chi2 / f)^(1/2) times as large fit."""
+    return TOO_LARGE.format(times=in_digits(math.sqrt(chi2 / freedom), 2))
+
+
+def small_misfit_in_words(chi2: float, freedom: int) -> str:
+    """`chi2 is only 0.41 times its degrees of freedom, ...`, '' of a misfit that is not too small."""
+    if not is_too_small(chi2, freedom):
+        return ""
+    less = (
+        f"chi2 is only {in_digits(chi2 / freedom, 2)} times its degrees of freedom, less than chance makes it once in"
+    )
+    return f"{less} {1.0 / TOO_SMALL:,.0f} times: {why_too_small(chi2, freedom)}."
