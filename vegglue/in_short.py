@@ -1,6 +1,7 @@
 """How values show themselves where they are printed: a heading, and below it a few lines with units."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 # Of a unit of time, from which it is told in the next: below two, whole ones may be off by more than a quarter.
@@ -29,6 +30,12 @@ def duration_in_short(seconds: float) -> str:
 def listed(parts: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+
+
+def without_asides(sentence: str) -> str:
+    """A sentence without what stands in round brackets, but for shares and chances, `(7%)`: for who reads one line."""
+    shorter = re.sub(r"\s*\([^()%]*\)", "", sentence)
+    return shorter if shorter == sentence else without_asides(shorter)
 
 
 def experiments_in_words(names: Sequence[str]) -> str:

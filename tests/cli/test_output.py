@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 from diagnoses import a_diagnosis
+from posteriors import a_posterior, changed
 from rungs import a_rung
 
+from vegglue.cli.ensemble_commands import _in_short
 from vegglue.cli.output import command_line
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE
@@ -40,6 +44,19 @@ def test_that_no_measurement_is_proposed_claims_no_more_than_was_weighed(capsys:
     show_questions("brook", [])
     said = " ".join(capsys.readouterr().out.split())
     assert "no two listed effects to be told apart, and what is in no list is weighed only where it is likelier" in said
+
+
+def test_what_a_run_found_is_a_short_line_each() -> None:
+    """It ended in one paragraph of up to 200 words, without a word on phi at its bound."""
+    first, last = a_diagnosis(), a_diagnosis(verdict={"sentence": "Nothing stands out (chi2 is 29), but it may (4%)."})
+    pressed = {name: np.array([name == "phi", False]) for name in ("n_b", "phi")}
+    posterior = changed(a_posterior(False), bound_hit=pressed)
+    of, child = SimpleNamespace(name="brook"), SimpleNamespace(name="brook-wind")
+    extension = SimpleNamespace(sentence="Missing: wind (of 0.3; which blows).", reason="Added: wind.")
+    lines = _in_short(extension, [(of, first), (child, last), (child, posterior)])
+    assert lines[:3] == ["Missing: wind.", "Added: wind.", "With that: Nothing stands out, but it may (4%)."]
+    assert lines[3].startswith("phi ends at a bound of its prior, and the bound, not the data, ends the range")
+    assert len(lines) == 4
 
 
 def test_a_verdict_that_doubts_the_data_is_followed_by_no_table_of_effects(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,13 +5,14 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, a_location, an_instrument, laws_suspected_of
 from posteriors import a_refinement, changed
 from report_runs import a_toy, told_of, written
 
 from vegglue.report_page.answer import answer_of
-from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
+from vegglue.report_page.answer_words import headline, headline_lines, of_which_model, where_it_fails, why_not_to_rely
 from vegglue.report_page.diagnosis_words import diagnosis_section
 from vegglue.report_page.findings import findings
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words
@@ -315,6 +316,39 @@ def test_what_the_model_still_asks_for_stands_beside_its_verdict(toy: Run) -> No
     numbers = {one.name: one.value for one in diagnosis_section(found).numbers}
     assert numbers["errors of the data"] == "2.1 times"
     assert "errors of the data" not in [one.name for one in diagnosis_section(a_diagnosis()).numbers]
+
+
+def test_the_head_of_the_page_is_a_few_short_lines(toy: Run) -> None:
+    """It was one paragraph of up to 200 words, with all that stands in brackets in the verdict."""
+    first = told_of(toy, a_diagnosis(verdict={"kind": "one-of", "left_over": "Beside it wind (p = 0.004) stands out."}))
+    unsure = "Nothing stands out (chi2 is 29 for 148 degrees of freedom), but between (by its errors) it may (4%) miss."
+    own = replace(NOTHING, name="child", verdict=replace(NOTHING.verdict, kind="cannot-tell", sentence=unsure))
+    child = replace(toy, diagnosis=own, loop=LoopResults(behind=first, ladder=LADDER))
+    lines = [plain(line) for line in headline_lines(child)]
+    assert len(lines) == 3
+    assert lines[0].startswith("Something was missing from")
+    assert lines[1:] == ["Beside it wind stands out.", "Nothing stands out, but between it may (4%) miss."]
+    assert answer_of(child).lines == headline_lines(child)
+
+
+def test_a_parameter_at_its_bound_is_told_in_the_headline(toy: Run) -> None:
+    """phi ended at 100, and only the table and the caveats said so."""
+    hit = {name: np.array([False, name == "phi"]) for name in toy.posterior.parameters}
+    pressed = replace(toy, diagnosis=NOTHING, posterior=changed(toy.posterior, bound_hit=hit))
+    assert plain(headline_lines(pressed)[-1]).startswith("φ (upper) ends at a bound of its prior, and the bound, not")
+    assert "bound" not in headline(replace(toy, diagnosis=NOTHING, posterior=changed(toy.posterior, bound_hit={
+        name: np.array([False, False]) for name in toy.posterior.parameters})))  # fmt: skip
+    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    assert "bound" not in headline(replace(pressed, diagnosis=doubted)), "which only follows from the data"
+
+
+def test_a_misfit_that_is_far_too_small_is_told_in_the_headline(toy: Run) -> None:
+    small, usual = (
+        replace(toy, diagnosis=NOTHING, posterior=replace(toy.posterior, refinement=a_refinement(chi2, 150)))
+        for chi2 in (61.5, 150.0)
+    )
+    assert "chi2 is only 0.41 times its degrees of freedom" in headline(small)
+    assert "chi2 is only" not in headline(usual)
 
 
 def test_gauges_that_are_missed_most_are_no_section() -> None:

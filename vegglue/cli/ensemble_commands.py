@@ -11,6 +11,7 @@ from vegglue.cli.hearing import heard
 from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import print_object
 from vegglue.cli.telling import tell
+from vegglue.in_short import without_asides
 
 
 def check_command(
@@ -119,10 +120,20 @@ def run_command(
 
         print_object(run_object(runs, results))
     else:  # what was found scrolled by, with all that was done after it
-        from vegglue.workflow.discover import DiscoveredCase
+        print("\n".join(["In short:", *(f"- {line}" for line in _in_short(extension, results))]))
 
-        laws = [result.found.sentence for _, result in results if isinstance(result, DiscoveredCase)]
-        print(" ".join(["In short:", extension.sentence, extension.reason, *laws, *_of_the_last(results)]))
+
+def _in_short(extension: Any, results: Sequence[tuple[Any, Any]]) -> list[str]:
+    """A line each: the verdict, what was added, laws, the verdict on the last model, and parameters at bounds."""
+    from vegglue.figures.typography import PLAIN_TEXT
+    from vegglue.report_page.prior_words import ends_at_bounds
+    from vegglue.results.posterior import Posterior
+    from vegglue.workflow.discover import DiscoveredCase
+
+    laws = [result.found.sentence for _, result in results if isinstance(result, DiscoveredCase)]
+    at_bounds = [ends_at_bounds(result, PLAIN_TEXT) for _, result in results if isinstance(result, Posterior)][-1:]
+    lines = [extension.sentence, extension.reason, *laws, *_of_the_last(results), *at_bounds]
+    return [without_asides(line) for line in lines if line]
 
 
 def _of_the_last(results: Sequence[tuple[Any, Any]]) -> list[str]:

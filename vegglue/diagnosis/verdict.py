@@ -232,8 +232,8 @@ def _unsure_between(grounds: Grounds) -> Statement:
     """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
     unsure = (
         "where nobody measured, halfway between the sections, the model may miss by as much as "
-        f"{grounds.between:.1f} times the errors of the data, by its own errors, those of its site and its parameters, "
-        "as far as these data know them: a missing effect may hide in that"
+        f"{grounds.between:.1f} times the errors of the data (by its own errors, those of its site and its parameters, "
+        "as far as these data know them): a missing effect may hide in that"
     )
     return _nothing_further(grounds, unsure, "instrument" if _all_clear(grounds) else "cannot-tell")
 

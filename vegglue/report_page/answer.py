@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vegglue.figures.error_rows import draw_error_rows
 from vegglue.figures.style import Picture
-from vegglue.report_page.answer_words import headline, of_which_model, where_it_fails, why_not_to_rely
+from vegglue.report_page.answer_words import headline_lines, of_which_model, where_it_fails, why_not_to_rely
 from vegglue.report_page.cause_words import accepted_causes
 from vegglue.report_page.ladder_words import causes_of, ladder_in_words, ladder_rows
 from vegglue.report_page.next_words import next_steps
@@ -21,14 +21,14 @@ STAND_IN = "These parameters are of the model as it is: they may stand in for wh
 class CaseAnswer:
     """What the top of a page says of one case (HTML).
 
-    headline: the verdict; subject: which model the page is about, '' where it is the one diagnosed; warning: what
-    forbids using it; in_full: the whole verdict (text), '' without a diagnosis; falls: whether models are compared;
-    ladder: None where nobody did, and ladder_words then name the command; where: it fails most (text); stand_in: what
-    to think of the parameters of this model (text).
+    lines: of the headline, the verdict first; subject: which model the page is about, '' where it is the one diagnosed;
+    warning: what forbids using it; in_full: the whole verdict (text), '' without a diagnosis; falls: whether models are
+    compared; ladder: None where nobody did, and ladder_words then name the command; where: it fails most (text);
+    stand_in: what to think of the parameters of this model (text).
     """
 
     name: str
-    headline: str
+    lines: list[str]
     subject: str
     warning: str
     in_full: str
@@ -40,6 +40,11 @@ class CaseAnswer:
     sections: SectionPanels
     stand_in: str
 
+    @property
+    def headline(self) -> str:
+        """All of its lines in one."""
+        return " ".join(self.lines)
+
 
 def answer_of(run: Run) -> CaseAnswer:
     """The answer of a run; its pictures are written to run.folder/figures. run.flow is not asked for."""
@@ -47,7 +52,7 @@ def answer_of(run: Run) -> CaseAnswer:
     missing = f"{command_about(run, 'run')} would show here how far the error falls with what is missing."
     return CaseAnswer(
         name=run.case.name,
-        headline=headline(run),
+        lines=headline_lines(run),
         subject=of_which_model(run),
         warning=why_not_to_rely(run),
         in_full=run.behind.verdict.sentence if run.behind else "",

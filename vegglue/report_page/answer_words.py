@@ -3,8 +3,8 @@
 import html
 from collections.abc import Iterator
 
-from vegglue.figures.typography import NARROW, decimals_between, fixed, interval, percent, unit_html
-from vegglue.in_short import listed, so_many
+from vegglue.figures.typography import NARROW, decimals_between, fixed, html_notation, interval, percent, unit_html
+from vegglue.in_short import listed, so_many, without_asides
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.carried_in_words import carried_in_short, carried_otherwise
 from vegglue.measurements.kinds import KINDS
@@ -17,12 +17,14 @@ from vegglue.report_page.cause_words import (
 )
 from vegglue.report_page.diagnosis_words import standard_errors
 from vegglue.report_page.findings import failed_of_weighed, too_many_failed
-from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, verdict_of
+from vegglue.report_page.key_numbers import MASS_LIMIT, largest_mass_error, symbol, verdict_of
 from vegglue.report_page.page_file import set_as_code
+from vegglue.report_page.prior_words import ends_at_bounds
 from vegglue.report_page.run import Run
 from vegglue.report_page.validation_words import UNBELIEVED
 from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.posterior import Posterior
+from vegglue.results.small_misfit import small_misfit_in_short
 from vegglue.results.suspect import AmplitudeEstimate
 
 # Rivals that the headline names, the likeliest: more are in the table.
@@ -31,22 +33,43 @@ NUMBERS = ("", "One", "Two", "Three", "Four", "Five", "Six")
 
 
 def headline(run: Run) -> str:
-    """The verdict in one sentence; of a model that was extended, what was missing before and what is now."""
+    """The verdict in short; of a model that was extended, what was missing before and what is now."""
+    return " ".join(headline_lines(run))
+
+
+def headline_lines(run: Run) -> list[str]:
+    """The same, a sentence or two in each line: the verdict, what the model still asks for, and what limits both."""
     before, own = run.before, run.diagnosis
     if before is None and run.behind is None:
-        return verdict_of(run.case, run.posterior)
-    parts = [] if before is None else [_said(before, html.escape(before.name), "was")]
+        return [verdict_of(run.case, run.posterior)]
+    lines = [] if before is None else _said(before, html.escape(before.name), "was")
     if own is not None:
-        suspected = bool(parts) and _only_suspects_a_law(own)
-        parts.append(f"What is left looks like a law that is in no list: {_law_in_words(own)}." if suspected
-                     else _said(own, "this model", "is"))  # fmt: skip
+        suspected = bool(lines) and _only_suspects_a_law(own)
+        lines += ([f"What is left looks like a law that is in no list: {_law_in_words(own)}."] if suspected
+                  else _said(own, "this model", "is"))  # fmt: skip
     elif before is None and run.behind is not None:
-        parts.append(_said(run.behind, html.escape(run.behind.name), "was"))
-    return " ".join(parts)
+        lines += _said(run.behind, html.escape(run.behind.name), "was")
+    last = own or run.behind
+    return lines if last is not None and last.verdict.doubts_the_data else [*lines, *_limits(run)]
 
 
-def _said(found: Diagnosis, model: str, tense: str) -> str:
-    """The verdict on a model in one sentence; tense: is or was."""
+def _limits(run: Run) -> list[str]:
+    """That parameters end at bounds, and that the misfit is far too small."""
+    posterior, refined = run.posterior, run.posterior.refinement
+    notation = html_notation({name: symbol(run.case, name) for name in posterior.parameters})
+    stated = refined is not None and refined.error_model.errors == "stated"
+    small = small_misfit_in_short(refined.misfit.chi2, refined.misfit.freedom) if stated and refined is not None else ""
+    return [one for one in (ends_at_bounds(posterior, notation), small) if one]
+
+
+def _said(found: Diagnosis, model: str, tense: str) -> list[str]:
+    """The verdict on a model in one sentence, and what the model still asks for; tense: is or was."""
+    named = found.verdict.kind in ("identified", "one-of", "none-of-these") and not _only_suspects_a_law(found)
+    left_over = html.escape(without_asides(found.verdict.left_over)) if named and found.field is None else ""
+    return [one for one in (_verdict_in_short(found, model, tense), left_over) if one]
+
+
+def _verdict_in_short(found: Diagnosis, model: str, tense: str) -> str:
     kind = found.verdict.kind
     if kind == "nothing-missing":
         return f"Nothing {tense} missing from {model} that these data could show."
@@ -59,8 +82,7 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
     if _only_suspects_a_law(found):
         return f"Something {tense} missing from {model} that is in no list: {_law_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
-        left_over = html.escape(found.verdict.left_over)
-        return " ".join(filter(None, [_what_is_missing(found, model, tense), left_over]))
+        return _what_is_missing(found, model, tense)
     if kind == "cannot-tell" and found.laws is not None and not (found.steps or found.places):
         best, chance = found.laws.laws[0], percent(sum(one.chance for one in found.laws.alike))
         law = html.escape(f"a law of {best.quantity} in {best.term}")
@@ -68,7 +90,7 @@ def _said(found: Diagnosis, model: str, tense: str) -> str:
             f"Whether anything {tense} missing from {model}, these data cannot tell; the likeliest, with a chance of "
             f"{chance}, is {law}, which is in no list."
         )
-    return set_as_code(html.escape(found.verdict.sentence))
+    return set_as_code(html.escape(without_asides(found.verdict.sentence)))
 
 
 def _only_suspects_a_law(found: Diagnosis) -> bool:

@@ -1,7 +1,7 @@
 """Where a posterior disagrees with its prior: it presses against a bound, or lies off its middle."""
 
 from vegglue.figures.typography import Notation
-from vegglue.in_short import telling_digits
+from vegglue.in_short import listed, telling_digits
 from vegglue.results.posterior import NEAR_BOUND, Posterior
 
 
@@ -9,6 +9,21 @@ def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
     """The bounds of its prior that a parameter presses against: 'lower', 'upper', both or none."""
     hit = posterior.marginals.bound_hit[name]
     return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
+
+
+def ends_at_bounds(posterior: Posterior, notation: Notation) -> str:
+    """`phi (upper) ends at a bound of its prior, ...`, for one line of a headline; '' where none does."""
+    at = {name: pressed_bounds(posterior, name) for name in posterior.parameters}
+    names = [f"{notation.parameter(name)} ({' and '.join(sides)})" for name, sides in at.items() if sides]
+    if not names:
+        return ""
+    subject = (
+        f"{listed(names)} {'ends at a bound of its prior' if len(names) == 1 else 'end at bounds of their priors'}"
+    )
+    remedy = "widen it if it may lie further, or see what it stands in for"
+    if len(names) > 1:
+        remedy = "widen them if they may lie further, or see what they stand in for"
+    return f"{subject}, and the bound, not the data, ends the range: {remedy}."
 
 
 def off_its_prior(posterior: Posterior, name: str) -> bool:

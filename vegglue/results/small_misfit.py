@@ -8,12 +8,12 @@ from vegglue.in_short import in_digits
 
 # Chance of a chi2 as small under errors alone [-], below which something is said: as rare as what is called missing.
 TOO_SMALL = 0.001
-# What is likely then, and what to do; {times} as large the errors would fit.
+# What is likely then, {times} as large the errors would fit, and what to do.
 TOO_LARGE = (
     "errors as stated, or as allowed for the model, are too large ({times} times as large would fit), or readings are "
-    "copies, or smoothed, and count as separate ones; check which, as ranges are too wide until then and an effect may "
-    "hide in them"
+    "copies, or smoothed, and count as separate ones"
 )
+CHECK_ERRORS = "check which, as ranges are too wide until then and an effect may hide in them"
 
 
 def is_too_small(chi2: float, freedom: int) -> bool:
@@ -23,14 +23,24 @@ def is_too_small(chi2: float, freedom: int) -> bool:
 
 def why_too_small(chi2: float, freedom: int) -> str:
     """What is likely of a misfit that is too small, and what to do: errors (chi2 / f)^(1/2) times as large fit."""
+    return f"{_likely(chi2, freedom)}; {CHECK_ERRORS}"
+
+
+def _likely(chi2: float, freedom: int) -> str:
     return TOO_LARGE.format(times=in_digits(math.sqrt(chi2 / freedom), 2))
 
 
-def small_misfit_in_words(chi2: float, freedom: int) -> str:
-    """`chi2 is only 0.41 times its degrees of freedom, ...`, '' of a misfit that is not too small."""
+def small_misfit_in_short(chi2: float, freedom: int) -> str:
+    """`chi2 is only 0.41 times its degrees of freedom: ...`, '' of a misfit that is not too small."""
     if not is_too_small(chi2, freedom):
         return ""
-    less = (
-        f"chi2 is only {in_digits(chi2 / freedom, 2)} times its degrees of freedom, less than chance makes it once in"
+    return f"chi2 is only {in_digits(chi2 / freedom, 2)} times its degrees of freedom: {_likely(chi2, freedom)}."
+
+
+def small_misfit_in_words(chi2: float, freedom: int) -> str:
+    """The same with how seldom chance makes it, and what to do."""
+    short, rare = (
+        small_misfit_in_short(chi2, freedom),
+        f", less than chance makes it once in {1.0 / TOO_SMALL:,.0f} times:",
     )
-    return f"{less} {1.0 / TOO_SMALL:,.0f} times: {why_too_small(chi2, freedom)}."
+    return f"{short.removesuffix('.').replace(':', rare, 1)}; {CHECK_ERRORS}." if short else ""
