@@ -177,7 +177,7 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
     assert '<a href="../toy-eddies/report.html">' in better
     assert "Measure <b>a gauge at x = 5 m</b>, to tell eddies from &lt;wind&gt;: 1 station" in measure
     nothing = next_steps(replace(toy, diagnosis=NOTHING, loop=replace(loop, questions=())))
-    assert any("What that model leaves open stands in its report" in step for step in nothing)
+    assert any("what that model leaves open stands in its report" in step for step in nothing)
     alone = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=())))
     assert any("No further measurement is needed" in step for step in alone)
     asked = next_steps(replace(toy, diagnosis=a_diagnosis()))
@@ -223,6 +223,18 @@ def test_no_field_work_is_proposed_for_what_is_answered(toy: Run) -> None:
     answered = Question("eddies from a change of k_s", (replace(GAUGE, now=30.0, then=60.0),), 25.0)
     steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(answered,))))
     assert list(map(plain, steps)) == ["No further measurement is needed."]
+
+
+def test_the_page_of_a_parent_does_not_speak_for_its_child(toy: Run) -> None:
+    """All was answered of the parent, and its page said that no measurement is needed; the child lacked something."""
+    answered = Question("eddies from a change of k_s", (replace(GAUGE, now=30.0, then=60.0),), 25.0)
+    for questions in ((answered,), ()):
+        parent = replace(toy, diagnosis=a_diagnosis(), loop=LoopResults(ladder=LADDER, questions=questions))
+        said = " ".join(map(plain, next_steps(parent)))
+        assert "No further measurement is needed" not in said
+        assert "What toy-eddies still lacks, and what that model leaves open stands in its report." in said
+    child = replace(toy, diagnosis=NOTHING, loop=LoopResults(ladder=_ending_with(toy), questions=(answered,)))
+    assert "No further measurement is needed." in " ".join(map(plain, next_steps(child)))
 
 
 def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:

@@ -62,10 +62,8 @@ def _measurements(run: Run) -> Iterator[str]:
     if questions is None:
         yield f"{command_about(run, 'next')} says what to measure next."
         return
-    if not questions and run.loop.ladder is not None and run.loop.ladder.steps[-1].name != run.case.name:
-        yield "What was found needs no further measurement. What that model leaves open stands in its report."
-    elif all(one.answered for one in questions):
-        yield "No further measurement is needed."
+    if all(one.answered for one in questions):
+        yield _nothing_to_measure(run)
     settled = [one for one in questions if one.useful]
     measurements = {one.useful[0].name: one.useful[0] for one in reversed(settled)}
     for best in list(reversed(measurements.values()))[:QUESTIONS_SHOWN]:
@@ -77,6 +75,20 @@ def _measurements(run: Run) -> Iterator[str]:
     left = [_to_see(one) for one in questions if one not in settled and not one.answered]
     if left:
         yield f"No single measurement would do {'; nor '.join(left)}."
+
+
+def _nothing_to_measure(run: Run) -> str:
+    """That nothing is asked of this model; of one that was extended no more, as what the last one lacks or leaves open
+    is not known here.
+    """
+    ladder = run.loop.ladder
+    if ladder is not None and ladder.steps[-1].name != run.case.name:
+        last = html.escape(ladder.steps[-1].name)
+        return (
+            f"Of this model nothing more is to be measured. What {last} still lacks, and what that model leaves open "
+            "stands in its report."
+        )
+    return "No further measurement is needed."
 
 
 def _to_see(question: Question) -> str:
