@@ -46,9 +46,9 @@ def test_a_stream_reversed_is_one_remark(tmp_path: Path) -> None:
 def with_gauges(folder: Path, middle: float) -> list[str]:
     """What is said of verticals of points in whose middle a gauge reads as much in both experiments [m]."""
     (folder / "levels.csv").write_text(
-        "experiment,x,y,level,level_se\n"
+        "experiment,section,x,y,level,level_se\n"
         + "".join(
-            f"{name},{x},0,{z},0.002\n"
+            f"{name},G{x},{x},0,{z},0.002\n"
             for name, surface in (("low", 1.0), ("high", 1.1))
             for x, z in ((2, surface + 0.02), (20, surface + middle), (38, surface))
         )
@@ -74,7 +74,7 @@ def test_gauges_that_agree_raise_no_question(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("middle", "cause"),
     [
-        (-0.7, r"2 values of level .*more than half the depth there"),
+        (-0.7, r"2 values of level \(gauge G20 of experiment low, gauge G20 .*more than half the depth there"),
         (-0.4, r"Levels of experiments low and high rise downstream, by 0\.4 m from x = 20 to 38 m"),
     ],
 )

@@ -51,3 +51,35 @@ def test_what_lies_along_the_channel_is_no_section(tmp_path: Path, heights: int)
 def test_equal_places_on_many_lines_are_sections_however_near(tmp_path: Path) -> None:
     rows = [f"{10 + 0.1 * i:.1f};{y};0.4" for i in range(6) for y in (-1, 0, 1)]
     assert imported(tmp_path, CHANNEL + JUNE, rows)[0]["section"].nunique() == 6
+
+
+LEVELS = ["P1;5;0;0.97", "P2;25;0;0.95"]
+
+
+def test_a_gauge_has_the_name_that_its_table_gives(tmp_path: Path) -> None:
+    """It was called section x5.00, and the column was not read."""
+    table, said = imported(tmp_path, CHANNEL + JUNE, LEVELS, "Gauge;x;y;level")
+    assert list(table["section"]) == ["P1", "P2"]
+    assert "section from Gauge" in said
+
+
+@pytest.mark.parametrize(
+    ("heading", "rows", "sections"),
+    [
+        ("Section;Gauge;x;y;level", [f"A;{row}" for row in LEVELS], ["A", "A"]),
+        ("Gauge;x;y;u", ["P1;5;0;0.4", "P1;25;0;0.5"], ["x5.00", "x25.00"]),
+    ],
+)
+def test_a_gauge_names_no_section_of_velocities_nor_where_one_is_named(
+    tmp_path: Path, heading: str, rows: list[str], sections: list[str]
+) -> None:
+    table, said = imported(tmp_path, CHANNEL + JUNE, rows, heading)
+    assert list(table["section"]) == sections
+    assert "not read: Gauge" in said
+
+
+def test_a_column_of_readings_of_a_gauge_is_not_taken_for_its_name(tmp_path: Path) -> None:
+    site = CHANNEL + JUNE + "files: {adv.csv: {columns: {level: Gauge}}}\n"
+    table, _ = imported(tmp_path, site, ["5;0;0.97", "25;0;0.95"], "x;y;Gauge")
+    assert list(table["value"]) == [0.97, 0.95]
+    assert list(table["section"]) == ["x5.00", "x25.00"]

@@ -16,6 +16,8 @@ class Role:
     names: tuple[str, ...]
 
 
+# Columns that name the gauge of a level, and mean nothing beside velocities.
+NAMES_OF_GAUGES = ("gauge", "gage", "gauge name", "gage name", "gauge id", "gauge no", "staff gauge", "pegelname")
 # Told apart from one another by their whole name, so that none of these is ambiguous. East and north components are
 # roles of their own: they turn with the map.
 ROLES = {
@@ -85,7 +87,8 @@ ROLES = {
                                  "profondeur de mesure", "meetdiepte", "profundidad de medicion",
                                  "profondita di misura")),
         Role("section", "", ("section", "transect", "profile", "cross section", "xs", "querprofil", "profil",
-                             "seccion", "sezione", "secao", "raai", "dwarsprofiel", "perfil", "profilo")),
+                             "seccion", "sezione", "secao", "raai", "dwarsprofiel", "perfil", "profilo",
+                             *NAMES_OF_GAUGES)),
         Role("experiment", "", ("experiment", "run", "test", "campaign", "versuch", "event",
                                 "essai", "ensayo", "ensaio", "proef", "prova", "campagne", "campana")),
         Role("device", "", ("device", "instrument", "probe", "sensor")),

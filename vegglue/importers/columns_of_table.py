@@ -4,7 +4,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, bracketed, is_in_degrees, known_name, role_of, unit_stated, words_of
+from vegglue.importers.column_names import (
+    NAMES_OF_GAUGES,
+    ROLES,
+    bracketed,
+    is_in_degrees,
+    known_name,
+    role_of,
+    unit_stated,
+    words_of,
+)
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
 from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
@@ -15,7 +24,9 @@ WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
 # Names that stand for a role where no other column has it: beside z of a point there may be the bed, beside Vx the
 # magnitude of the velocity, and beside the depth of the water that of a point.
+SECTIONS_PROPER = {*ROLES["section"].names} - {*NAMES_OF_GAUGES}
 LESS_SAID = {
+    "section": {*NAMES_OF_GAUGES},
     "z": NAMES_OF_BED,
     "depth": {"depth", "tiefe", "profondeur", "profundidad", "diepte", "profondita", "profundidade"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
@@ -106,6 +117,9 @@ def _is_passed_over(heading: str, role: str, headings: Sequence[str], words: Fil
         x = words.columns.get("x")
         east = bool(NAMES_OF_EAST & set(names)) or (x is not None and role_of(x) is None)
         return "e" not in names and (bool(others) or not east)
+    if own in NAMES_OF_GAUGES and not any(name in SECTIONS_PROPER for name in names):
+        roles = [*words.columns, *(known[0] for known in map(role_of, headings) if known is not None)]
+        return "level" not in roles or any(ROLES[one].quantity == "velocity" for one in roles if one != "u_se")
     less = LESS_SAID.get(role, set())
     return own in less and any(name not in less for name in others)
 

@@ -80,12 +80,13 @@ def _whose(rows: pd.DataFrame, of_kind: pd.DataFrame) -> str:
     """`section A of experiment low`, `all of experiment low`, `all there are`."""
     if len(rows) == len(of_kind) > 1:
         return "all there are"
+    noun = "gauge" if kind_of(str(of_kind["kind"].iloc[0])).instrument == "gauge" else "section"
     names = []
     for experiment, here in rows.groupby("experiment", sort=False):
         sections = [str(name) for name in here["section"].unique() if name]
         if len(here) == int((of_kind["experiment"] == experiment).sum()) > 1 and len(sections) != 1:
             names.append(f"all of experiment {experiment}")
         else:
-            names += [f"section {name} of experiment {experiment}" for name in sections] or [f"experiment {experiment}"]
+            names += [f"{noun} {name} of experiment {experiment}" for name in sections] or [f"experiment {experiment}"]
     more = f" and {len(names) - TOLD} more" if len(names) > TOLD else ""
     return ", ".join(names[:TOLD]) + more
