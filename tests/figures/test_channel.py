@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawings import off_the_sheet, points, texts
+from matplotlib.axes import Axes
 
 from vegglue.case.config import load_case
 from vegglue.figures.channel import REACH_OF_INTEREST_MARGIN, draw_channel
@@ -54,3 +55,29 @@ def test_the_place_of_the_section_has_few_digits() -> None:
     place = re.search(r"across x = (\d+(\.\d+)?) m", title)
     assert place is not None
     assert len(place[1]) <= 5
+
+
+def covered(axes: Axes, x: np.ndarray, y: np.ndarray) -> list[str]:
+    """Texts within these axes below which one of the places lies."""
+    figure = axes.get_figure()
+    figure.canvas.draw()
+    places = axes.transData.transform(np.column_stack([x, y]))
+    boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    return [text for text, box in boxes.items() if any(box.contains(*place) for place in places)]
+
+
+def test_no_name_covers_a_gauge() -> None:
+    """`upstream` and `outlet` stood on the axis at the ends, where gauges are, and the name of a patch on stations."""
+    case = load_case(CONFIGS / "twin.yaml")
+    site, observations = build_site(case), read_observations(case)
+    (west, east), (patch, *_) = case.grid.x, case.plants.patches
+    middle = np.vstack([corners_of(case, patch).mean(axis=0)])
+    x = np.array([west + 0.03 * (east - west), east - 0.025 * (east - west), middle[0, 0]])
+    y = np.array([0.5 * sum(case.grid.y), 0.5 * sum(case.grid.y), middle[0, 1]])
+    table = observations.table.iloc[:3].assign(x=x, y=y, used=True)
+    whole = draw_channel(case, site, replace(observations, table=table)).axes[0]
+    assert {"upstream", "outlet", patch.name} <= {text.get_text() for text in whole.texts}
+    assert covered(whole, x, y) == []
+    far = replace(observations, table=table.assign(y=case.grid.y[0]))
+    usual = {text.get_text(): text for text in draw_channel(case, site, far).axes[0].texts}
+    assert usual["outlet"].xy[1] == pytest.approx(0.5 * sum(case.grid.y)), "in the middle, where nothing stands"

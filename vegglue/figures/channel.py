@@ -1,5 +1,6 @@
 """The channel as the model sees it, for `vegglue check`: bed, friction classes, plants, boundaries and stations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.patches import Polygon
 
 from vegglue.case.schema import Case
+from vegglue.figures.label_places import HALF_LETTER, HALF_POINT, about_a_patch, along_an_edge, freest
 from vegglue.figures.style import COLOUR, SMALL, canvas, label, save, styled
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth
@@ -42,16 +44,16 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     figure, (whole, *between, across) = canvas(9.4, 7.2 if apart else 5.6, nrows=len(heights), height_ratios=heights)
     for axes in (whole, *between):
         _draw_plan(axes, case, site, observations)
-    _draw_boundaries(whole, case)
     whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: classes, boundaries and stations (not to scale)")
+    _draw_boundaries(whole, case, observations)
     for axes in between:
         whole.axvspan(low, high, fill=False, edgecolor=COLOUR["ink"], linewidth=0.8, linestyle=":")
         axes.set(xlim=reach, title="The reach between the dotted lines")
     nearest = between[0] if between else whole
     nearest.set(xlabel="x [m], flow to the right")
     for patch in case.plants.patches:
-        x, y = corners_of(case, patch).mean(axis=0)
-        label(nearest, x, y, patch.name, ha="center", va="center", xytext=(0, 0))
+        places = about_a_patch(corners_of(case, patch), nearest)
+        _name(nearest, places, patch.name, observations, "ink")
     figure.legend(handles=_legend(case, site, observations), loc="outside lower left", ncols=6, fontsize=SMALL)
     _draw_section(across, case, site, 0.5 * (low + high))
     return figure
@@ -125,14 +127,22 @@ def _draw_stations(axes: Axes, observations: Observations) -> None:
     axes.plot(table["x"][~used], table["y"][~used], "x", markersize=4.5, color=COLOUR["ink"])
 
 
-def _draw_boundaries(axes: Axes, case: Case) -> None:
+def _name(
+    axes: Axes, places: Sequence[tuple[float, float]], text: str, observations: Observations, colour: str
+) -> None:
+    """A text around the one of these places where it covers the fewest stations."""
+    x, y = freest(places, text, axes, observations.table[["x", "y"]].to_numpy(float))
+    label(axes, x, y, text, colour, ha="center", va="center", xytext=(0, 0))
+
+
+def _draw_boundaries(axes: Axes, case: Case, observations: Observations) -> None:
     (west, east), (south, north) = case.grid.x, case.grid.y
     line: dict[str, Any] = {"linewidth": 3.0, "solid_capstyle": "butt", "clip_on": False}
     for name, inflow in case.inflows.items():
         if inflow.side == "west":
             low, high = inflow.range or case.grid.y
             axes.plot([west, west], [low, high], color=COLOUR["model"], **line)
-            label(axes, west, 0.5 * (low + high), name, "model", xytext=(6, 0))
+            _name(axes, along_an_edge(west + _inward(case, name), (low, high)), name, observations, "model")
         else:
             low, high = inflow.range or case.grid.x
             y = south if inflow.side == "south" else north
@@ -140,7 +150,12 @@ def _draw_boundaries(axes: Axes, case: Case) -> None:
             label(axes, 0.5 * (low + high), y, name, "model", xytext=(0, 6 if inflow.side == "south" else -10))
     low, high = case.outlet.range or case.grid.y
     axes.plot([east, east], [low, high], color=COLOUR["model"], **line)
-    label(axes, east, 0.5 * (low + high), "outlet", "model", xytext=(-6, 0), ha="right")
+    _name(axes, along_an_edge(east - _inward(case, "outlet"), (low, high)), "outlet", observations, "model")
+
+
+def _inward(case: Case, text: str) -> float:
+    """How far from an end of the channel the middle of a text lies [m]."""
+    return (HALF_LETTER * (len(text) + 1) + HALF_POINT) * (case.grid.x[1] - case.grid.x[0])
 
 
 def _legend(case: Case, site: Site, observations: Observations) -> list[Line2D | Swatch]:
