@@ -209,3 +209,21 @@ def test_a_frame_in_degrees_is_refused(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "site", frame={"origin": [8.5, 47.4], "angle": 0, "crs": "EPSG:4326"})
     with pytest.raises(InputError, match=r"expected a projected system, with coordinates in metres.*EPSG:4326"):
         import_folder(folder, tmp_path / "site.yaml")
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("stem_diameter_mm", "write stems times diameter [1/m] as `stems_per_m2` of all of them"),
+        ("number_of_stems", "write it over the area of the patch, as `stems_per_m2`"),
+        ("species", None),
+    ],
+)
+def test_what_has_no_key_is_told_with_what_to_write_instead(tmp_path: Path, key: str, said: str | None) -> None:
+    """A diameter was taken as a note, and where else it belongs was not told."""
+    patch = {"x": [16, 20], "y": [0, 1.5], "stems_per_m2": 20}
+    folder = field_folder(tmp_path / "brook", patches=[{**patch, key: 8}])
+    told = assumptions_of(folder)
+    assert any(f"not read: patches[0].{key}" in one for one in told)
+    assert any("has no key" in one or "have no key" in one for one in told) == (said is not None)
+    assert said is None or any(said in one for one in told)

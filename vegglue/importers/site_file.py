@@ -12,7 +12,7 @@ from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import FieldSite
-from vegglue.importers.site_keys import misspelt_key, unread_keys
+from vegglue.importers.site_keys import about_stems, misspelt_key, unread_keys
 
 # What the file of measurements is called that no calibration sees, whatever its ending.
 HELD_OUT = "holdout"
@@ -86,6 +86,7 @@ def left_open(folder: Path) -> list[str]:
         unread.append("channel.bank_slope_v_per_h, as there are walls")
     told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
     told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
+    told += about_stems(unread)
     if (held_out := held_out_file(folder)) is not None and not site.holdout:
         told.append(f"{held_out.name} is not read: {path.name} names no experiment under `holdout`.")
     first, *others = _held_out_files(folder) or [path]

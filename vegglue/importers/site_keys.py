@@ -1,7 +1,7 @@
 """Keys of a site file that nobody reads: notes, or slips of the pen."""
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import BaseModel
@@ -27,11 +27,29 @@ OTHER_WORDS = {
     "canopy_height": "canopy_height_guess_m", "q": "discharge", "width": "bottom_width_m", "slope": "bed_slope",
     "viscosity": "eddy_viscosity_m2_s",
 }  # fmt: skip
+# What takes the place of two things that are usually known of plants.
+THICK_STEMS = (
+    "Diameters of stems have no key: the drag phi = C_d m D h of the densest patch is calibrated, with the diameter D "
+    "in it. Where it differs from patch to patch, write stems times diameter [1/m] as `stems_per_m2` of all of them: "
+    "only their ratio counts. Where you know D, narrow the prior of phi in the config."
+)
+COUNTED_STEMS = "The number of stems in a patch has no key: write it over the area of the patch, as `stems_per_m2`."
 
 
 def unread_keys(given: Any) -> list[str]:
     """The keys of a site file that no reader knows, with where they stand, as in `channel.axis`."""
     return [place + key for place, key, _ in _unread(given)]
+
+
+def about_stems(unread: Sequence[str]) -> list[str]:
+    """What to write instead of keys of a patch that tell how thick its stems are, or how many stand in it."""
+    words = [key.rpartition(".")[2].lower() for key in unread if key.startswith("patches")]
+    told = []
+    if any("diam" in word or "thick" in word for word in words):
+        told.append(THICK_STEMS)
+    if any("stem" in word and ("number" in word or "count" in word) for word in words):
+        told.append(COUNTED_STEMS)
+    return told
 
 
 def misspelt_key(given: Any) -> tuple[str, str] | None:
