@@ -107,3 +107,18 @@ def test_heights_that_are_not_used_are_said(tmp_path: Path, heading: str) -> Non
     case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
     assert case.imported is not None
     assert "3 of velocity, taken for averages over the depth, as few places have several" in case.imported[0].taken
+
+
+@pytest.mark.parametrize(("below", "average"), [(0.54, True), (0.81, False)])
+def test_a_point_at_four_tenths_of_the_depth_is_its_average_and_no_other(
+    tmp_path: Path, below: float, average: bool
+) -> None:
+    """Of a point at a tenth of the depth, where a log law has 0.8 of its average, nothing was to be done."""
+    rows = "".join(f"8;{y};{DEPTH};{below};0.4\n" for y in (-1, 0, 1))
+    table = f"x;y;Water depth;Measurement depth;u\n{rows}"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    assert case.imported is not None
+    taken = case.imported[0].taken
+    assert ("3 of velocity, at about 0.4 of the depth above the bed, and so taken for averages" in taken) == average
+    assert ("correct others, or state errors that hold the difference" in taken) != average
+    assert read_observations(case).table["value"].tolist() == [0.4, 0.4, 0.4]

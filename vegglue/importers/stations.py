@@ -27,6 +27,13 @@ from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
 VERTICALS = 0.2
+# Height of a point over the depth at which a log law has its average [-], the rule of 0.6 below the surface; and how
+# near that is near enough: it moves the velocity of a log law by 2 %.
+OF_AVERAGE, NEAR_AVERAGE = 0.4, 0.05
+NOT_AVERAGES = (
+    "they are that about 0.4 of the depth above the bed only, and not among plants; correct others, or state errors "
+    "that hold the difference"
+)
 # By how much verticals are moved to the line of their section before it is said [m].
 NEAR_LINE = 0.01
 # Names of a column that a message lists.
@@ -180,11 +187,15 @@ def _in_verticals(taken: MeasuredRows) -> bool:
 
 
 def _at_one_height(taken: MeasuredRows) -> tuple[str, ...]:
-    """That heights of velocities are not used, where few places have several."""
+    """That heights of velocities are not used, where few places have several; and what that asks of them."""
     role = vertical_role(taken)
     if role is None or "u" not in taken.numbers or not np.isfinite(taken.numbers[role]).any():
         return ()
-    return (f"taken for averages over the depth, as few places have several heights ({role} not used)",)
+    if role == "height" and "depth" in taken.numbers:
+        share = taken.numbers[role] / taken.numbers["depth"]
+        if (np.abs(share[np.isfinite(share)] - OF_AVERAGE) < NEAR_AVERAGE).all():
+            return (f"at about {OF_AVERAGE:g} of the depth above the bed, and so taken for averages over the depth",)
+    return (f"taken for averages over the depth, as few places have several heights ({role} not used): {NOT_AVERAGES}",)
 
 
 def _places(taken: MeasuredRows) -> list[PlaceKey]:
