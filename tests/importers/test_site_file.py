@@ -227,3 +227,10 @@ def test_what_has_no_key_is_told_with_what_to_write_instead(tmp_path: Path, key:
     assert any(f"not read: patches[0].{key}" in one for one in told)
     assert any("has no key" in one or "have no key" in one for one in told) == (said is not None)
     assert said is None or any(said in one for one in told)
+
+
+def test_a_missing_level_is_asked_for_by_its_short_name(tmp_path: Path) -> None:
+    """`downstream_level_m` was asked for of a file that says `discharge: 600 l/s`."""
+    folder = field_folder(tmp_path / "brook", experiments={"low": {"discharge": "600 l/s"}})
+    with pytest.raises(InputError, match=r"`experiments\.low\.level` is missing; add it"):
+        read_site(folder / "site.json")

@@ -12,7 +12,7 @@ from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import FieldSite
-from vegglue.importers.site_keys import about_stems, misspelt_key, unread_keys
+from vegglue.importers.site_keys import OF_FLOW, about_stems, misspelt_key, unread_keys
 
 # What the file of measurements is called that no calibration sees, whatever its ending.
 HELD_OUT = "holdout"
@@ -108,11 +108,18 @@ def _given(path: Path) -> Any:
         raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
 
 
+def _by_short_name(place: str) -> str:
+    """`experiments.May.level` of `experiments.May.downstream_level_m`: as it may be written with a unit of its own."""
+    short = {long: name for name, long in OF_FLOW}
+    before, dot, last = place.rpartition(".")
+    return f"{before}{dot}{short.get(last, last)}"
+
+
 def _sentence(error: ValidationError) -> str:
     problem = error.errors()[0]
     place = dotted(tuple(key for key in problem["loc"] if key != "[key]")) or "site.json"
     if problem["type"] == "missing":
-        return f"`{place}` is missing; add it."
+        return f"`{_by_short_name(place)}` is missing; add it."
     expected = expected_in_words(problem)
     for said, meant in (("valid number", "number"), ("valid string", "text in quotes")):
         expected = expected.replace(said, meant)
