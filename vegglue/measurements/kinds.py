@@ -4,7 +4,7 @@ A new kind is one entry here, its reader in `flow/readers.py`, and roles of its 
 for files that are imported; `adv` in a case is a way of reading that yields velocities, no kind of its own.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -111,12 +111,21 @@ def unstated_errors(station: pd.DataFrame) -> str | None:
     if bare.empty:
         return None
     kinds = [(kind_of(str(name)), int(count)) for name, count in bare.groupby("kind", sort=False).size().items()]
+    known = set(used.loc[used["standard_error"].to_numpy(float) > 0, "kind"])
     one = kinds[0][0]
     first = f"x = {bare['x'].iloc[0]:g}, y = {bare['y'].iloc[0]:g} m"
     return (
         f"no standard error is stated for {listed([f'{count} of {kind.words}' for kind, count in kinds])}, "
-        f"the first at {first}: add "
-        f"{listed([f'a column `{kind.error_column}`' for kind, _ in kinds])}, or say it in the site "
-        f"file, as in `files: {{NAME.csv: {{standard_error: {one.usual_error:g} {one.unit}}}}}`; in a config, as "
+        f"the first at {first}: "
+        f"{_where_to_state([kind for kind, _ in kinds], known)}, or say it in the site file, as in "
+        f"`files: {{NAME.csv: {{standard_error: {one.usual_error:g} {one.unit}}}}}`; in a config, as "
         "`standard_error` of the observation."
     )
+
+
+def _where_to_state(kinds: Sequence[Kind], known: Collection[str]) -> str:
+    """`give `u_se` there, too, and add a column `v_se``; known: kinds of which others state their errors."""
+    empty = [f"`{kind.error_column}`" for kind in kinds if kind.name in known]
+    lacking = [f"a column `{kind.error_column}`" for kind in kinds if kind.name not in known]
+    filled = [f"give {listed(empty)} there, too"] if empty else []
+    return ", and ".join([*filled, *([f"add {listed(lacking)}"] if lacking else [])])
