@@ -118,3 +118,13 @@ def test_repeats_far_beyond_their_stated_errors_are_told(tmp_path: Path) -> None
             "2 repeats averaged, which differ by 20 times their stated errors at x = 8, y = 1 m: see whether they are"
         )
         assert (said in case.imported[0].taken) == told
+
+
+@pytest.mark.parametrize(("again", "copied"), [("0.40", True), ("0.43", False)])
+def test_a_station_written_twice_is_told_with_its_place(tmp_path: Path, again: str, copied: bool) -> None:
+    """`1 repeats averaged` stood in the line, and not where."""
+    table = f"x,y,u,u_se\n8,1,0.40,0.02\n20,1,0.5,0.02\n8,1,{again},0.02\n"
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
+    assert case.imported is not None
+    assert "2 of velocity, 1 repeat averaged at x = 8, y = 1 m" in case.imported[0].taken
+    assert ("take the row out if it was written twice" in case.imported[0].taken) == copied

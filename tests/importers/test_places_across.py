@@ -34,7 +34,7 @@ def test_repeats_on_the_axis_are_averaged_and_it_is_said(tmp_path: Path, table: 
     found = read_observations(case).table
     assert found["y"].tolist() == [0.0] * len(found)
     assert case.imported is not None
-    assert "1 repeats averaged, too few" in case.imported[0].taken
+    assert "1 repeat averaged at x = 10, y = 0 m, too few" in case.imported[0].taken
     assert "y = 0 for want of a column" in case.imported[0].taken
 
 

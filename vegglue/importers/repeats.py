@@ -54,7 +54,15 @@ def said_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> st
     too_few = f", too few for a standard error: {LEAST_OF_FILE} are needed" if 0 < freedom < LEAST_OF_FILE else ""
     tau = _in_a_row(unstated)
     alike = f", {tau:.2g} in a row as one, as neighbours are alike" if tau > 1.0 else ""
-    return (f", {repeats} repeats averaged{alike}" if repeats else "") + too_few + _beyond_errors(gathered)
+    averaged = _single(gathered) if repeats == 1 else f", {repeats} repeats averaged{alike}" if repeats else ""
+    return averaged + too_few + _beyond_errors(gathered)
+
+
+def _single(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
+    """Where the only repeat is, and what to do if it is a row that was written twice."""
+    (place, values), *_ = ((place, values) for place, values in gathered.items() if len(values) > 1)
+    copied = " (the same value: take the row out if it was written twice)" if values[0][0] == values[1][0] else ""
+    return f", 1 repeat averaged at x = {place[2]:g}, y = {place[3]:g} m{copied}"
 
 
 def _beyond_errors(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
