@@ -234,3 +234,24 @@ def test_a_missing_level_is_asked_for_by_its_short_name(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "brook", experiments={"low": {"discharge": "600 l/s"}})
     with pytest.raises(InputError, match=r"`experiments\.low\.level` is missing; add it"):
         read_site(folder / "site.json")
+
+
+@pytest.mark.parametrize(
+    ("y", "said"),
+    [
+        ([0, 2, 1, 2], "expected two numbers (with a decimal point, as a comma parts them), got [0, 2, 1, 2]"),
+        (0.2, "expected a list of values in square brackets, got 0.2"),
+    ],
+)
+def test_no_type_of_a_language_is_named(tmp_path: Path, y: object, said: str) -> None:
+    """`[0,2, 1,2]` was answered with `Tuple should have at most 2 items after validation, not 4`."""
+    folder = field_folder(tmp_path / "brook", patches=[{"x": [16, 20], "y": y}])
+    with pytest.raises(InputError) as raised:
+        read_site(folder / "site.json")
+    assert f"site.json: `patches[0].y` {said}" in str(raised.value)
+
+
+def test_a_file_in_place_of_a_folder_is_called_a_file(tmp_path: Path) -> None:
+    table = field_folder(tmp_path / "brook") / "velocities.csv"
+    with pytest.raises(InputError, match=r"expected a folder with site\.yaml, .* got a file;"):
+        read_site(site_file(table))

@@ -12,6 +12,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name
 
 MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
+OF_A_PAIR = 2  # numbers in a range, or in a place
 KeyPath = tuple[str | int, ...]
 
 
@@ -46,6 +47,10 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
 
 def expected_in_words(problem: Mapping[str, Any]) -> str:
     """What one of pydantic's problems says was expected, without its opening words and the names of our types."""
+    if problem["type"] == "too_long" and problem["ctx"]["max_length"] == OF_A_PAIR:
+        return "two numbers (with a decimal point, as a comma parts them)"
+    if problem["type"] == "tuple_type":
+        return "a list of values in square brackets"
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 

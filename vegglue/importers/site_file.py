@@ -36,7 +36,7 @@ def _held_out_files(folder: Path) -> list[Path]:
 def read_site(path: Path) -> FieldSite:
     """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
     if not path.exists():
-        what = "none in it" if path.parent.is_dir() else "no such folder"
+        what = "none in it" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"
         raise InputError(
             f"{shown_path(path.parent)}: expected a folder with site.yaml, or site.json, and tables of measurements, "
             f"got {what}; `vegglue new NAME` makes one to begin with."
