@@ -67,6 +67,7 @@ def main() -> None:
     whole(case)
     whole(on_grid(case, (300.0, 471.0), (0.5, 0.375)))
     sizes(case)
+    second_core()
     cores(case)
     loop.main()
     scale.spread()
@@ -274,6 +275,32 @@ def cores(case) -> None:  # type: ignore[no-untyped-def]
             spent.append(time.perf_counter() - began)
     gain = spent[0] / spent[1]
     print(f"{members} members: {spent[0]:.0f} s with one job, {spent[1]:.0f} s with two: {gain:.2f} times faster")
+
+
+def second_core() -> None:
+    """What a second process adds on this machine at most: to products in cache, and to sums through memory."""
+    gains = []
+    with Parallel(n_jobs=2) as pool:
+        for work in (products_in_cache, sums_through_memory):
+            pool(delayed(work)() for _ in range(2))
+            alone = shortest(lambda: pool([delayed(work)()]))  # noqa: B023
+            gains.append(2.0 * alone / shortest(lambda: pool(delayed(work)() for _ in range(2))))  # noqa: B023
+    print(
+        f"a second process: {gains[0]:.2f} times as many products in cache, {gains[1]:.2f} times as many sums in memory"
+    )
+
+
+def products_in_cache() -> None:
+    block = np.ones((96, 96))
+    for _ in range(10_000):
+        block @ block
+
+
+def sums_through_memory() -> None:
+    values = np.ones(4_000_000)
+    total = values.copy()
+    for _ in range(100):
+        np.add(values, 1.0, out=total)
 
 
 if __name__ == "__main__":
