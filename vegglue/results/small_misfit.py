@@ -32,15 +32,16 @@ def _likely(chi2: float, freedom: int) -> str:
 
 def small_misfit_in_short(chi2: float, freedom: int) -> str:
     """`chi2 is only 0.41 times its degrees of freedom: ...`, '' of a misfit that is not too small."""
-    if not is_too_small(chi2, freedom):
-        return ""
-    return f"chi2 is only {in_digits(chi2 / freedom, 2)} times its degrees of freedom: {_likely(chi2, freedom)}."
+    return f"{_size(chi2, freedom)}: {_likely(chi2, freedom)}." if is_too_small(chi2, freedom) else ""
 
 
 def small_misfit_in_words(chi2: float, freedom: int) -> str:
     """The same with how seldom chance makes it, and what to do."""
-    short, rare = (
-        small_misfit_in_short(chi2, freedom),
-        f", less than chance makes it once in {1.0 / TOO_SMALL:,.0f} times:",
-    )
-    return f"{short.removesuffix('.').replace(':', rare, 1)}; {CHECK_ERRORS}." if short else ""
+    if not is_too_small(chi2, freedom):
+        return ""
+    seldom = f"less than chance makes it once in {1.0 / TOO_SMALL:,.0f} times"
+    return f"{_size(chi2, freedom)}, {seldom}: {why_too_small(chi2, freedom)}."
+
+
+def _size(chi2: float, freedom: int) -> str:
+    return f"chi2 is only {in_digits(chi2 / freedom, 2)} times its degrees of freedom"
