@@ -15,7 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from itertools import count
 from multiprocessing import resource_tracker
@@ -165,6 +165,24 @@ def _shared_out(
     for one in others:
         one.result()  # raises what a task raised
     return found
+
+
+def begun(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
+    """work(*task) by a thread that `at_most` has to spare, else when it is asked for; what is returned waits for it."""
+    spare = _SPARE.get()
+    if spare is None or not spare.acquire(blocking=False):
+        return partial(work, *task)
+
+    def by_another() -> Any:
+        try:
+            return work(*task)
+        finally:
+            spare.release()
+
+    pool = ThreadPoolExecutor(1)
+    found = pool.submit(copy_context().run, by_another)
+    pool.shutdown(wait=False)
+    return found.result
 
 
 @lru_cache(maxsize=1)

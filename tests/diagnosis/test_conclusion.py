@@ -50,7 +50,7 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
     for name, stub in stubs.items():
         monkeypatch.setattr(conclusion, name, stub)
     held = Findings(places=(a_location(),), undecided=Undecided((), ()))
-    found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None)
+    found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None, lambda: None)
     assert judged == [(first, Findings())]  # what competed beside the place was told beside the law
     assert (found.places, found.suspects) == ((), (tested[True],))
 

@@ -1,6 +1,7 @@
 """Laws beside everything listed: their alarm, what they are compared with, and what a diagnosis says of them."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,7 @@ from vegglue.case.config import load_case
 from vegglue.diagnosis import unlisted_laws
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.findings import Charge, Findings
-from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_suspected
+from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_beside, laws_suspected
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import Step
@@ -39,7 +40,7 @@ def suspected(
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
     base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
     last: Any = SimpleNamespace(base=base, flagged=(), fingerprints=None, kinds=kinds)
-    return laws_suspected(last, last, found)
+    return laws_suspected(last, last, found, partial(laws_beside, last))
 
 
 def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,7 +57,7 @@ def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.Mo
     last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None))),
                                 fingerprints=None)  # fmt: skip
     monkeypatch.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
-    assert laws_suspected(last, last, Findings()) is None
+    assert laws_suspected(last, last, Findings(), partial(laws_beside, last)) is None
 
 
 def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,6 @@
 """What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +41,7 @@ from vegglue.results.diagnosis import (
 )
 from vegglue.screening import score_test
 from vegglue.screening.evidence import kind_named
+from vegglue.screening.law_screening import LawScreening
 from vegglue.screening.residual_screening import Screening
 from vegglue.site.channel_geometry import half_width
 from vegglue.version import VERSION
@@ -61,10 +62,15 @@ ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
 
 def concluded(
-    first: Screening, last: Screening, found: Findings, suspects: Mapping[str, Suspect], unseen: Model | None
+    first: Screening,
+    last: Screening,
+    found: Findings,
+    suspects: Mapping[str, Suspect],
+    unseen: Model | None,
+    laws_beside_first: Callable[[], LawScreening | None],
 ) -> Diagnosis:
     """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
-    laws = laws_suspected(first, last, found)
+    laws = laws_suspected(first, last, found, laws_beside_first)
     if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), charges=(), of_shape=0.0, undecided=None)

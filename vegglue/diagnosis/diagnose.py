@@ -9,6 +9,7 @@ and from the last screening.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -37,12 +38,13 @@ from vegglue.diagnosis.rivals import (
 )
 from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
+from vegglue.diagnosis.unlisted_laws import laws_beside
 from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.measurements.suspicious_values import absurd_values
-from vegglue.parallel import in_threads
+from vegglue.parallel import begun, in_threads
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
 from vegglue.screening.candidates import candidate_in_case
@@ -80,6 +82,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)
     found, suspects = Findings(absurd=absurd), dict[str, Suspect]()
+    laws = partial(laws_beside, first) if absurd else begun(laws_beside, first)
     while True:
         tested = suspects_of(screening)
         suspects = tested | _kept(suspects, tested)
@@ -104,7 +107,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         screening = at_hand or screen(base, found.flagged)
         for step in found.steps:
             suspects[step.accepted] = _in_model(suspects[step.accepted], screening.base)
-    return concluded(first, screening, found, suspects, unseen)
+    return concluded(first, screening, found, suspects, unseen, laws)
 
 
 def _calibrated_unless_absurd(model: Model, absurd: Sequence[str]) -> Baseline:

@@ -6,6 +6,8 @@ They have an alarm of their own, which is asked after that of everything listed:
 listed effect that was accepted they are told where they clearly explain more.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from vegglue.calibration.baseline import log_evidence
@@ -21,18 +23,26 @@ from vegglue.screening.residual_screening import Screening
 LAW_ALARMS, LAWS_HELD = 0.01, 0.95
 
 
-def laws_suspected(first: Screening, last: Screening, found: Findings) -> LawsSuspected | None:
+def laws_beside(screening: Screening) -> LawScreening | None:
+    """Laws screened beside all that is listed; None where none can be told: `discover` refuses a command."""
+    if screening.base.model.case.engine is not None:
+        return None
+    traces = law_fingerprints(screening.base, (), screening.fingerprints)
+    return screen_laws(screening.base, traces, screening.flagged) if traces.laws else None
+
+
+def laws_suspected(
+    first: Screening, last: Screening, found: Findings, beside_first: Callable[[], LawScreening | None]
+) -> LawsSuspected | None:
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
     errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
+
+    beside_first: `laws_beside` the first screening, begun before it is known whether it is asked for.
     """
-    if found.absurd or last.base.model.case.engine is not None:  # `discover` refuses a command
+    if found.absurd:
         return None
-    at = first if found.accepted else last
-    traces = law_fingerprints(at.base, (), at.fingerprints)
-    if not traces.laws:
-        return None
-    screening = screen_laws(at.base, traces, at.flagged)
-    if screening.p >= LAW_ALARMS:
+    screening = beside_first() if found.accepted or last is first else laws_beside(last)
+    if screening is None or screening.p >= LAW_ALARMS:
         return None
     of_laws = screening.of_each
     chances = tempered_chances(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
