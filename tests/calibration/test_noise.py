@@ -106,7 +106,7 @@ def test_correlation_is_found_beside_missing_physics(rho: float) -> None:
     for _ in range(6):
         missing = physics @ random.standard_normal(physics.shape[1]) * 0.03
         left = correlated(rho, random) + missing
-        noise = estimate_noise(noise_of(stations()), left, physics)
+        noise = estimate_noise(noise_of(stations()), left, physics @ physics.T)
         found.append(noise.correlation)
         assert noise.scale < 1.3, "missing physics is not taken for noise"
     assert np.mean(found) == pytest.approx(rho, abs=0.12)
@@ -118,7 +118,7 @@ def test_errors_smaller_than_allowed_do_not_look_correlated(rho: float, grid: fl
     """Half of the stated errors, and an error of the grid (m/s) that is not there."""
     random, physics = np.random.default_rng(11), smooth()
     wary = with_grid_error(noise_of(stations()), np.full(SECTIONS * STATIONS, grid))
-    found = [estimate_noise(wary, correlated(rho, random, error=0.005), physics) for _ in range(6)]
+    found = [estimate_noise(wary, correlated(rho, random, error=0.005), physics @ physics.T) for _ in range(6)]
     assert np.mean([one.correlation for one in found]) == pytest.approx(rho, abs=0.15)
     assert [one.scale for one in found] == [1.0] * 6, "errors are never taken as smaller than stated"
 
@@ -126,7 +126,7 @@ def test_errors_smaller_than_allowed_do_not_look_correlated(rho: float, grid: fl
 def test_what_a_section_shows_by_chance_is_no_correlation() -> None:
     """Of independent errors the best correlation is seldom zero, and seldom likelier than none."""
     random, physics = np.random.default_rng(12), np.zeros((SECTIONS * STATIONS, 1))
-    found = [estimate_noise(noise_of(stations()), correlated(0.0, random), physics) for _ in range(10)]
+    found = [estimate_noise(noise_of(stations()), correlated(0.0, random), physics @ physics.T) for _ in range(10)]
     assert sum(one.correlation > 0.0 for one in found) <= 1
     assert all(one.correlation_chances[1, 1:].sum() > 0.0 for one in found), "it is doubted all the same"
 
@@ -134,7 +134,7 @@ def test_what_a_section_shows_by_chance_is_no_correlation() -> None:
 def test_one_reading_a_section_tells_nothing_of_neighbours() -> None:
     """However alike the readings are."""
     alone = stations()[:6].assign(section=list("abcdef"), x=10.0 * np.arange(6))
-    noise = estimate_noise(noise_of(alone), np.full(6, 0.02), np.zeros((6, 1)))
+    noise = estimate_noise(noise_of(alone), np.full(6, 0.02), np.zeros((6, 6)))
     assert noise.correlation == 0.0
     assert noise.correlation_chances.tolist() == [[0.0], [1.0]]
 
@@ -142,7 +142,7 @@ def test_one_reading_a_section_tells_nothing_of_neighbours() -> None:
 def test_stated_errors_that_are_far_too_small_are_scaled() -> None:
     random = np.random.default_rng(6)
     left = correlated(0.0, random, error=0.02)
-    noise = estimate_noise(noise_of(stations(0.01)), left, smooth())
+    noise = estimate_noise(noise_of(stations(0.01)), left, smooth() @ smooth().T)
     assert noise.scale == pytest.approx(2.0, rel=0.2)
 
 
@@ -206,7 +206,7 @@ def test_doubt_about_the_correlation_keeps_alarms_rare() -> None:
     alarms = {"known": 0, "doubted": 0}
     for _ in range(TRIES):
         left = correlated(0.6, random)
-        noise = estimate_noise(noise_of(stations()), left, physics)
+        noise = estimate_noise(noise_of(stations()), left, physics @ physics.T)
         white = noise.whiten(traces)
         score = np.abs(noise.whiten(left) @ white / np.linalg.norm(white, axis=0)).max()
         certain = with_correlation(noise, noise.correlation, noise.scale)

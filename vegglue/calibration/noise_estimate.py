@@ -27,20 +27,20 @@ LEVEL_STEP, UNCORRELATED_CHANCE = 0.05, 0.5
 CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
 
 
-def estimate_noise(noise: Noise, residual: Array, systematic: Array) -> Noise:
+def estimate_noise(noise: Noise, residual: Array, gram: Array) -> Noise:
     """rho and s of the errors by maximum likelihood of the residual r (n,), measured minus predicted.
 
         r ~ N(0, cov(rho, s) + t^2 F F')
 
-    systematic: F (n, k), changes of the predictions that calibration and missing effects could make, each of plausible
-    size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only when
-    the likelihood rejects the stated errors at 1 %, and is never below 1.
+    gram: F F' (n, n), F (n, k) changes of the predictions that calibration and missing effects could make, each of
+    plausible size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1
+    only when the likelihood rejects the stated errors at 1 %, and is never below 1.
 
     Errors that are smaller than stated look correlated where s is 1: a covariance with rho near 1 expects smaller
     differences. So the chances of each rho are those of the s that fits best, where this is below 1; rho is the median
     of these chances, 0 unless some correlation is likelier than none.
     """
-    deviance, neighbours = _deviance_of(noise, residual, systematic), _has_neighbours(noise)
+    deviance, neighbours = _deviance_of(noise, residual, gram), _has_neighbours(noise)
     correlations = [[0.0], START_CORRELATIONS] if neighbours else [[0.0]]
     fits = in_threads(partial(_likeliest, deviance), itertools.product(correlations, [False, True]))
     (stated_without, free_without), (stated, free) = fits[:2], fits[-2:]
@@ -94,9 +94,8 @@ def _has_neighbours(noise: Noise) -> bool:
     return bool((np.isfinite(noise.separation) & ~np.eye(noise.rows.size, dtype=bool)).any())
 
 
-def _deviance_of(noise: Noise, residual: Array, systematic: Array) -> Callable[[float, float, float], float]:
+def _deviance_of(noise: Noise, residual: Array, gram: Array) -> Callable[[float, float, float], float]:
     """-2 ln likelihood (rho, s, ln t) up to a constant; infinite where t is so large that nothing can be factored."""
-    gram = systematic @ systematic.T
     known = covariance_of(replace(noise, scale=0.0))
     variance = np.outer(noise.error, noise.error)
     # Few pairs of stations share a section: a power of all distances took more time than the factors.

@@ -206,13 +206,14 @@ def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z
     """
     slope, changes = used
     systematic = np.hstack([slope, changes])
-    first = estimate_noise(noise, residual, systematic)
+    gram = systematic @ systematic.T
+    first = estimate_noise(noise, residual, gram)
     projected = score_test.project(first.whiten(slope), first.whiten(residual), z, first.whiten(systematic))
-    best = int(np.argmax((projected.units.T @ projected.residual) ** 2))
-    column = systematic[:, best : best + 1]
+    best = int(np.argmax(projected.score**2))
+    column = systematic[:, best]
     whole = float(np.linalg.norm(first.whiten(column)))
     free = min(FREE_SIZE / max(float(projected.length[best]), 1e-300), LONGEST_FREE / max(whole, 1e-300))
-    return estimate_noise(first, residual, np.hstack([systematic, free * column]))
+    return estimate_noise(first, residual, gram + np.outer(free * column, free * column))
 
 
 def refit_start(screening: Screening, candidate: int, column: int) -> Array:

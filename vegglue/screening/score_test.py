@@ -39,6 +39,11 @@ class Projected:
         """S_perp / |S_perp| (rows, c)."""
         return self.fingerprints / np.maximum(self.length, 1e-300)
 
+    @property
+    def score(self) -> Array:
+        """T (c,) [standard errors], of either sign; made without units, which are as large as the fingerprints."""
+        return np.asarray((self.fingerprints.T @ self.residual) / np.maximum(self.length, 1e-300))
+
 
 def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Projected:
     """(I - P) [r; -z] and (I - P) [S; 0], P onto [J; 1]: J (n, p), r (n,) and S (n, c) whitened, z (p,)."""
@@ -54,7 +59,7 @@ def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Pr
 
 def scores(projected: Projected, only_sign: np.ndarray) -> Array:
     """T = S_perp' r / |S_perp| (c,); 0 where an effect that only has one sign would need the other."""
-    return _signed(projected.units.T @ projected.residual, only_sign)
+    return _signed(projected.score, only_sign)
 
 
 def null_draws(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Array:
@@ -73,7 +78,7 @@ def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping
     allowed {L: (2, c)}: whether it may have either sign at that length; n_jL: number of fingerprints and signs of its
     family that are allowed. All families with any allowed are as likely before (Bayes).
     """
-    score = projected.units.T @ projected.residual
+    score = projected.score
     signed, highest = np.stack([score, -score]), float(np.abs(score).max(initial=0.0))
     most = max(length * highest - 0.5 * length**2 for length in allowed)
     chance = np.zeros(score.size)
