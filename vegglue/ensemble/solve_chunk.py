@@ -32,12 +32,12 @@ StartFrom = Mapping[str, LinearisedMember | None]
 def linearised_medians(case: Case, site: Site) -> StartFrom:
     """Of every experiment, the member at the medians of all priors; None where it had to be marched."""
     parameters, tolerance = len(case.parameters), case.numerics.tolerance
-    return {
-        experiment: linearised_median(
-            partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case)
-        )
-        for experiment in case.experiments
-    }
+
+    def median_in(experiment: str) -> LinearisedMember | None:
+        return linearised_median(partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case))
+
+    found = in_threads(median_in, [(experiment,) for experiment in case.experiments])
+    return dict(zip(case.experiments, found, strict=True))
 
 
 def solve_chunk(
