@@ -43,7 +43,10 @@ def test_that_no_measurement_is_proposed_claims_no_more_than_was_weighed(capsys:
     """`no rivals` stood below a verdict with `or else something in no list ... (8%)`, which is not asked about."""
     show_questions("brook", [])
     said = " ".join(capsys.readouterr().out.split())
-    assert "no two listed effects to be told apart, and what is in no list is weighed only where it is likelier" in said
+    assert (
+        "no two listed effects are left to be told apart, and what is in no list is weighed only where it is likelier"
+        in said
+    )
 
 
 def test_what_a_run_found_is_a_short_line_each() -> None:

@@ -69,7 +69,8 @@ def off(cleared: bool) -> Diagnosis:
          "More may be missing, but an instrument is off: one reading"),
         (replace(EVERY_KIND, field=None), "else is missing from this model that is in no list: water that enters"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "more drag by 0.40 1/m at x = 33.0 m, y = −0.6 m"),
-        (replace(EVERY_KIND, steps=(), field=None, places=(), verdict=replace(EVERY_KIND.verdict, kind="cannot-tell")),
+        (replace(EVERY_KIND, steps=(), field=None, places=(),
+                 verdict=replace(EVERY_KIND.verdict, kind="cannot-tell", tells_laws=True)),
          "these data cannot tell; the likeliest, with a chance of 75 %, is a law of the speed in friction of the"),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "Say `this`."}), "Say this."),
         (a_diagnosis(verdict={"kind": "cannot-tell", "sentence": "I cannot tell <it>."}), "cannot tell &lt;it&gt;."),
@@ -203,6 +204,25 @@ def test_what_is_found_with_doubtful_measurements_is_folded_and_says_so(toy: Run
     assert "found with the measurements as they stand" in section.condition
     assert section.suspects == []
     assert sorted(one.name for one in section.other_suspects) == sorted(one.name for one in sound.suspects)
+
+
+def test_a_law_is_not_the_likeliest_where_another_cause_is_told_before_it(toy: Run) -> None:
+    """The page began with a law of 6 %, and left out the place of 79 % that its diagnosis told."""
+    sentence = "These data cannot tell: it may be something in no list (79%) or eddies (8%), but none of them surely."
+    undecided = replace(NOTHING.verdict, kind="cannot-tell", sentence=sentence)
+    found = replace(NOTHING, laws=laws_suspected_of("law_bank_speed_step"), verdict=undecided)
+    page = replace(toy, diagnosis=found)
+    assert plain(headline(page)).startswith(sentence[:-1])
+    assert "discover" not in "".join(next_steps(page))
+    told = replace(found, verdict=replace(undecided, tells_laws=True))
+    assert "the likeliest, with a chance of 50" in plain(headline(replace(toy, diagnosis=told)))
+
+
+def test_a_last_model_that_lacks_more_says_how_to_go_on(toy: Run) -> None:
+    loop = LoopResults(ladder=_ending_with(toy), questions=())
+    steps = list(map(plain, next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))))
+    assert "vegglue extend toy.yaml --auto adds what this model still lacks, and shows the error fall." in steps[0]
+    assert "No measurement is proposed: no two listed effects are left to be told apart." in steps
 
 
 def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:

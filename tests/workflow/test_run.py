@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -76,8 +77,8 @@ def gone(
     kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch, laws: LawsSuspected | None = None
 ) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
-    found = a_diagnosis(verdict={"kind": kind})
-    found = SimpleNamespace(verdict=found.verdict, places=found.places[:1] * places, laws=laws)
+    found = a_diagnosis(verdict={"kind": kind, "tells_laws": laws is not None})
+    found = replace(found, places=found.places[:1] * places, laws=laws)
     rungs = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
     alone = SimpleNamespace(rungs=(TWIN.name,), left_out=None)
     made, shown, kept = list[str](), list[str](), list[str]()

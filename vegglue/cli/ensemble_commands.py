@@ -1,6 +1,6 @@
 """The shell of the ensemble: check, simulate, infer, report; and run, which goes the whole way."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 import typer
@@ -9,8 +9,9 @@ import vegglue
 from vegglue.cli.doubts import opened_case
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
-from vegglue.cli.output import print_object
+from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
+from vegglue.errors import shown_path
 from vegglue.in_short import without_asides
 
 
@@ -121,6 +122,8 @@ def run_command(
         print_object(run_object(runs, results))
     else:  # what was found scrolled by, with all that was done after it
         print("\n".join(["In short:", *(f"- {line}" for line in _in_short(extension, results))]))
+        for following in _left_to_add(results):
+            print(f"Next: {command_line('extend', following, '--auto', runs=runs, trust=trust)}")
 
 
 def _in_short(extension: Any, results: Sequence[tuple[Any, Any]]) -> list[str]:
@@ -134,6 +137,16 @@ def _in_short(extension: Any, results: Sequence[tuple[Any, Any]]) -> list[str]:
     at_bounds = [ends_at_bounds(result, PLAIN_TEXT) for _, result in results if isinstance(result, Posterior)][-1:]
     lines = [extension.sentence, extension.reason, *laws, *_of_the_last(results), *at_bounds]
     return [without_asides(line) for line in lines if line]
+
+
+def _left_to_add(results: Sequence[tuple[Any, Any]]) -> Iterator[str]:
+    """The last config, where it is another than the first and its diagnosis found more."""
+    from vegglue.results.diagnosis import Diagnosis
+
+    diagnosed = [(of, one) for of, one in results if isinstance(one, Diagnosis)]
+    last, found = diagnosed[-1]
+    if last.name != diagnosed[0][0].name and (found.steps or found.places):
+        yield shown_path(last.source)
 
 
 def _of_the_last(results: Sequence[tuple[Any, Any]]) -> list[str]:

@@ -165,9 +165,9 @@ def show_questions(name: str, found: Sequence[Question]) -> None:
     """For each question about a model the four best measurements, or why none would do."""
     if not found:
         console().print(
-            f"{name}: no measurement is proposed; its diagnosis asks for those there are to be mended first, or leaves "
-            "no two listed effects to be told apart, and what is in no list is weighed only where it is likelier than "
-            "they are."
+            f"{name}: no measurement is proposed: no two listed effects are left to be told apart, and what is in no "
+            "list is weighed only where it is likelier than they are; or those there are have to be mended first, "
+            "which its diagnosis says."
         )
     for question in found:
         console().print(repr(question))

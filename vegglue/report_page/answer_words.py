@@ -83,7 +83,7 @@ def _verdict_in_short(found: Diagnosis, model: str, tense: str) -> str:
         return f"Something {tense} missing from {model} that is in no list: {_law_in_words(found)}."
     if kind in ("identified", "one-of", "none-of-these"):
         return _what_is_missing(found, model, tense)
-    if kind == "cannot-tell" and found.laws is not None and not (found.steps or found.places):
+    if kind == "cannot-tell" and found.laws is not None and found.verdict.tells_laws:
         best, chance = found.laws.laws[0], percent(sum(one.chance for one in found.laws.alike))
         law = html.escape(f"a law of {best.quantity} in {best.term}")
         return (

@@ -70,7 +70,7 @@ def against_measurement_error(posterior: Posterior, kind: str, miss: float) -> s
         return f", {short(miss / error, 2)} times the measurement error of {with_unit(error, kind)}"
     if miss > error and _misfit_below(posterior, DOUBTED):
         return f", which the measurement error of {with_unit(error, kind)} hardly explains"
-    less = "far less" if _misfit_too_small(posterior) else "no more"
+    less = "far less" if miss < error and _misfit_too_small(posterior) else "no more"
     return f", {less} than the measurement error of {with_unit(error, kind)} explains"
 
 

@@ -34,16 +34,22 @@ def _better_model(run: Run) -> Iterator[str]:
     assert found is not None
     if found.verdict.doubts_the_data:
         return
-    if (run.diagnosis or found).laws is not None and (ladder is None or ladder.steps[-1].name == run.case.name):
+    if (run.diagnosis or found).law_stands_out and (ladder is None or ladder.steps[-1].name == run.case.name):
         yield f"{command_about(run, 'discover')} calibrates laws that are in no list, and writes the best."
     if ladder is None:
         if found.steps or found.places:
             yield f"{command_about(run, 'extend', '--auto')} adds what is missing, and shows the error fall."
         return
+    if run.diagnosis is not None and ladder.steps[-1].name == run.case.name and _asks_for_more(run.diagnosis):
+        yield f"{command_about(run, 'extend', '--auto')} adds what this model still lacks, and shows the error fall."
     if len(ladder.steps) > 1 and ladder.steps[-1].name != run.case.name:
         yield f"Go on with the model that has it: {_page_of(run, ladder.steps[-1])}."
     elif len(ladder.steps) > 1 and ladder.steps[0].name in run.loop.pages:
         yield f"Compare with the model without it: {_page_of(run, ladder.steps[0])}."
+
+
+def _asks_for_more(found: Diagnosis) -> bool:
+    return bool(found.steps or found.places)
 
 
 def _page_of(run: Run, step: LadderStep) -> str:
@@ -88,6 +94,8 @@ def _nothing_to_measure(run: Run) -> str:
             f"Of this model nothing more is to be measured. What {last} still lacks, and what that model leaves open "
             "stands in its report."
         )
+    if run.loop.questions == () and run.behind is not None and run.behind.verdict.kind != "nothing-missing":
+        return "No measurement is proposed: no two listed effects are left to be told apart."
     return "No further measurement is needed."
 
 

@@ -224,6 +224,11 @@ class Diagnosis:
         return [list(group) for step in self.steps for group in step.groups]
 
     @property
+    def law_stands_out(self) -> bool:
+        """Whether a law is worth a search: where the verdict cannot tell, only if no other cause is told before it."""
+        return self.laws is not None and (self.verdict.kind != "cannot-tell" or self.verdict.tells_laws)
+
+    @property
     def changed(self) -> bool:
         """Whether anything was taken into the model or set aside."""
         return bool(self.steps or self.places or self.instruments)

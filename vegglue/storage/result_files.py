@@ -31,9 +31,9 @@ def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | N
     StorageError when the file is broken.
     """
     if not path.exists() and part_file(path).exists():
-        command = shown_command("simulate", config)
+        command = _made_by("simulate", config, path)
         raise InputError(f"{path}: found only a part of the members; run {command} to solve the rest.")
-    return _read(path, expected_hash, shown_command("simulate", config), ensemble_from)
+    return _read(path, expected_hash, _made_by("simulate", config, path), ensemble_from)
 
 
 def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
@@ -55,7 +55,7 @@ def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: 
 
 def read_posterior(path: Path, expected_hash: str | None = None, config: Path | None = None) -> Posterior:
     """Read a posterior; errors as those of read_ensemble, for `vegglue infer`."""
-    return _read(path, expected_hash, shown_command("infer", config), posterior_from)
+    return _read(path, expected_hash, _made_by("infer", config, path), posterior_from)
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: str) -> None:
@@ -98,6 +98,12 @@ def flow_that_fits(path: Path, config_hash: str, theta: Mapping[str, float]) -> 
 def stored_hash(path: Path) -> str | None:
     """Config hash a result file was made from, or None when there is no readable file."""
     return stored_attribute(path, "config_hash")
+
+
+def _made_by(verb: str, config: Path | None, path: Path) -> str:
+    """The command that makes a result, into the folder of runs where it was looked for."""
+    runs = path.parent.parent
+    return shown_command(verb, config, *(["--runs", str(runs)] if config is not None and runs != Path("runs") else []))
 
 
 def _read(path: Path, expected_hash: str | None, command: str, understand: Callable[..., Result]) -> Result:

@@ -141,7 +141,7 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
     kept = choice.stages[-1]
     if not kept and not choice.refused:
         why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
-        return f"Nothing is added: {LAW_TO_DISCOVER if found.laws is not None else why}."
+        return f"Nothing is added: {LAW_TO_DISCOVER if found.law_stands_out else why}."
     first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
     spread = [(candidate_at(case, place).name, place) for place in places_tried(found)]
     said = [

@@ -76,7 +76,7 @@ def run(
 
 def _acts_all_over(found: Diagnosis) -> bool:
     """Whether none of the known effects explains the misfit, and it is not at a place; or a law stands out."""
-    return found.laws is not None or (found.verdict.kind == "none-of-these" and not found.places)
+    return found.law_stands_out or (found.verdict.kind == "none-of-these" and not found.places)
 
 
 @one_thread()
