@@ -87,7 +87,9 @@ def plants_at(
 ) -> VegetatedCells:
     """Plants in some cells; phi may differ between them, (cell, 1)."""
     values = [value + np.zeros((column.size, 1)) for value in (phi, canopy_height, bare_chezy)]
-    return VegetatedCells(column, row, np.full(column.size, PLANT_LAWS.index(law)), *values, proportional)
+    return VegetatedCells(
+        column, row, np.full(column.size, PLANT_LAWS.index(law)), np.ones(column.size), *values, proportional
+    )
 
 
 def trapezoid(length: float, half_width: float, cells: tuple[int, int]) -> tuple[Array, Array]:

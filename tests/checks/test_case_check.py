@@ -31,10 +31,8 @@ def test_a_patch_on_the_map_is_told_as_that(tmp_path):
     )
     on_map = on_map.replace("y: [0, 1.5], stems", "y: [2000, 2001.5], stems")
     framed = on_map + "frame: {origin: [1000, 2000], angle: 0}\n"
-    assert any(
-        "Patch p1 covers no cell centre: its corners are places on the map" in one for one in odd(tmp_path, framed)
-    )
-    assert any("Patch p1 covers no cell centre: it lies outside the grid, at x" in one for one in odd(tmp_path, on_map))
+    assert any("Patch p1 covers no cell: its corners are places on the map" in one for one in odd(tmp_path, framed))
+    assert any("Patch p1 covers no cell: it lies outside the grid, at x" in one for one in odd(tmp_path, on_map))
 
 
 @pytest.mark.parametrize(
@@ -63,8 +61,7 @@ def test_a_flume_with_walls_is_not_told_to_widen_its_grid(tmp_path):
     [
         ("members: 1024", "members: 64}\ninfer: {method: glue", "Only 64 members will be simulated"),
         ("members: 1024", "members: 1000", "Note: 1000 members is no power of two; .* with 1024."),
-        ("y: [0, 1.5], stems", "y: [0.1, 0.2], stems", "Patch p1 covers no cell centre"),
-        ("y: [0, 1.5], stems", "y: [0.2, 1.3], stems", "Patch p1 of 4.4 m2 becomes 6 m2 of cells: take finer cells"),
+        ("y: [0, 1.5], stems", "y: [0.1, 0.2], stems", "Patch p1 covers less than half of every cell that it touches"),
         (
             "y: [0, 1.5], stems",
             "y: [4, 9], stems",
@@ -224,7 +221,7 @@ def test_the_expected_water_is_parallel_to_the_floor_and_nowhere_below_the_outle
     depth = expected_depth(case, site, case.experiments["low"])
     # z_out = 1 m over a floor at -0.0395 m in the last cell.
     assert depth.max(axis=1) == pytest.approx(1.0395)
-    rising = site.__class__(site.grid, site.bed[::-1], site.friction_class, site.class_names, site.patch)
+    rising = site.__class__(site.grid, site.bed[::-1], site.friction_class, site.class_names, site.patch, site.cover)
     assert (rising.bed + expected_depth(case, rising, case.experiments["low"])).min() == pytest.approx(1.0)
 
 

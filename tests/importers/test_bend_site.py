@@ -144,7 +144,7 @@ def test_the_bed_and_the_patches_follow_the_line(tmp_path: Path, flow: pd.DataFr
     found, grid = build_site(case), build_grid(case)
     assert case.grid.x == pytest.approx((0.0, 31.0), abs=1e-3), "as far as the survey goes"
     assert np.allclose(found.bed, 2.0 - 0.002 * grid.x[:, None] + 0.02 * grid.y, atol=0.002)
-    planted = np.argwhere(found.patch >= 0)
+    planted = np.argwhere(found.main_patch >= 0)
     assert len(planted)
     assert grid.x[planted[:, 0]].min() == pytest.approx(18.0, abs=0.6)
     assert grid.x[planted[:, 0]].max() == pytest.approx(22.0, abs=0.6)

@@ -87,7 +87,7 @@ def test_a_case_in_a_bend(tmp_path: Path) -> None:
     assert cell_stretch(grid)[40, [0, -1]] == pytest.approx([1.23, 0.77])
     table = read_observations(case).table
     assert table[["x", "y"]].to_numpy()[0] == pytest.approx([20.0 + AROUND / 2.0, 0.0], abs=1e-4)
-    column, row = np.nonzero(site.patch == 0)
+    column, row = np.nonzero(site.main_patch == 0)
     assert grid.x[column].min() == pytest.approx(55.5)
     assert grid.x[column].max() == pytest.approx(62.5)
     assert np.abs(grid.y[row]).max() < 2.0

@@ -182,16 +182,17 @@ def test_classes_by_raster(tmp_path):
         site(tmp_path, friction=zones(rule | {"values": {1: "bed"}}))
 
 
-def test_patches_take_the_cells_whose_centre_they_hold(tmp_path):
+def test_patches_take_the_cells_that_they_cover_half_of(tmp_path):
     stands = {"reed": {"phi": 1.0, "canopy_height": 0.5}}
-    square = {"name": "a", "stand": "reed", "x": [1.5, 3.5], "y": [1.6, 3.4]}
+    square = {"name": "a", "stand": "reed", "x": [1.4, 3.4], "y": [1.6, 3.4]}
     bow = {"name": "b", "stand": "reed", "polygon": [[4, 0], [8, 0], [8, 6], [6, 6], [6, 2], [4, 2]]}
     built = site(tmp_path, plants={"stands": stands, "patches": [square, bow]})
     expected = np.full((8, 6), -1)
     expected[1:3, 2] = 0
     expected[4:8, 0:2] = 1
     expected[6:8, 2:6] = 1
-    assert np.array_equal(built.patch, expected)
+    assert np.array_equal(built.main_patch, expected)
+    assert built.cover[1:4, 1:4] == pytest.approx(np.outer([0.6, 1.0, 0.4], [0.4, 1.0, 0.4]))
 
 
 def test_an_experiment_may_have_a_bed_of_its_own(tmp_path):

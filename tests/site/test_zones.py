@@ -57,7 +57,7 @@ def test_a_centre_on_a_shared_edge_belongs_to_the_upper_range() -> None:
     assert centres_within(None, centres).all()
 
 
-def test_patches_zones_and_boundaries_hold_the_same_cells(tmp_path: Path) -> None:
+def test_zones_and_boundaries_hold_the_same_cells_and_patches_what_they_cover(tmp_path: Path) -> None:
     span = [0.25, 1.25]  # of the centres 0.25, 0.75 and 1.25 not the last
     case = case_with(
         tmp_path,
@@ -72,7 +72,7 @@ def test_patches_zones_and_boundaries_hold_the_same_cells(tmp_path: Path) -> Non
     site = build_site(case)
     problem = build_problem(case, site, "one", {"n_b": np.array([0.03])})
     cells = [6, 7]
-    assert np.flatnonzero(site.patch[0] == 0).tolist() == cells
+    assert site.cover[0, 5:10] == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
     assert np.flatnonzero(site.friction_class[0] == 1).tolist() == cells
     assert np.flatnonzero(problem.boundaries.outlet).tolist() == cells
     assert inflow_cells(case.inflows["upstream"], site.grid).tolist() == cells

@@ -43,7 +43,7 @@ def _content_of(model: Model) -> str:
     tree = plain_tree(dumped(model.case, ONLY_NAMED), str)
     digest = hashlib.sha256(json.dumps(tree).encode())
     for site in (model.site, *model.site.own.values()):
-        for values in (site.bed, site.friction_class, site.patch):
+        for values in (site.bed, site.friction_class, site.patch, site.cover):
             digest.update(values.tobytes())
     digest.update(pd.util.hash_pandas_object(model.station, index=False).to_numpy().tobytes())
     return digest.hexdigest()

@@ -70,7 +70,7 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     """Answers to each side of each patch further out and further in, over 2^(1/2) (station, 2 sides) [unit of a
     station per m]; see `_side`.
     """
-    patch, parts = model.site.patch, [np.zeros((len(model.station), 0))]
+    patch, parts = model.site.main_patch, [np.zeros((len(model.station), 0))]
     rate = {name: _friction_rate(cells, rows) for name, rows in model.rows.items()}
     for index in np.unique(patch[patch >= 0]):
         parts += [_side(model, cells, rate, int(index), axis, step) for axis in (0, 1) for step in (-1, 1)]
@@ -86,8 +86,10 @@ def _side(model: Model, cells: CellResponses, rate: Mapping[str, Array], index: 
     stands where water was fast, and slows it: half of it counts as if water were slow there already. Of what a second
     solver does where all sides lie up to 0.1 m off, this leaves a twentieth of the squares; with I alone half was left.
     """
-    inside, width = model.site.patch == index, (model.site.grid.dx, model.site.grid.dy)[axis]
+    inside, width = model.site.main_patch == index, (model.site.grid.dx, model.site.grid.dy)[axis]
     within, found = inside & ~_next(inside, axis, outwards), np.zeros((len(model.station), 2))
+    # Cells that are covered in part differ by that part of what plants and bed differ by.
+    width = width * np.maximum(model.site.cover - _next(model.site.cover, axis, outwards), 0.5)
     for experiment, rows in model.rows.items():
         if index in patches_present(model.case, experiment):
             excess = within * (rate[experiment] - _next(rate[experiment], axis, outwards)) / width
@@ -114,7 +116,7 @@ def _friction_rate(cells: CellResponses, rows: NDArray[np.int_]) -> Array:
 
 def _patches(model: Model, cells: CellResponses) -> Array:
     """Answers to the relative friction of each patch (station, patches); none in experiments without it."""
-    patch, columns = model.site.patch, [np.zeros((len(model.station), 0))]
+    patch, columns = model.site.main_patch, [np.zeros((len(model.station), 0))]
     for index in np.unique(patch[patch >= 0]):
         answers = cells.of["friction"][:, patch == index].sum(axis=1)
         for experiment, rows in model.rows.items():

@@ -13,8 +13,9 @@ from vegglue.in_short import experiments_in_words, in_digits
 from vegglue.measurements.observations import Observations
 from vegglue.site.channel_geometry import expected_depth, patches_present
 from vegglue.site.gridded_site import Site, in_experiment
+from vegglue.site.plant_cover import share_in_patch
 from vegglue.site.polygons import area_of, corners_of
-from vegglue.site.zones import BANK_SLOPE, cells_of_patch, slope
+from vegglue.site.zones import BANK_SLOPE, slope
 
 # By `numerics.emergent`: what is taken for plants that stand out of the water.
 DRAG_OF_EMERGENT = {
@@ -39,17 +40,22 @@ OF_A_RIDGE, LEAST_RIDGE, MOST_RIDGE = 0.5, 0.02, 0.8
 
 
 def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
-    """Patches that the grid holds poorly: area of their cells against their own [m2], overlaps, unused stands."""
+    """Patches that the grid holds poorly: area in it against their own [m2], small ones, overlaps, unused stands."""
     cell = site.grid.dx * site.grid.dy
     for index, patch in enumerate(case.plants.patches):
         meant = area_of(corners_of(case, patch))
-        alone = cells_of_patch(patch, site.grid)
-        covered, hidden = alone.sum() * cell, int((alone & (site.patch != index)).sum())
-        if not alone.any():
-            yield f"Patch {patch.name} covers no cell centre: {_why_none(case, site, corners_of(case, patch))}."
+        share = share_in_patch(case, patch, site.grid)
+        covered, hidden = share.sum() * cell, int(((share >= 0.5) & (site.patch != index)).sum())
+        if not share.any():
+            yield f"Patch {patch.name} covers no cell: {_why_none(case, site, corners_of(case, patch))}."
         elif abs(covered - meant) > LARGEST_MISS * meant:
             remedy = _beyond_grid(case, corners_of(case, patch)) or "take finer cells"
             yield f"Patch {patch.name} of {in_digits(meant)} m2 becomes {in_digits(covered)} m2 of cells: {remedy}."
+        elif share.max() < 0.5:
+            yield (
+                f"Patch {patch.name} covers less than half of every cell that it touches: its drag is spread over "
+                "them; take finer cells."
+            )
         if hidden:
             yield f"Patch {patch.name} loses {hidden} cells to patches listed after it, which win where they overlap."
     unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}
@@ -58,14 +64,14 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
 
 
 def _why_none(case: Case, site: Site, corners: Array) -> str:
-    """Why a patch with these corners (k, 2) [m] covers no cell centre."""
+    """Why a patch with these corners (k, 2) [m] covers no cell."""
     x, y = site.grid.x, site.grid.y
     if case.frame is not None:
         east, north = corners.mean(axis=0)
         along, across = case.frame.to_model(east, north)
         if x[0] <= along <= x[-1] and y[0] <= across <= y[-1]:
             return "its corners are places on the map, and a case expects them along and across the channel; turn them"
-    return _beyond_grid(case, corners) or "it is smaller than a cell; take finer cells"
+    return _beyond_grid(case, corners) or "it has no area; correct its corners"
 
 
 def _beyond_grid(case: Case, corners: Array) -> str:
@@ -207,5 +213,5 @@ def _share_held(case: Case, site: Site, experiment: str, friction_class: int, k_
     """Share of the wet cells of a class, without those of plants, in which 12 h / k_s lies below its floor [-]."""
     now = in_experiment(site, experiment)
     depth = expected_depth(case, now, case.experiments[experiment])
-    wet = depth[(now.friction_class == friction_class) & (site.patch < 0) & (depth > 0)]
+    wet = depth[(now.friction_class == friction_class) & (site.main_patch < 0) & (depth > 0)]
     return float(np.mean(12.0 * wet / k_s < case.numerics.bank_argument_minimum)) if wet.size else 0.0

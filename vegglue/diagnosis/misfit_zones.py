@@ -76,6 +76,6 @@ def _named(kind: Kind, ground: ChannelGeometry, i: int, j: int) -> str:
 def _zone(geometry: ChannelGeometry, i: int, j: int) -> str:
     if abs(geometry.edge[i, j, 0]) < AT_EDGE * geometry.half_width[i, j, 0]:
         return "edge"
-    if geometry.planted[i, j, 0]:
+    if geometry.planted[i, j, 0] >= 0.5:
         return "plants"
     return "bank" if geometry.bank[i, j, 0] else "floor"

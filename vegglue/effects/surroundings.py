@@ -21,10 +21,10 @@ class ChannelGeometry:
 
     share_along: (x - x_m) / L, x_m the middle of the grid and L its length, -1/2 .. 1/2 (nx, 1, 1) [-];
     offset: distance from the channel axis over the half width of the floor, positive towards larger y [-]; half_width:
-    that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: 1 where plants stand
-    in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite; edge: distance
-    across from the nearest side of a patch, positive outside it and negative inside, infinite in columns without one;
-    relative_stems: of the patch over the mean of all patches, 1 where none stands [-];
+    that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: share of a cell that
+    plants cover in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite;
+    edge: distance across from the nearest side of a patch, positive outside it and negative inside, infinite in columns
+    without one; relative_stems: of the patch over the mean of all patches, 1 where none stands [-];
     wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite; on a grid
     along a centreline, stretch: length of a cell over dx [-], and turning: curvature of the line along its row [1/m].
     """

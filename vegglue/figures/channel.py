@@ -111,7 +111,7 @@ def _class_colour(index: int) -> str:
 
 def _draw_patches(axes: Axes, case: Case, site: Site) -> None:
     densest = max((patch.stems for patch in case.plants.patches), default=1.0)
-    i, j = np.nonzero(site.patch >= 0)
+    i, j = np.nonzero(site.main_patch >= 0)
     axes.plot(site.grid.x[i], site.grid.y[j], ",", color=COLOUR["stems"])
     for patch in case.plants.patches:
         strength = 0.3 + 0.6 * patch.stems / densest

@@ -98,10 +98,18 @@ def _on_faces(stands: Array, rate: Array, depth: Array, film: float) -> Array:
 
 
 def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[Array, Array]) -> None:
-    """The laws of plants in place of those of the bed where plants stand; values: phi and canopy height (cell, m)."""
+    """The laws of plants in place of those of the bed on what plants cover; values: phi and canopy height (cell, m)."""
     plants = problem.plants
     plant_laws.plant_drag(
-        rate, depth, plants.column, plants.row, plants.law, *values, plants.bare_chezy, plants.proportional
+        rate,
+        depth,
+        plants.column,
+        plants.row,
+        plants.law,
+        plants.share,
+        *values,
+        plants.bare_chezy,
+        plants.proportional,
     )
 
 

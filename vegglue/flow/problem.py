@@ -53,8 +53,8 @@ class BedFriction:
 
 @dataclass(frozen=True)
 class VegetatedCells:
-    """Vegetated cells (column, row), the law of each (an index into PLANT_LAWS), and their values per cell and member:
-    phi [-], h_d [m], C_b [m^1/2/s].
+    """Vegetated cells (column, row), the law of each (an index into PLANT_LAWS), the share of each that plants cover
+    [-], and their values per cell and member: phi [-], h_d [m], C_b [m^1/2/s].
 
     proportional: phi h/h_d in place of phi where plants stand out of the water.
     """
@@ -62,6 +62,7 @@ class VegetatedCells:
     column: NDArray[np.int64]
     row: NDArray[np.int64]
     law: NDArray[np.int64]
+    share: Array
     phi: Array
     canopy_height: Array
     bare_chezy: Array
@@ -259,6 +260,6 @@ def _walls_between(walls: SideWalls, south: bool, north: bool) -> SideWalls:
 
 def _plants_between(plants: VegetatedCells, south: int, north: int) -> VegetatedCells:
     inside = (plants.row >= south) & (plants.row < north)
-    names = ("column", "row", "law", "phi", "canopy_height", "bare_chezy")
+    names = ("column", "row", "law", "share", "phi", "canopy_height", "bare_chezy")
     kept = replace(plants, **{name: getattr(plants, name)[inside] for name in names})
     return replace(kept, row=kept.row - south)

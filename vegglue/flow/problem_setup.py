@@ -180,7 +180,7 @@ def _plants(case: Case, site: Site, experiment: str, theta: Theta, members: int)
         fields[:, index == patch] = np.stack([phi * stems / stand.stems, height, chezy])[:, None]
         law[index == patch] = plant_laws.PLANT_LAWS.index(stand.law)
     proportional = case.numerics.emergent == "proportional"
-    return VegetatedCells(column, row, law, fields[0], fields[1], fields[2], proportional)
+    return VegetatedCells(column, row, law, site.cover[column, row], fields[0], fields[1], fields[2], proportional)
 
 
 @lru_cache(PLANTED_KEPT)  # every problem of every member asks for the same

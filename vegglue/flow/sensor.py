@@ -96,10 +96,12 @@ def _by_kind(station: pd.DataFrame) -> Iterator[tuple[Kind, NDArray[np.intp], Ar
 def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     """What instruments make of it: the effects of the stage sensor, each where it acts."""
     problem, now = flow.problem, flow.at_faces
-    canopy = np.zeros_like(now.cell)
-    canopy[problem.plants.column, problem.plants.row] = bent_plants(problem, flow.state, now.cell)[1]
+    plants, among = problem.plants, np.zeros_like(now.cell)
+    depth = now.cell[plants.column, plants.row]
+    reaching = np.minimum(bent_plants(problem, flow.state, now.cell)[1] / depth, 1.0)
+    among[plants.column, plants.row] = plants.share[:, None] * reaching
     fields = {"depth": now.cell, "u": flow.u, "rate": closures(problem, flow.state, now.cell).rate}
-    fields["canopy_share"] = np.minimum(canopy / now.cell, 1.0)
+    fields["canopy_share"] = among
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
     there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
     there |= _measured_by_probes(flow, value, station) | {"x": x[:, None], "y": y[:, None]}

@@ -137,7 +137,7 @@ def median_plants(run: Run, experiment: str) -> VegetatedCells:
 
 def planted_cells(run: Run, experiment: str) -> np.ndarray:
     """Whether each cell (nx, ny) bears plants in an experiment."""
-    return np.isin(run.site.patch, patches_present(run.case, experiment))
+    return np.isin(run.site.main_patch, patches_present(run.case, experiment))
 
 
 def station_zones(run: Run) -> list[str]:

@@ -101,8 +101,10 @@ def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float
 
 
 @compiled
-def plant_drag(drag, depth, column, row, law, phi, canopy, bare_chezy, proportional):
-    """Overwrite k = g / (C^2 h) [1/m] on plant cells by that of the law of each, an index into PLANT_LAWS."""
+def plant_drag(drag, depth, column, row, law, cover, phi, canopy, bare_chezy, proportional):
+    """k -> s k_p + (1 - s) k [1/m] on cells of which plants cover the share s, k_p = g / (C^2 h) by the law of each, an
+    index into PLANT_LAWS: what both parts take, where the water is as fast on both.
+    """
     m = depth.shape[2]
     for p in range(column.size):
         i, j = column[p], row[p]
@@ -110,4 +112,4 @@ def plant_drag(drag, depth, column, row, law, phi, canopy, bare_chezy, proportio
             h = depth[i, j, k]
             share = min(h / canopy[p, k], 1.0) if proportional else 1.0
             chezy = _chezy(law[p], share * phi[p, k], canopy[p, k], h, bare_chezy[p, k])
-            drag[i, j, k] = GRAVITY / (chezy * chezy * h)
+            drag[i, j, k] = cover[p] * (GRAVITY / (chezy * chezy * h)) + (1.0 - cover[p]) * drag[i, j, k]

@@ -68,7 +68,8 @@ def _geometry(
     grid, bed = site.grid, site.bed
     axis, half_width, floor = _section(site)
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
-    front, edge, wake = _distances(patch, grid.x, grid.y, grid.dx, grid.dy)
+    cover = np.where(patch >= 0, site.cover, 0.0)
+    front, edge, wake = _distances(patch, cover, grid)
     bent = {} if grid.centreline is None else _bent(grid)
     return ChannelGeometry(
         x=grid.x[:, None, None],
@@ -82,7 +83,7 @@ def _geometry(
         half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
         side_slope=_side_slope(site)[..., None],
         bank=(~floor).astype(float)[..., None],
-        planted=(patch >= 0).astype(float)[..., None],
+        planted=cover[..., None],
         front=front[..., None],
         edge=edge[..., None],
         wake=wake[..., None],
@@ -146,14 +147,16 @@ def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array
     return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy)
 
 
-def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: float) -> tuple[Array, Array, Array]:
+def _distances(patch: NDArray[np.int64], cover: Array, grid: Grid) -> tuple[Array, Array, Array]:
     """Front, edge and wake of ChannelGeometry, (nx, ny) [m]."""
+    x, y = grid.x, grid.y
     front, edge, wake, own = (np.full(patch.shape, np.inf) for _ in range(4))
     for index in np.unique(patch[patch >= 0]):
         column, row = np.nonzero(patch == index)
-        west, east = x[column.min()] - 0.5 * dx, x[column.max()] + 0.5 * dx
-        south, north = y[row.min()] - 0.5 * dy, y[row.max()] + 0.5 * dy
-        front[column, row] = x[column] - west
+        held = np.where(patch == index, cover, 0.0)
+        west, east = _ends(held.max(axis=1), x, grid.dx)
+        south, north = _ends(held.max(axis=0), y, grid.dy)
+        front[column, row] = np.maximum(x[column] - west, 0.0)
         beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
         here = slice(column.min(), column.max() + 1)
         edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
@@ -162,6 +165,12 @@ def _distances(patch: NDArray[np.int64], x: Array, y: Array, dx: float, dy: floa
         spans = ((y > south) & (y < north))[None]
         wake = np.where(spans & (behind < wake), behind, wake)
     return front, np.where(patch >= 0, own, edge), wake  # plants stand within their own patch, whatever is near
+
+
+def _ends(share: Array, centres: Array, step: float) -> tuple[float, float]:
+    """Where what covers cells (n,) in a row begins and ends [m], from the share [-] of the first and of the last."""
+    first, last = np.flatnonzero(share)[[0, -1]]
+    return float(centres[first] + step * (0.5 - share[first])), float(centres[last] - step * (0.5 - share[last]))
 
 
 def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
