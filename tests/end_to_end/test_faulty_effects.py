@@ -7,6 +7,7 @@ from reach import COARSE, said_to, write_reach
 
 from vegglue.checks.effect_contract import breaches
 from vegglue.effects.library import effects_of
+from vegglue.errors import InputError
 
 EFFECT = '''from vegglue.effects.definition import Amplitude, Effect
 
@@ -56,6 +57,17 @@ def test_an_effect_at_work_that_fails_ends_a_simulation(
     monkeypatch.chdir(tmp_path)
     code, told = said_to(monkeypatch, capsys, "simulate", config, "--trust", "--jobs", 1)
     assert (code, "fails when it acts, in line 6" in told) == (2, True), told
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('stage="resistance"', 'stage="friction"', "the stage of `slow_stones` expected one of site, "),
+    ('source="a guess"', 'source="a guess", each="run"', "`each` of `slow_stones` expected one of case, experiment, "),
+])  # fmt: skip
+def test_a_word_that_an_effect_cannot_have_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    """`each` of another word ended a diagnosis in a KeyError."""
+    (tmp_path / "stones.py").write_text(EFFECT.replace(old, new).replace("{body}", "return {}"), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        effects_of(tmp_path / "stones.py")
 
 
 def test_a_function_of_other_names_fails_in_no_line(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Velocities beside patches whose sides lie anywhere between those of cells are as exact as beside those that do not."""
+"""Velocities beside patches are as exact wherever the sides of these lie between the sides of cells."""
 
 from pathlib import Path
 

@@ -25,6 +25,8 @@ from vegglue.arrays import Array
 # What an effect does: what is to be seen at its stage and its parameters -> what it changes, by name.
 Act = Callable[..., Mapping[str, Array]]
 Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
+Each = Literal["case", "experiment", "section", "device", "patch"]
+EACH: tuple[Each, ...] = ("case", "experiment", "section", "device", "patch")
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage hands on, and whether an effect adds to it or takes its place.
 ADDED = {"site": ("bed", "inflow"), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
@@ -143,7 +145,7 @@ class Effect:
     doi: str = ""
     checked: bool = False
     read_in: str = ""
-    each: Literal["case", "experiment", "section", "device", "patch"] = "case"
+    each: Each = "case"
     mirrored: bool = True
     tags: tuple[str, ...] = ()
     seen: SeenRange | None = None

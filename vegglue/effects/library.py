@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import get_type_hints
 
 from vegglue.effects import boundary, exchange, force, grammar, plants, resistance, sensor, site, unlisted
-from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
+from vegglue.effects.definition import EACH, STAGES, Amplitude, Effect, Shape
 from vegglue.errors import InputError, shown_path
 
 SHIPPED: tuple[Effect, ...] = (
@@ -105,10 +105,13 @@ def _is_number(value: object) -> bool:
 
 
 def _refuse_unusable(effect: Effect, shown: str) -> None:
-    """Errors: InputError for a name that no config and no command can hold, or a stage that there is not."""
+    """Errors: InputError for a name that no config and no command can hold, or a stage or `each` that there is not."""
     if not (effect.name.isascii() and effect.name.isidentifier()):
         said = f"expected letters, digits and underscores, got `{effect.name}`"
         raise InputError(f"{shown}: the name of an effect {said}; correct it.")
     if effect.stage not in STAGES:
         said = f"expected one of {', '.join(STAGES)}, got `{effect.stage}`"
         raise InputError(f"{shown}: the stage of `{effect.name}` {said}; correct it.")
+    if effect.each not in EACH:
+        said = f"expected one of {', '.join(EACH)}, got `{effect.each}`"
+        raise InputError(f"{shown}: `each` of `{effect.name}` {said}; correct it.")
