@@ -15,6 +15,9 @@ from vegglue.site.grid import Grid, cell_stretch, curvature_of, filter_width_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import BANK_SLOPE, beyond_slope_break
 
+# Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over a
+# cell that lies half within is a fourth. Laws that fade out divide by such distances.
+NEAREST = 0.25
 # Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
 GEOMETRIES_KEPT = 8
 
@@ -156,8 +159,9 @@ def _distances(patch: NDArray[np.int64], cover: Array, grid: Grid) -> tuple[Arra
         held = np.where(patch == index, cover, 0.0)
         west, east = _ends(held.max(axis=1), x, grid.dx)
         south, north = _ends(held.max(axis=0), y, grid.dy)
-        front[column, row] = np.maximum(x[column] - west, 0.0)
+        front[column, row] = np.maximum(x[column] - west, NEAREST * grid.dx)
         beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
+        beside = np.copysign(np.maximum(np.abs(beside), NEAREST * grid.dy), beside)
         here = slice(column.min(), column.max() + 1)
         edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
         own[column, row] = beside[row]
