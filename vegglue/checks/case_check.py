@@ -23,6 +23,7 @@ from vegglue.checks.ensemble_and_priors import (
     remarks_on_kept_fields,
     remarks_on_units_of_effects,
 )
+from vegglue.checks.heights_or_levels import remarks_on_unmoved_heights
 from vegglue.checks.stations import (
     remarks_on_absurd_values,
     remarks_on_dry_velocities,
@@ -57,6 +58,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_units_of_places(case, observations),
         *remarks_on_dry_velocities(case, site, observations),
         *remarks_on_exchanged_heights(case, observations),
+        *remarks_on_unmoved_heights(case, observations),
         *remarks_on_directions(case, _with_possible_levels(case, site, observations)),
         *remarks_on_discharges(case, site, observations),
     ]
@@ -86,6 +88,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_stations(case, site, observations),
         remarks_on_shared_places(observations),
         remarks_on_exchanged_heights(case, observations),
+        remarks_on_unmoved_heights(case, observations),
         remarks_on_heights(observations),
         remarks_on_directions(case, possible),
         remarks_on_lost_points(observations, _doubted_levels(case, observations, possible)),
