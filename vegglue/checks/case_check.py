@@ -24,6 +24,7 @@ from vegglue.checks.ensemble_and_priors import (
     remarks_on_units_of_effects,
 )
 from vegglue.checks.heights_or_levels import remarks_on_unmoved_heights
+from vegglue.checks.outlet_level import remarks_on_outlet_levels
 from vegglue.checks.stations import (
     remarks_on_absurd_values,
     remarks_on_dry_velocities,
@@ -50,6 +51,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
     dry = [*remarks_on_dry_outlets(case, site, observations)]
     if not observations.table["used"].any():
         return dry
+    possible = _with_possible_levels(case, site, observations)
     return [
         *dry,
         *remarks_on_absurd_values(case, site, observations),
@@ -59,7 +61,8 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_dry_velocities(case, site, observations),
         *remarks_on_exchanged_heights(case, observations),
         *remarks_on_unmoved_heights(case, observations),
-        *remarks_on_directions(case, _with_possible_levels(case, site, observations)),
+        *remarks_on_directions(case, possible),
+        *remarks_on_outlet_levels(case, site, possible),
         *remarks_on_discharges(case, site, observations),
     ]
 
@@ -91,6 +94,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_unmoved_heights(case, observations),
         remarks_on_heights(observations),
         remarks_on_directions(case, possible),
+        remarks_on_outlet_levels(case, site, possible),
         remarks_on_lost_points(observations, _doubted_levels(case, observations, possible)),
         remarks_on_ensemble(case, observations),
         remarks_on_kept_fields(case, site),
