@@ -35,6 +35,7 @@ from vegglue.checks.stations import (
     remarks_on_stations,
 )
 from vegglue.checks.steep_flow import remarks_on_steep_flow
+from vegglue.checks.turned_velocities import remarks_on_turned_velocities
 from vegglue.checks.units_of_places import remarks_on_units_of_places
 from vegglue.checks.verticals import remarks_on_exchanged_heights, remarks_on_heights, remarks_on_lost_points
 from vegglue.measurements.observations import Observations
@@ -62,6 +63,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
         *remarks_on_exchanged_heights(case, observations),
         *remarks_on_unmoved_heights(case, observations),
         *remarks_on_directions(case, possible),
+        *remarks_on_turned_velocities(case, observations),
         *remarks_on_outlet_levels(case, site, possible),
         *remarks_on_discharges(case, site, observations),
     ]
@@ -94,6 +96,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_unmoved_heights(case, observations),
         remarks_on_heights(observations),
         remarks_on_directions(case, possible),
+        remarks_on_turned_velocities(case, observations),
         remarks_on_outlet_levels(case, site, possible),
         remarks_on_lost_points(observations, _doubted_levels(case, observations, possible)),
         remarks_on_ensemble(case, observations),
