@@ -23,6 +23,7 @@ from vegglue.checks.ensemble_and_priors import (
     remarks_on_kept_fields,
     remarks_on_units_of_effects,
 )
+from vegglue.checks.errors_across_plants import remarks_on_errors_across_plants
 from vegglue.checks.heights_or_levels import remarks_on_unmoved_heights
 from vegglue.checks.outlet_level import remarks_on_outlet_levels
 from vegglue.checks.stations import (
@@ -114,6 +115,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[str]:
         remarks_on_canopies(case, site, observations),
         remarks_on_bank_law(case, site),
         remarks_on_patch_edges(case, observations),
+        remarks_on_errors_across_plants(case, observations),
         remarks_on_discharges(case, site, observations),
     )
     return [sentence for about in remarks for sentence in about]
