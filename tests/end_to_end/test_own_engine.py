@@ -22,7 +22,7 @@ SMALL = ("members: 1024", "members: 16")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 KNOWN = "members: 16, seed: 7}\ninfer: {sigma: known}"
 # Draws of a posterior here, of the first round and worth: a run of a command is some hundredths of a second.
-FIRST, WORTH = 64, 40
+FIRST, WORTH = 256, 160
 
 
 @dataclass(frozen=True)
