@@ -49,6 +49,11 @@ the same, and 170 more, sized in the truth. What was chosen after seeing some of
   nobody had seen: none of these in 21, a place within 1.5 m in 14. Drag of the banks that grows along the channel was
   listed as well (`bank_drag_trend`): eleven sets with an effect of the banks, diagnosed again, have verdicts of the
   same kind.
+- Since then all that something unlisted leaves in its surroundings holds half of it, and not half in each of some 40
+  bumps. The first 125 objects of the small channel were hidden anew for it, all sized in the stranger's own flow:
+  none of these is told of 84 and a place within 1.5 m of 52 (42 %); of the same objects in the lines below, of other
+  sizes, of 84 and 55. What `extend --auto` kept lowered the error in 65 of 87, there in 61 of 81. No site of this
+  study has a patch whose sides lie within cells, see DECISIONS: nothing here tells of that.
 
 On what nobody had looked at it is right less often than on what it was chosen after. What `extend --auto` keeps is
 counted as it was before the last changes of its rule in all but the last 170: in 42 sets all that was named was

@@ -1,5 +1,6 @@
 """Velocities beside patches are as exact wherever the sides of these lie between the sides of cells."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 import yaml
 
 from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.measurements.kinds import velocity_rows
@@ -16,8 +19,8 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 CELL, FINE = (0.5, 0.1875), (0.125, 0.046875)
 
 
-def velocities(folder: Path, moved: tuple[float, float], cell: tuple[float, float]) -> np.ndarray:
-    """u [m/s] at the stations of the twin, its patches moved along and across [m]."""
+def moved_case(folder: Path, moved: tuple[float, float], cell: tuple[float, float]) -> Case:
+    """The twin's channel on other cells, its patches moved along and across [m]."""
     tree = yaml.safe_load(CONFIG.read_text())
     tree["grid"]["cell"] = list(cell)
     for one in tree["observations"]:
@@ -26,7 +29,12 @@ def velocities(folder: Path, moved: tuple[float, float], cell: tuple[float, floa
         patch["x"] = [x + moved[0] for x in patch["x"]]
         patch["y"] = [y + moved[1] for y in patch["y"]]
     (folder / "moved.yaml").write_text(yaml.safe_dump(tree))
-    case = load_case(folder / "moved.yaml")
+    return load_case(folder / "moved.yaml")
+
+
+def velocities(folder: Path, moved: tuple[float, float], cell: tuple[float, float]) -> np.ndarray:
+    """u [m/s] at its stations."""
+    case = moved_case(folder, moved, cell)
     point = linearise(model_of(case, read_observations(case)), np.zeros(len(case.parameters)))
     assert point is not None
     return point.prediction[velocity_rows(read_observations(case).table)]
@@ -43,3 +51,21 @@ def test_sides_within_cells_add_no_error(tmp_path: Path, moved: tuple[float, flo
     its centre.
     """
     assert error(tmp_path, moved) < 1.5 * error(tmp_path, (0.0, 0.0))
+
+
+@pytest.mark.slow
+def test_where_nothing_is_hidden_beside_them_nothing_is_found(tmp_path: Path) -> None:
+    """A channel whose patches lie across cells, its data those of cells of a fourth of the size and errors as stated.
+    With cells planted by their centre a deeper bed was told beside a patch, 32 to 1.
+    """
+    random, moved = np.random.default_rng(100), (0.2, 0.09)
+    z = random.uniform(-0.7, 0.7, 4)
+    case = moved_case(tmp_path, moved, FINE)
+    observations = read_observations(case)
+    point = linearise(model_of(case, observations), z)
+    assert point is not None
+    error = observations.table["standard_error"].to_numpy(float)
+    measured = point.prediction + error * random.standard_normal(error.size)
+    model = model_of(moved_case(tmp_path, moved, CELL), observations)
+    model = replace(model, station=observations.table.assign(value=measured))
+    assert diagnose_model(model).verdict.kind == "nothing-missing"

@@ -15,8 +15,8 @@ from vegglue.site.grid import Grid, cell_stretch, curvature_of, filter_width_of
 from vegglue.site.gridded_site import Site, in_experiment
 from vegglue.site.zones import BANK_SLOPE, beyond_slope_break
 
-# Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over a
-# cell that lies half within is a fourth. Laws that fade out divide by such distances.
+# Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over
+# a cell that lies half within is a fourth. Laws that fade out divide by such distances.
 NEAREST = 0.25
 # Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
 GEOMETRIES_KEPT = 8
