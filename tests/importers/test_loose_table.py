@@ -66,6 +66,42 @@ def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tupl
     assert table.rows[0][1] == first
 
 
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [
+            "PS1;155020,7;463045,2;12 mei;11,76;",
+            "PS2;155095,9;463072,9;12 mei;11,73;schaal scheef",
+            "PS3;1,5;2,5;a;3,1;",
+        ],
+        ["PS1;155020,7;463045,2;12 mei;11,76", "PS2;155095,9;463072,9;12 mei;11,73;scheef", "PS3;1,5;2,5;a;3,1;x y"],
+        ["12 mei;620;meetschot", "3 juni;1400;ADCP, 4 raaien"],
+        [
+            "A;1;155048,53;463050,74;NaN;NaN;droog",
+            "A;2;155048,39;463051,12;14,3;70,4;",
+            "A;3;155048,2;463051,5;2,5;69;",
+        ],
+        ["A;1;155048,53;463050,74;-;-;droog", "A;2;155048,39;463051,12;14,3;70,4;", "A;3;155048,2;463051,5;2,5;69;"],
+        ["A;left;bank;3,5;;;dry", "A;2;155048,39;463051,12;14,3;70,4;", "A;3;155048,2;463051,5;2,5;69;"],
+    ],
+)
+@pytest.mark.parametrize("units", [[], ["-;1;m;m;-;-;"]])
+def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: list[str]) -> None:
+    """A remark in two of six rows had them parted by their decimal commas, and a dry first row became the heading."""
+    table = read_loosely(table_of(tmp_path, "raai;x;q;level;u;direction;note", *units, *rows))
+    assert table.headings[:3] == ("raai", "x", "q")
+    assert [row[0] for _, row in table.rows] == [row.split(";")[0] for row in rows]
+    assert table.form.startswith("semicolons")
+    assert bool(any(table.units)) == bool(units)
+
+
+def test_words_with_semicolons_do_not_part_a_table_of_commas(tmp_path: Path) -> None:
+    table = read_loosely(
+        table_of(tmp_path, "x,y,u,note", "1,2,0.5,wet; deep", "3,4,0.6,dry; steep", "5,6,0.7,mud; old")
+    )
+    assert table.headings == ("x", "y", "u", "note")
+
+
 def told_of(folder: Path, *lines: str) -> str:
     """What is told of a table of measurements in a folder of a field team."""
     table_of(field_folder(folder), *lines)

@@ -13,8 +13,9 @@ from zipfile import ZipFile
 
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import role_of
 from vegglue.importers.library_files import read_by_library, refuse_larger
-from vegglue.importers.number_words import has_decimal_comma, is_number, number_in
+from vegglue.importers.number_words import MISSING_WORDS, has_decimal_comma, is_number, number_in
 from vegglue.importers.unit_words import is_unit
 from vegglue.in_short import listed, so_many
 
@@ -91,12 +92,19 @@ def _without_comments(text: str) -> tuple[list[tuple[int, str]], int]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """That which cuts most lines into equally many fields, two or more; titles are not cut."""
+    """That which cuts most lines into equally many fields, two or more; titles are not cut.
+
+    A row of numbers that are none any more is cut amiss: `155020,7;463045,2` by its commas.
+    """
     found, best = " ", 0.0
-    for separator in SEPARATORS:
-        fields = [len(_filled(_fields(line, separator))) for line in lines[-LOOKED_AT:]]
-        counts = Counter(count for count in fields if count > 1)
-        share = max(counts.values(), default=0) / len(fields) if fields else 0.0
+    looked_at = lines[-LOOKED_AT:]
+    cut = {separator: [_filled(_fields(line, separator)) for line in looked_at] for separator in SEPARATORS}
+    holds = {separator: [any(map(is_number, fields)) for fields in rows] for separator, rows in cut.items()}
+    of_words = [not any(one) for one in zip(*holds.values(), strict=True)]
+    for separator, rows in cut.items():
+        sound = [one or words for one, words in zip(holds[separator], of_words, strict=True)]
+        counts = Counter(len(fields) for fields, kept in zip(rows, sound, strict=True) if kept and len(fields) > 1)
+        share = max(counts.values(), default=0) / len(rows) if rows else 0.0
         if share > best + MORE_LINES_CUT:
             found, best = separator, share
     return found
@@ -117,7 +125,7 @@ def _filled(fields: list[str]) -> list[str]:
 def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool = False) -> LooseTable:
     """The longest stretch of rows of numbers, with the heading and the units above it."""
     lines = [(number, _filled(fields)) for number, fields in whole]
-    numeric = [sum(map(is_number, fields)) * 2 >= len(fields) > 1 for _, fields in lines]
+    numeric = _rows_of_numbers(lines, separator)
     if not any(numeric):
         raise InputError(f"{shown_path(path)}: expected a table of numbers, got none; {CHECK_OR_MOVE}.")
     first, begin, width = _begin(lines, numeric)
@@ -135,6 +143,35 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
     lone = len(lines) - first - len(rows)
     form += ("" if named else ", no heading") + (f", {so_many(lone, 'line')} of one field left out" if lone else "")
     return LooseTable(tuple(headings), units, kept, decimal_comma, form)
+
+
+def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
+    """Which lines are rows of the table, and neither a title nor a heading: half of the fields are numbers.
+
+    Words behind the last number are a remark, and not counted, unless words of a title may stand for fields. Marks for
+    no value beside two numbers are values. A line below names of columns is a row if it holds a number and no name.
+    """
+    found = [_is_row(fields, separator) for _, fields in lines]
+    above: Sequence[str] = ()
+    for i, (_, fields) in enumerate(lines[:-1]):
+        if not all(map(is_unit, fields)):
+            nameless = any(map(is_number, fields)) and not any(map(role_of, fields))
+            found[i] = found[i] or (nameless and found[i + 1] and _names_columns(above))
+            above = fields
+    return found
+
+
+def _names_columns(fields: Sequence[str]) -> bool:
+    return len(fields) > 1 and any(map(role_of, fields)) and not any(map(is_number, fields))
+
+
+def _is_row(fields: Sequence[str], separator: str) -> bool:
+    numbers = [is_number(field) for field in fields]
+    last = max((place for place, number in enumerate(numbers, 1) if number), default=0)
+    values = sum(numbers)
+    marked = values + sum(field.lower() in MISSING_WORDS for field in fields if field) if values > 1 else values
+    with_remark = separator != " " and not all(map(is_unit, fields)) and values * 2 >= last > 1
+    return marked * 2 >= len(fields) > 1 or with_remark
 
 
 def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, int]:
