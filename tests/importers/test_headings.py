@@ -132,3 +132,29 @@ def test_words_of_the_site_file_that_reach_no_column_are_refused(tmp_path: Path,
 @pytest.mark.parametrize("heading", ["Velocity in cm/s", "u in cm/s", "Depth-averaged velocity [cm/s]"])
 def test_a_unit_may_stand_behind_in(heading: str) -> None:
     assert role_of(heading) == ("u", "cm/s")
+
+
+@pytest.mark.parametrize(
+    ("headings", "roles"),
+    [
+        ("snelheid [cm/s];richting [graden]", {"speed", "direction"}),
+        ("Geschwindigkeit [cm/s];Fließrichtung [Grad]", {"speed", "direction"}),
+        ("vitesse [cm/s];direction [degrés]", {"speed", "direction"}),
+        ("mean velocity [cm/s];direction [deg]", {"speed", "direction"}),
+        ("V [cm/s];dir [°]", {"speed", "direction"}),
+        ("velocity x [cm/s];direction [deg]", {"u", "direction"}),
+        ("snelheid [cm/s];meting", {"u"}),
+    ],
+)
+def test_a_velocity_with_a_direction_is_a_speed(tmp_path: Path, headings: str, roles: set[str]) -> None:
+    """It was taken for the one along the channel, and its direction dropped."""
+    (tmp_path / "a.csv").write_text(f"x;y;{headings}\n8;0;40;30\n20;0;50;31\n", encoding="utf-8")
+    taken = read_rows(tmp_path / "a.csv", FileWords())
+    assert set(taken.numbers) == {"x", "y"} | roles
+    assert "u" in roles or taken.numbers["speed"].tolist() == [0.4, 0.5]
+    assert read_rows(tmp_path / "a.csv", FileWords(columns={"u": headings.split(";")[0]})).numbers["u"][0] == 0.4
+
+
+def test_an_empty_direction_leaves_the_velocity_along(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("x;y;snelheid;richting\n8;0;0,4;\n20;0;0,5;\n", encoding="utf-8")
+    assert "u" in read_rows(tmp_path / "a.csv", FileWords()).numbers

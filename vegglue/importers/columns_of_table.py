@@ -16,12 +16,15 @@ from vegglue.importers.column_names import (
 )
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
+from vegglue.importers.number_words import is_number
 from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
 from vegglue.in_short import listed
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
 NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
+# Words of a heading of u that say along; one without them is that of a speed where a direction stands beside it.
+WORDS_FOR_ALONG = {"u", "ux", "vx", "umean", "x", "streamwise"}
 # Names that stand for a role where no other column has it: beside z of a point there may be the bed, beside Vx the
 # magnitude of the velocity, and beside the depth of the water that of a point.
 SECTIONS_PROPER = {*ROLES["section"].names} - {*NAMES_OF_GAUGES}
@@ -63,6 +66,8 @@ def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[st
     _refuse_doubles(path, table, found, words)
     if "v" not in words.columns and _is_the_speed(found, table.headings):
         found["u"] = found.pop("v")
+    if "u" not in words.columns and _has_direction(found, table):
+        found["speed"] = found.pop("u")
     if "u_se" not in words.columns and (kind := _only_kind(found)) and not _of_one(table.headings[found["u_se"]]):
         found.setdefault(f"{kind}_se", found.pop("u_se"))
     # One error for a velocity, not for a component of it, is that of both.
@@ -128,6 +133,14 @@ def _is_the_speed(found: Mapping[str, int], headings: Sequence[str]) -> bool:
     """Whether a column V stands for the velocity: there is no other, and its name says no direction."""
     alone = not any(ROLES[role].quantity == "velocity" for role in found if role not in ("v", "u_se", "u_std"))
     return "v" in found and alone and not WORDS_FOR_ACROSS & set(words_of(headings[found["v"]]).split())
+
+
+def _has_direction(found: Mapping[str, int], table: LooseTable) -> bool:
+    """Whether a velocity, whose name says no component, has a direction beside it, and so is a speed."""
+    if not {"u", "direction"} <= found.keys() or {"v", "speed"} & found.keys():
+        return False
+    known = any(is_number(row[found["direction"]]) for _, row in table.rows)
+    return known and not WORDS_FOR_ALONG & set(words_of(table.headings[found["u"]]).split())
 
 
 def _only_kind(found: Mapping[str, int]) -> str | None:

@@ -28,7 +28,9 @@ UNITS: dict[str, dict[str, float]] = {
 SPELLINGS = {
     "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "usft": "ft", "inch": "in",
     "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "cms": "m3/s",
-    "deg": "degrees", "degree": "degrees", "°": "degrees", "radians": "rad", "sec": "s", "seconds": "s",
+    "deg": "degrees", "degree": "degrees", "°": "degrees", "graden": "degrees",
+    "graad": "degrees", "grad": "degrees", "degré": "degrees", "degrés": "degrees", "degres": "degrees",
+    "grados": "degrees", "gradi": "degrees", "graus": "degrees", "radians": "rad", "sec": "s", "seconds": "s",
     "minutes": "min", "hours": "h", "m/sec": "m/s", "cm/sec": "cm/s", "ft/sec": "ft/s", "ms": "m/s", "mps": "m/s",
     "lps": "l/s", "gpm": "gal/min", "m3/day": "m3/d", "yards": "yd", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s",
     "qm3/s": "m3/s",
