@@ -158,3 +158,19 @@ def test_a_velocity_with_a_direction_is_a_speed(tmp_path: Path, headings: str, r
 def test_an_empty_direction_leaves_the_velocity_along(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x;y;snelheid;richting\n8;0;0,4;\n20;0;0,5;\n", encoding="utf-8")
     assert "u" in read_rows(tmp_path / "a.csv", FileWords()).numbers
+
+
+@pytest.mark.parametrize(
+    "heading", ["snelheid [cm/s]", "snelheid (cm/s)", "snelheid, cm/s", "snelheid_cm_s", "snelheid"]
+)
+def test_a_column_is_named_without_its_unit(tmp_path: Path, heading: str) -> None:
+    """`columns: {speed: snelheid}` was refused, and wanted `snelheid [cm/s]`."""
+    (tmp_path / "a.csv").write_text(f"x;y;{heading}\n8;0;40\n20;0;50\n", encoding="utf-8")
+    words = FileWords(columns={"speed": "snelheid"}, units={"speed": "cm/s"})
+    assert read_rows(tmp_path / "a.csv", words).numbers["speed"].tolist() == [0.4, 0.5]
+
+
+def test_a_name_of_two_columns_needs_its_unit(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("x;y;snel [cm/s];snel [m/s]\n8;0;40;0,4\n20;0;50;0,5\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"expected the column 'snel' for speed, got x, y, snel \[cm/s\]"):
+        read_rows(tmp_path / "a.csv", FileWords(columns={"speed": "snel"}))

@@ -4,7 +4,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from vegglue.importers.unit_words import unit_named
+from vegglue.importers.unit_words import is_like_unit, unit_named
 
 
 @dataclass(frozen=True)
@@ -133,6 +133,12 @@ def unit_stated(heading: str, quantity: str) -> str | None:
 def bracketed(heading: str) -> str:
     """What stands in brackets or after a comma at the end of a heading, '' where nothing does."""
     return _apart(heading)[1].strip()
+
+
+def names_without_unit(heading: str) -> set[str]:
+    """`snelheid` of `snelheid [cm/s]`, `snelheid, cm/s` and `snelheid_cm_s`; none where it has no unit."""
+    bare, unit = _apart(heading)
+    return {bare} if unit else {name for name, word in _suffixed(heading) if name and is_like_unit(word)}
 
 
 def _apart(heading: str) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from vegglue.importers.column_names import (
     bracketed,
     is_in_degrees,
     known_name,
+    names_without_unit,
     role_of,
     unit_stated,
     words_of,
@@ -78,9 +79,14 @@ def columns_of_table(path: Path, table: LooseTable, words: FileWords) -> dict[st
 
 
 def _named_in_site_file(path: Path, table: LooseTable, words: FileWords) -> dict[str, int]:
-    """The places of the columns that the site file names. Errors: InputError where one is not there, or is of two."""
+    """The places of the columns that the site file names, with or without their unit.
+
+    Errors: InputError where one is not there, or is of two.
+    """
     found: dict[str, int] = {}
-    for role, heading in words.columns.items():
+    for role, named in words.columns.items():
+        alike = [one for one in table.headings if named in names_without_unit(one)]
+        heading = alike[0] if named not in table.headings and len(alike) == 1 else named
         if heading not in table.headings:
             raise InputError(
                 f"{shown_path(path)}: expected the column {heading!r} for {role}, got {', '.join(table.headings)}; "
