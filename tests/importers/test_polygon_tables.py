@@ -84,3 +84,38 @@ def test_units_that_a_table_of_patches_does_not_give_are_told(tmp_path: Path, he
     (tmp_path / "patch.csv").write_text(f"{heading}\n{rows}", encoding="utf-8")
     found = planted_polygons(tmp_path / "patch.csv", None)
     assert planted_in_words(found) == f"1 patch: stems from {heading.split(',')[-1]}{taken}"
+
+
+@pytest.mark.parametrize(("heading", "density"), [("stengels_m2", 2.0), ("Halme pro m²", 2.0), ("tiges_par_m2", 2.0)])
+def test_stems_of_other_languages_are_read(tmp_path: Path, heading: str, density: float) -> None:
+    (found,) = planted_polygons(drawn(tmp_path / "a.geojson", **{heading: 2}), None)
+    assert found.density == density
+    assert planted_in_words([found]) == f"1 patch: stems from {heading}"
+
+
+def test_what_may_be_a_density_is_told_with_what_to_write(tmp_path: Path) -> None:
+    """Patches were equally dense, and the attribute that says otherwise was one of those not read."""
+    path = drawn(tmp_path / "a.geojson", bedekkingsdichtheid=2, stem_diameter=4, name="riet")
+    said = planted_in_words(planted_polygons(path, None))
+    assert "bedekkingsdichtheid may be their density: where it is, write `patches: {file: ..., columns: {stems:" in said
+    assert "stem_diameter may" not in said
+    (found,) = planted_polygons(path, None, {"stems": "bedekkingsdichtheid"})
+    assert (found.name, found.density, found.density_from) == ("riet", 2.0, "bedekkingsdichtheid")
+    with pytest.raises(
+        InputError, match=r"a.geojson: expected 'dichtheid' for stems of each polygon, got .* `patches`"
+    ):
+        planted_polygons(path, None, {"stems": "dichtheid"})
+
+
+def test_a_site_file_names_columns_of_patches(tmp_path: Path) -> None:
+    rows = "".join(f"{kind};{x};{y};{many}\n" for kind, many in (("riet", 20), ("zegge", 40)) for x, y in SQUARE[:-1])
+    patches = "patches: {file: plants.csv, columns: {stems: aantal, name: soort}}\n"
+    velocities = "experiment,section,x,y,u\nJune,A,8,0.5,0.4\n"
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + patches, velocities__csv=velocities)
+    (folder / "plants.csv").write_text(f"soort;x;y;aantal [1/m2]\n{rows}", encoding="utf-8")
+    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
+    assert [(one.name, one.stems) for one in case.plants.patches] == [("riet", 20.0), ("zegge", 40.0)]
+    assert not any("columns" in one for one in assumptions_of(folder))
+    (folder / "site.yaml").write_text(CHANNEL + JUNE + patches.replace("stems:", "stengels:"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"`patches.*columns` expected the headings of `stems` and `name`"):
+        vegglue.import_folder(folder, tmp_path / "brook.yaml")

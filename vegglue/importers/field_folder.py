@@ -145,7 +145,7 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
             continue
         if not (folder / one.file).is_file():
             raise InputError(f"{shown_path(folder)}: `patches` names {one.file}, which is not there; correct it.")
-        polygons = planted_polygons(folder / one.file, frame)
+        polygons = planted_polygons(folder / one.file, frame, one.columns)
         imported.append(record(folder / one.file, None, planted_in_words(polygons)))
         for polygon in polygons:
             density = polygon.density if polygon.density is not None else one.stems_per_m2

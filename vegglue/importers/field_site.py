@@ -85,6 +85,12 @@ def _walled(given: Any) -> Any:
     return {"n": given} if isinstance(given, int | float) else given
 
 
+def _of_polygons(columns: dict[str, str]) -> dict[str, str]:
+    if not columns.keys() <= {"stems", "name"}:
+        raise ValueError("the headings of `stems` and `name`, such as `{stems: HEADING}`")
+    return columns
+
+
 class PlantedPatch(_Said):
     """A rectangle of plants, or a polygon, in the channel; or a file of polygons."""
 
@@ -93,6 +99,7 @@ class PlantedPatch(_Said):
     polygon: Polygon | None = None
     file: PrintableName | None = None
     name: PrintableName | None = None
+    columns: Annotated[dict[str, str], AfterValidator(_of_polygons)] = {}
     stems_per_m2: Annotated[Number, Field(gt=0, le=1e7)] = 1.0
 
     @model_validator(mode="before")
@@ -101,6 +108,8 @@ class PlantedPatch(_Said):
         """Errors: ValidationError of a rectangle that lacks a side, unless it is another shape."""
         if isinstance(given, dict) and not given.keys() & {"polygon", "file"}:
             _Rectangle.model_validate(given)
+        if isinstance(given, dict) and "columns" in given and "file" not in given:
+            raise ValueError("a `file` beside `columns`")
         return given
 
 

@@ -16,9 +16,11 @@ from vegglue.importers.polygon_properties import (
     density_factor,
     density_heading,
     first_heading,
+    given_heading,
+    like_densities,
     names_its_unit,
 )
-from vegglue.importers.polygon_tables import polygons_of_table
+from vegglue.importers.polygon_tables import NONE_NAMED, columns_named, polygons_of_table
 from vegglue.in_short import listed, so_many
 
 AREAS = ("Polygon", "MultiPolygon")  # geometries of GeoJSON
@@ -30,7 +32,8 @@ Ring = list[tuple[float, float]]
 @dataclass(frozen=True)
 class NamedPolygon:
     """Corners in the channel [m]; density [1/m2] and class where the file says them; density_from: its heading;
-    unread: headings of what else the file says of it; lengths_taken: which of x and y were taken as m, unsaid.
+    unread: headings of what else the file says of it, like_density: those that may be a density; lengths_taken: which
+    of x and y were taken as m, unsaid.
     """
 
     name: str
@@ -39,39 +42,55 @@ class NamedPolygon:
     friction_class: str | None
     density_from: str | None = None
     unread: tuple[str, ...] = ()
+    like_density: tuple[str, ...] = ()
     lengths_taken: tuple[str, ...] = ()
 
 
-def read_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
-    """All polygons of a file, each part of one for itself. Errors: InputError for another file, and for degrees."""
-    features, taken = _features(path)
+def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
+    """All polygons of a file, each part of one for itself. columns: headings of `stems` and `name`, where they are not
+    told by themselves.
+
+    Errors: InputError for another file, for degrees, and for a heading that is not there.
+    """
+    features, taken = _features(path, columns)
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     refuse_degrees(path, frame, [ring for ring, _ in features])
-    named = [_named_polygon(path, frame, f"p{number}", *one) for number, one in enumerate(features, 1)]
+    headings = columns_named(path, columns, [*dict.fromkeys(str(key) for _, said in features for key in said)])
+    named = [_named_polygon(path, frame, f"p{number}", headings, *one) for number, one in enumerate(features, 1)]
     return [replace(one, lengths_taken=taken) for one in named]
 
 
-def _features(path: Path) -> tuple[Sequence[tuple[Ring, Mapping[str, Any]]], tuple[str, ...]]:
+def _features(
+    path: Path, columns: Mapping[str, str]
+) -> tuple[Sequence[tuple[Ring, Mapping[str, Any]]], tuple[str, ...]]:
     """Outlines with their properties, and which of x and y nobody gave a unit of; a map is in m by its frame."""
     ending = path.suffix.lower()
     if ending in TABLES:
-        return polygons_of_table(path)
+        return polygons_of_table(path, columns)
     return list(_of_shapefile(path) if ending == ".shp" else _of_geojson(path)), ()
 
 
 def _named_polygon(
-    path: Path, frame: Frame | None, number: str, ring: Ring, properties: Mapping[str, Any]
+    path: Path,
+    frame: Frame | None,
+    number: str,
+    named: Mapping[str, str],
+    ring: Ring,
+    properties: Mapping[str, Any],
 ) -> NamedPolygon:
-    of_density = density_heading(properties)
-    of_class, of_name = first_heading(properties, CLASSES), first_heading(properties, NAMES)
+    of_density = given_heading(properties, named["stems"]) if "stems" in named else density_heading(properties)
+    of_name = given_heading(properties, named["name"]) if "name" in named else first_heading(properties, NAMES)
+    of_class = first_heading(properties, CLASSES)
+    unread = {str(one): value for one, value in properties.items() if one not in (of_density, of_class, of_name)}
     return NamedPolygon(
         name=str(properties[of_name]) if of_name is not None else number,
         corners=[rounded_place(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
         density=_density(path, of_density, properties[of_density]) if of_density is not None else None,
         friction_class=str(properties[of_class]) if of_class is not None else None,
         density_from=of_density,
-        unread=tuple(str(one) for one in properties if one not in (of_density, of_class, of_name)),
+        unread=tuple(unread),
+        like_density=like_densities(unread),
     )
 
 
@@ -81,7 +100,15 @@ def planted_in_words(found: Sequence[NamedPolygon]) -> str:
     unread = dict.fromkeys(heading for one in found for heading in one.unread)
     said = f"stems from {listed(list(known))}" if known else "no stems, and so equally dense"
     clauses = [f"{so_many(len(found), 'patch', 'patches')}: {said}", *units_taken(found)]
-    return "; ".join([*clauses, *([f"not read: {listed(list(unread))}"] if unread else [])])
+    clauses += [f"not read: {listed(list(unread))}"] if unread else []
+    alike = dict.fromkeys(heading for one in found for heading in one.like_density)
+    if alike and not known:
+        first = next(iter(alike))
+        clauses.append(
+            f"{listed(list(alike))} may be their density: where it is, write "
+            f"`patches: {{file: ..., columns: {{stems: {first}}}}}`"
+        )
+    return "; ".join(clauses)
 
 
 def units_taken(found: Sequence[NamedPolygon]) -> list[str]:
@@ -93,9 +120,9 @@ def units_taken(found: Sequence[NamedPolygon]) -> list[str]:
     return [f"no unit given of {', and of '.join(taken)}"] if taken else []
 
 
-def planted_polygons(path: Path, frame: Frame | None) -> list[NamedPolygon]:
+def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
     """Polygons of plants. Errors: InputError as in read_polygons, and for one without stems among others that have."""
-    found = read_polygons(path, frame)
+    found = read_polygons(path, frame, columns)
     said = any(one.density is not None for one in found)
     for one in found:
         if said and not (one.density is not None and 0.0 < one.density <= MOST_STEMS):

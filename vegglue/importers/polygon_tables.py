@@ -1,12 +1,13 @@
 """Polygons in a table: the corners of each in their order, a row each, with its name and what is known of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import role_of
+from vegglue.importers.column_names import names_without_unit, role_of
 from vegglue.importers.columns_of_table import columns_of_table, taken_as_si
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import read_loosely
@@ -17,9 +18,31 @@ Corners = list[tuple[float, float]]
 FEWEST_CORNERS = 3
 
 
-def polygons_of_table(path: Path) -> tuple[list[tuple[Corners, Mapping[str, str]]], tuple[str, ...]]:
+NONE_NAMED: Mapping[str, str] = MappingProxyType({})
+
+
+def columns_named(path: Path, columns: Mapping[str, str], headings: Sequence[str]) -> dict[str, str]:
+    """The headings that the site file names, which may leave their unit out, by what they hold.
+
+    Errors: InputError for one that is not there.
+    """
+    found: dict[str, str] = {}
+    for what, named in columns.items():
+        alike = [one for one in headings if named in names_without_unit(one)]
+        if named not in headings and len(alike) != 1:
+            raise InputError(
+                f"{shown_path(path)}: expected {named!r} for {what} of each polygon, got "
+                f"{', '.join(headings) or 'none'}; correct `columns` of this file in `patches`."
+            )
+        found[what] = named if named in headings else alike[0]
+    return found
+
+
+def polygons_of_table(
+    path: Path, columns: Mapping[str, str] = NONE_NAMED
+) -> tuple[list[tuple[Corners, Mapping[str, str]]], tuple[str, ...]]:
     """Corners [m] and properties, those of its first row, of each name; of all rows where no column names polygons.
-    And which of x and y nobody gave a unit of.
+    And which of x and y nobody gave a unit of. columns: headings of `stems` and `name`, as the site file names them.
 
     Errors: InputError for a table without x and y, a corner that lacks one, and fewer corners than a triangle has.
     """
@@ -31,9 +54,14 @@ def polygons_of_table(path: Path) -> tuple[list[tuple[Corners, Mapping[str, str]
             "`patches: [{x: [20, 24], y: [0, 1.5], stems_per_m2: 22}]`."
         )
     taken = rows_of_table(path, table, FileWords())
+    headings = columns_named(path, columns, table.headings)
     texts = {**{taken.columns[role]: words for role, words in taken.texts.items()}, **taken.others}
     rows = [{heading: column[row].strip() for heading, column in texts.items()} for row in range(taken.size)]
-    named = first_heading(rows[0], NAMES) or next(iter(taken.columns[role] for role in taken.texts), None)
+    named = (
+        headings.get("name")
+        or first_heading(rows[0], NAMES)
+        or next(iter(taken.columns[role] for role in taken.texts), None)
+    )
     places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
     found: dict[str, tuple[Corners, Mapping[str, str]]] = {}
     for line, properties, place in zip(taken.lines, rows, places.tolist(), strict=True):
