@@ -328,3 +328,34 @@ def test_a_bed_of_more_levels_than_a_case_reads_is_refused(tmp_path: Path) -> No
     folder = folder_of(tmp_path / "brook", site, bed__csv=points, a__csv="x,y,u\n8,2,0.4\n")
     with pytest.raises(InputError, match=r"at most 10,000,000 levels .* got 1\.28e\+10; say larger cells"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+@pytest.mark.parametrize(
+    ("crs", "corner", "words"),
+    [
+        (
+            "urn:ogc:def:crs:EPSG::31370",
+            (155090.0, 463072.0),
+            "expected coordinates in EPSG:28992, .* got EPSG:31370; save",
+        ),
+        ("EPSG:31370", (155090.0, 463072.0), "expected coordinates in EPSG:28992, .* got EPSG:31370; save"),
+        ("urn:ogc:def:crs:OGC:1.3:CRS84", (5.3813, 52.1506), "got degrees; save it in .* of the survey, EPSG:28992"),
+        ("urn:ogc:def:crs:EPSG::28992", (155090.0, 463072.0), ""),
+    ],
+)
+def test_polygons_of_another_system_are_refused(
+    tmp_path: Path, crs: str, corner: tuple[float, float], words: str
+) -> None:
+    """With a centreline the frame has no origin, and patches in degrees or of Belgium were planted off the grid."""
+    side = 1e-4 if words.startswith("got degrees") else 2.0
+    ring = [[corner[0] + side * x, corner[1] + side * y] for x, y in ((0, 0), (1, 0), (1, 1))]
+    feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    system = {"type": "name", "properties": {"name": crs}}
+    text = json.dumps({"type": "FeatureCollection", "crs": system, "features": [feature]})
+    (tmp_path / "a.geojson").write_text(text, encoding="utf-8")
+    frame = Frame(origin=(0.0, 0.0), angle=0.0, crs="EPSG:28992")
+    if not words:
+        assert len(read_polygons(tmp_path / "a.geojson", frame)) == 1
+        return
+    with pytest.raises(InputError, match=words):
+        read_polygons(tmp_path / "a.geojson", frame)

@@ -17,6 +17,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import FileOfSite
 from vegglue.importers.file_words import file_words
 from vegglue.importers.map_files import (
+    SPAN_OF_DEGREES,
     geojson_features,
     may_be_degrees,
     refuse_degrees,
@@ -30,8 +31,6 @@ from vegglue.site.centreline import Centreline, centreline_of
 
 # Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
 MOST_POINTS = 1000
-# Degrees on the map that a whole reach spans at most: a line so short, in a file of a map program, lies in degrees.
-SPAN_OF_DEGREES = 0.5
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     said = dict(given.model_extra or {})
     turned = bool(said.pop("reverse", False))
     words = file_words(said, f"{shown_path(folder)}: `grid.centreline`")
-    taken = _of_map(path) if path.suffix.lower() in (".geojson", ".json", ".shp") else read_rows(path, words)
+    taken = _of_map(path, frame) if path.suffix.lower() in (".geojson", ".json", ".shp") else read_rows(path, words)
     points = _points(path, in_the_channel(taken, Placement(frame), words))
     refuse_degrees(path, frame, [list(zip(taken.numbers["x"].tolist(), taken.numbers["y"].tolist(), strict=True))])
     shape = CentrelineShape(points=tuple(points[::-1] if turned else points))
@@ -118,9 +117,9 @@ def _points(path: Path, taken: MeasuredRows) -> list[tuple[float, float]]:
     return found
 
 
-def _of_map(path: Path) -> MeasuredRows:
+def _of_map(path: Path, frame: Frame | None) -> MeasuredRows:
     """The one line in a file of a map program."""
-    found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path)
+    found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path, frame)
     if len(found) != 1:
         raise InputError(f"{shown_path(path)}: expected one line, got {len(found)}; save the centreline alone.")
     places = np.array(found[0], dtype=np.float64)
@@ -133,8 +132,8 @@ def _of_map(path: Path) -> MeasuredRows:
     return MeasuredRows({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, form)
 
 
-def _of_geojson(path: Path) -> list[Any]:
-    with geojson_features(path, "a line") as features:
+def _of_geojson(path: Path, frame: Frame | None) -> list[Any]:
+    with geojson_features(path, "a line", frame) as features:
         shapes = [feature.get("geometry", feature) for feature in features]
         lines = [[shape["coordinates"]] for shape in shapes if shape["type"] == "LineString"]
         lines += [shape["coordinates"] for shape in shapes if shape["type"] == "MultiLineString"]

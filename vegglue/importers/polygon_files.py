@@ -52,7 +52,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
 
     Errors: InputError for another file, for degrees, and for a heading that is not there.
     """
-    features, taken = _features(path, columns)
+    features, taken = _features(path, frame, columns)
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     refuse_degrees(path, frame, [ring for ring, _ in features])
@@ -62,13 +62,13 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
 
 
 def _features(
-    path: Path, columns: Mapping[str, str]
+    path: Path, frame: Frame | None, columns: Mapping[str, str]
 ) -> tuple[Sequence[tuple[Ring, Mapping[str, Any]]], tuple[str, ...]]:
     """Outlines with their properties, and which of x and y nobody gave a unit of; a map is in m by its frame."""
     ending = path.suffix.lower()
     if ending in TABLES:
         return polygons_of_table(path, columns)
-    return list(_of_shapefile(path) if ending == ".shp" else _of_geojson(path)), ()
+    return list(_of_shapefile(path) if ending == ".shp" else _of_geojson(path, frame)), ()
 
 
 def _named_polygon(
@@ -134,8 +134,8 @@ def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str]
     return found
 
 
-def _of_geojson(path: Path) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
-    with geojson_features(path, "polygons") as features:
+def _of_geojson(path: Path, frame: Frame | None) -> Iterator[tuple[Ring, Mapping[str, Any]]]:
+    with geojson_features(path, "polygons", frame) as features:
         for number, feature in enumerate(features, 1):
             properties = dict(feature.get("properties") or {})
             geometry = feature["geometry"]
