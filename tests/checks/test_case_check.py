@@ -231,6 +231,12 @@ def test_distance_to_an_outline(x, y, expected):
     assert distance_to_outline(outline, x, y) == pytest.approx(expected)
 
 
+@pytest.mark.filterwarnings("error")
+def test_corners_that_coincide_are_measured_without_a_warning():
+    outline = np.array([[0, 0], [3, 0], [3, 0], [3, 2], [0, 2], [0, 0]], dtype=float)
+    assert distance_to_outline(outline, -3, 4) == pytest.approx(3.6055512754639896)
+
+
 @pytest.mark.parametrize("name", ["d0", "d3a"])
 def test_the_channel_is_drawn(tmp_path, name):
     case = load_case(CONFIGS / f"{name}.yaml")

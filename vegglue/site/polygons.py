@@ -40,7 +40,9 @@ def distance_to_outline(outline: Array, x: float, y: float) -> float:
     """
     start, side = outline, np.roll(outline, -1, axis=0) - outline
     from_start = np.array([x, y]) - start
-    along = np.clip((from_start * side).sum(axis=1) / (side**2).sum(axis=1), 0.0, 1.0)
+    squared = (side**2).sum(axis=1)
+    # A side of no length, where two corners are one place, is its own nearest point.
+    along = np.clip((from_start * side).sum(axis=1) / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
     return float(np.hypot(*(from_start - along[:, None] * side).T).min())
 
 
