@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from field_folders import field_folder
+from field_folders import CHANNEL, field_folder, folder_of
 
 import vegglue
 from vegglue.errors import InputError
@@ -82,3 +82,28 @@ def test_a_column_of_remarks_here_and_there_is_not_shown(tmp_path: Path) -> None
     (folder / "survey.txt").write_text(rows, encoding="utf-8")
     with pytest.raises(InputError, match=r"got none; add one"):
         vegglue.import_folder(folder, tmp_path / "brook.yaml")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (
+            "meting;debiet [l/s];opmerking\n12 mei;620;meetschot\n3 juni;1400;ADCP, 4 raaien\n",
+            r"into the site file, `experiments: \{12 mei: \{discharge: 620 l/s, level: \.\.\.\}\}`, and move",
+        ),
+        (
+            "Peilschaal;X;Y;12 mei [m+NAP];3 juni [m+NAP]\nPS1;2;0;0,76;1,04\nPS2;15;0;0,73;1,01\n",
+            r"got a column of values for each, 12 mei \[m\+NAP\] and 3 juni .*gauge, x, y, experiment and level",
+        ),
+        (
+            "Peilschaal;afstand;12 mei;3 juni\nPS1;2;0,76;1,04\nPS2;15;0,73;1,01\n",
+            r"got a column of values for each, 12 mei and 3 juni; .*gauge, x, y, experiment and level",
+        ),
+    ],
+)
+def test_tables_by_experiment_are_told_what_to_write(tmp_path: Path, table: str, words: str) -> None:
+    """`expected a column of x` said of discharges of the experiments, and of gauges side by side, what they lack."""
+    flows = "experiments: {12 mei: {discharge: 620 l/s, level: 70 cm}, 3 juni: {discharge: 1400 l/s, level: 98 cm}}\n"
+    folder = folder_of(tmp_path / "beek", CHANNEL + flows, a__csv=table)
+    with pytest.raises(InputError, match=words):
+        vegglue.import_folder(folder, tmp_path / "beek.yaml")

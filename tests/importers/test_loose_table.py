@@ -9,6 +9,7 @@ from field_folders import field_folder
 import vegglue
 from vegglue.errors import InputError
 from vegglue.importers.loose_table import read_loosely
+from vegglue.importers.unit_words import unit_named
 
 HEADING = "experiment,section,x,y,u,u_se"
 ROWS = [f"low,D{number},{number}.0,-1.5,0.5718,0.012" for number in range(12)]
@@ -146,6 +147,11 @@ def test_a_unit_may_name_the_datum_of_a_level(tmp_path: Path) -> None:
     table = read_loosely(table_of(tmp_path, "Gauge;Chainage;Level", ";m;m a.s.l.", "A;2;47,748", "B;17;47,736"))
     assert table.headings == ("Gauge", "Chainage", "Level")
     assert table.units == ("", "m", "m a.s.l.")
+
+
+@pytest.mark.parametrize("unit", ["cm+NAP", "cm + NAP", "cm ü. NN"])
+def test_a_level_may_be_in_centimetres_above_a_datum(unit: str) -> None:
+    assert unit_named(unit, "length") == "cm"
 
 
 def test_two_titles_above_two_rows_are_no_table(tmp_path: Path) -> None:

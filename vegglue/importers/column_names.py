@@ -66,7 +66,7 @@ ROLES = {
                                  "niveau d' eau", "niveau de l' eau", "waterstand", "waterpeil", "nivel",
                                  "nivel del agua", "nivel de agua", "livello", "livello idrico")),
         Role("discharge", "discharge", ("discharge", "q", "flow", "flow rate", "abfluss", "debit", "total q",
-                                        "caudal", "afvoer", "portata", "vazao")),
+                                        "caudal", "afvoer", "debiet", "durchfluss", "portata", "vazao")),
         Role("u_se", "velocity", ("u se", "se u", "u error", "u uncertainty", "velocity se", "velocity uncertainty",
                                   "standard error", "se", "verr")),
         Role("v_se", "velocity", ("v se", "se v", "v error", "v uncertainty")),

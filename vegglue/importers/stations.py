@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
-from vegglue.importers.column_names import is_in_degrees
+from vegglue.importers.column_names import is_in_degrees, words_of
 from vegglue.importers.columns_of_table import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_words import FileWords
@@ -125,6 +125,10 @@ def _named(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], wh
         headings = ", ".join([*taken.columns.values(), *taken.others])
         if any(map(is_in_degrees, taken.others)):
             raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
+        if [kind.column for kind in KINDS.values() if kind.column in taken.numbers] == ["discharge"]:
+            raise InputError(_discharge_of_no_place(where, headings, experiments))
+        if "level" not in taken.numbers and (wide := _side_by_side(taken, experiments)):
+            raise InputError(_written_long(where, experiments, wide))
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
             "`files` of the site file, or give there `x: 12 m` of all rows, `line` of a tape or `position` of a probe."
@@ -150,15 +154,35 @@ def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[st
     if len(experiments) == 1:
         return [experiments[0]] * taken.size
     file = where.removesuffix(":").rpartition("/")[2]
-    if side_by_side := [heading for heading in taken.others if {heading, *heading.split()} & set(experiments)]:
-        raise InputError(
-            f"{where} expected a row for each place and experiment, with the name of the experiment ("
-            f"{', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
-            f"{listed(side_by_side)}; write them one below the other."
-        )
+    if side_by_side := _side_by_side(taken, experiments):
+        raise InputError(_written_long(where, experiments, side_by_side))
     raise InputError(
         f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{_alike(taken)}"
         f"; add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
+    )
+
+
+def _side_by_side(taken: MeasuredRows, experiments: Sequence[str]) -> list[str]:
+    """Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`."""
+    names = [name for one in experiments if (name := words_of(one))]
+    return [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in names)]
+
+
+def _written_long(where: str, experiments: Sequence[str], side_by_side: Sequence[str]) -> str:
+    return (
+        f"{where} expected a row for each place and experiment, with the name of the experiment ("
+        f"{', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
+        f"{listed(side_by_side)}; write them one below the other, levels of gauges in the columns gauge, x, y, "
+        "experiment and level."
+    )
+
+
+def _discharge_of_no_place(where: str, headings: str, experiments: Sequence[str]) -> str:
+    return (
+        f"{where} expected a column of x beside the discharges, got none in {headings}; write the discharge of each "
+        f"experiment into the site file, `experiments: {{{experiments[0]}: {{discharge: 620 l/s, level: ...}}}}`, and "
+        "move this file out of the folder; only discharges measured at sections have x, in a column, or as `x: 12 m` "
+        "of this file in `files`."
     )
 
 

@@ -37,7 +37,7 @@ SPELLINGS = {
 }  # fmt: skip
 # What stands behind the unit of a level and says of which datum it is: `m a.s.l.`, `m+NAP`, `m ü. NN`.
 OF_A_DATUM = re.compile(
-    r"(m|ft)[\s+]*(a\.?\s?s\.?\s?l\.?|above sea level|aod|nap|(ü\.?\s?)?nh?n|ahd|navd88|ngvd29|ngf|taw|dvr90)"
+    r"(m|dm|cm|mm|ft)[\s+]*(a\.?\s?s\.?\s?l\.?|above sea level|aod|nap|(ü\.?\s?)?nh?n|ahd|navd88|ngvd29|ngf|taw|dvr90)"
 )
 
 
