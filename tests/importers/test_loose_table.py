@@ -96,6 +96,13 @@ def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: l
     assert bool(any(table.units)) == bool(units)
 
 
+@pytest.mark.parametrize("rows", [["1;2;0,5", "3;4;0,6"], ["A;1;dry", "B;2;0,6"], ["A;1;dry", "B;2;wet"]])
+def test_what_a_title_says_with_its_unit_is_no_row(tmp_path: Path, rows: list[str]) -> None:
+    table = read_loosely(table_of(tmp_path, "Site;Mill brook", "Discharge;620;l/s", "x;y;u", *rows))
+    assert table.headings == ("x", "y", "u")
+    assert [";".join(row) for _, row in table.rows] == rows
+
+
 def test_words_with_semicolons_do_not_part_a_table_of_commas(tmp_path: Path) -> None:
     table = read_loosely(
         table_of(tmp_path, "x,y,u,note", "1,2,0.5,wet; deep", "3,4,0.6,dry; steep", "5,6,0.7,mud; old")

@@ -148,11 +148,14 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
 def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
     """Which lines are rows of the table, and neither a title nor a heading: half of the fields are numbers.
 
-    Words behind the last number are a remark, and not counted, unless words of a title may stand for fields. Marks for
-    no value beside two numbers are values. A line below names of columns is a row if it holds a number and no name.
+    Words behind the last number are a remark, and not counted below the heading; above it they are the unit of what a
+    title says. A line below names of columns is a row if it holds a number and no name.
     """
-    found = [_is_row(fields, separator) for _, fields in lines]
+    found = [_is_row(fields) for _, fields in lines]
+    heading = _last_heading(lines, found)
     above: Sequence[str] = ()
+    for i, (_, fields) in enumerate(lines):
+        found[i] = found[i] or (i > heading and _has_remark(fields, separator))
     for i, (_, fields) in enumerate(lines[:-1]):
         if not all(map(is_unit, fields)):
             nameless = any(map(is_number, fields)) and not any(map(role_of, fields))
@@ -161,17 +164,36 @@ def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
     return found
 
 
+def _last_heading(lines: Sequence[Line], numeric: Sequence[bool]) -> int:
+    """Where the last line of names stands above the first row of numbers of the usual width; -1 where none does."""
+    width = _usual_width(lines, numeric)
+    first = (i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
+    above = range(next(first, len(lines)))
+    return max((i for i in above if _names_columns(lines[i][1])), default=-1)
+
+
+def _usual_width(lines: Sequence[Line], numeric: Sequence[bool]) -> int:
+    """The commonest number of fields of rows of numbers, 0 where there are none."""
+    widths = Counter(len(fields) for (_, fields), row in zip(lines, numeric, strict=True) if row)
+    return widths.most_common(1)[0][0] if widths else 0
+
+
 def _names_columns(fields: Sequence[str]) -> bool:
     return len(fields) > 1 and any(map(role_of, fields)) and not any(map(is_number, fields))
 
 
-def _is_row(fields: Sequence[str], separator: str) -> bool:
+def _is_row(fields: Sequence[str]) -> bool:
+    """Whether half of the fields are numbers; marks for no value beside two numbers count as such."""
+    values = sum(map(is_number, fields))
+    marked = values + sum(field.lower() in MISSING_WORDS for field in fields if field) if values > 1 else values
+    return marked * 2 >= len(fields) > 1
+
+
+def _has_remark(fields: Sequence[str], separator: str) -> bool:
+    """Whether half of the fields up to the last number are numbers; between spaces words may be those of a title."""
     numbers = [is_number(field) for field in fields]
     last = max((place for place, number in enumerate(numbers, 1) if number), default=0)
-    values = sum(numbers)
-    marked = values + sum(field.lower() in MISSING_WORDS for field in fields if field) if values > 1 else values
-    with_remark = separator != " " and not all(map(is_unit, fields)) and values * 2 >= last > 1
-    return marked * 2 >= len(fields) > 1 or with_remark
+    return separator != " " and not all(map(is_unit, fields)) and sum(numbers) * 2 >= last > 1
 
 
 def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, int]:
@@ -179,8 +201,7 @@ def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, in
 
     Rows of other widths belong to it where words stand above them: its first rows may lack or have a field.
     """
-    widths = Counter(len(fields) for (_, fields), row in zip(lines, numeric, strict=True) if row)
-    width = widths.most_common(1)[0][0]
+    width = _usual_width(lines, numeric)
     first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
     begin = first - next((i for i, row in enumerate(reversed(numeric[:first])) if not row), first)
     return begin if begin > 0 and len(lines[begin - 1][1]) > 1 else first, begin, width
