@@ -96,6 +96,17 @@ def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: l
     assert bool(any(table.units)) == bool(units)
 
 
+@pytest.mark.parametrize(
+    "rows", [["S1 72,4 46,8 44,9", "A 1,6 57,6 69,3"], ["6,2 6,1 58,1", "- - 75,1", "7,3 2,1 8,3", "9,1 3,3 4,4"]]
+)
+def test_spaces_part_numbers_with_decimal_commas(tmp_path: Path, rows: list[str]) -> None:
+    """They were parted by the commas, as these cut all lines but the heading."""
+    headings = ("section", "x", "y", "u")[-len(rows[0].split()) :]
+    table = read_loosely(table_of(tmp_path, " ".join(headings), *rows, rows[0], rows[0], rows[0], rows[0]))
+    assert table.headings == headings
+    assert table.decimal_comma
+
+
 @pytest.mark.parametrize("rows", [["1;2;0,5", "3;4;0,6"], ["A;1;dry", "B;2;0,6"], ["A;1;dry", "B;2;wet"]])
 def test_what_a_title_says_with_its_unit_is_no_row(tmp_path: Path, rows: list[str]) -> None:
     table = read_loosely(table_of(tmp_path, "Site;Mill brook", "Discharge;620;l/s", "x;y;u", *rows))

@@ -94,12 +94,12 @@ def _without_comments(text: str) -> tuple[list[tuple[int, str]], int]:
 def _separator(lines: Sequence[str]) -> str:
     """That which cuts most lines into equally many fields, two or more; titles are not cut.
 
-    A row of numbers that are none any more is cut amiss: `155020,7;463045,2` by its commas.
+    A row of numbers most of which are none any more is cut amiss: `155020,7;463045,2` by its commas.
     """
     found, best = " ", 0.0
     looked_at = lines[-LOOKED_AT:]
     cut = {separator: [_filled(_fields(line, separator)) for line in looked_at] for separator in SEPARATORS}
-    holds = {separator: [any(map(is_number, fields)) for fields in rows] for separator, rows in cut.items()}
+    holds = {separator: [_is_cut_well(fields) for fields in rows] for separator, rows in cut.items()}
     of_words = [not any(one) for one in zip(*holds.values(), strict=True)]
     for separator, rows in cut.items():
         sound = [one or words for one, words in zip(holds[separator], of_words, strict=True)]
@@ -108,6 +108,14 @@ def _separator(lines: Sequence[str]) -> str:
         if share > best + MORE_LINES_CUT:
             found, best = separator, share
     return found
+
+
+def _is_cut_well(fields: Sequence[str]) -> bool:
+    """Whether half of the fields are numbers, marks for none or words behind them, and not half of them several."""
+    values = [field if is_number(field) or field.lower() not in MISSING_WORDS else "0" for field in fields]
+    several = [field for field in fields if " " in field and not is_number(field)]
+    joined = sum(all(map(is_number, field.split())) for field in several)
+    return any(map(is_number, fields)) and _is_half_numbers(values) and joined * 2 < len(fields)
 
 
 def _fields(line: str, separator: str) -> list[str]:
@@ -190,10 +198,15 @@ def _is_row(fields: Sequence[str]) -> bool:
 
 
 def _has_remark(fields: Sequence[str], separator: str) -> bool:
-    """Whether half of the fields up to the last number are numbers; between spaces words may be those of a title."""
+    """Whether it is a row with words behind its numbers; between spaces they may be those of a title."""
+    return separator != " " and not all(map(is_unit, fields)) and _is_half_numbers(fields)
+
+
+def _is_half_numbers(fields: Sequence[str]) -> bool:
+    """Whether half of the fields up to the last number are numbers; a number in front alone is none."""
     numbers = [is_number(field) for field in fields]
     last = max((place for place, number in enumerate(numbers, 1) if number), default=0)
-    return separator != " " and not all(map(is_unit, fields)) and sum(numbers) * 2 >= last > 1
+    return sum(numbers) * 2 >= last > 1
 
 
 def _begin(lines: Sequence[Line], numeric: Sequence[bool]) -> tuple[int, int, int]:
