@@ -117,7 +117,7 @@ def _points(path: Path, taken: MeasuredRows) -> list[tuple[float, float]]:
     return found
 
 
-def _of_map(path: Path, frame: Frame | None) -> MeasuredRows:
+def _of_map(path: Path, frame: Frame | None = None) -> MeasuredRows:
     """The one line in a file of a map program."""
     found = _of_shapefile(path) if path.suffix.lower() == ".shp" else _of_geojson(path, frame)
     if len(found) != 1:

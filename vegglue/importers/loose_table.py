@@ -161,15 +161,17 @@ def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
     """
     found = [_is_row(fields) for _, fields in lines]
     heading = _last_heading(lines, found)
-    above: Sequence[str] = ()
     for i, (_, fields) in enumerate(lines):
-        found[i] = found[i] or (i > heading and _has_remark(fields, separator))
-    for i, (_, fields) in enumerate(lines[:-1]):
-        if not all(map(is_unit, fields)):
-            nameless = any(map(is_number, fields)) and not any(map(role_of, fields))
-            found[i] = found[i] or (nameless and found[i + 1] and _names_columns(above))
-            above = fields
+        found[i] = (
+            found[i] or (i > heading and _has_remark(fields, separator)) or (0 <= heading < i and _is_thin(fields))
+        )
     return found
+
+
+def _is_thin(fields: Sequence[str]) -> bool:
+    """Whether it holds a number, and neither a name of a column nor units alone."""
+    several = len(fields) > 1 and any(map(is_number, fields))
+    return several and not any(map(role_of, fields)) and not all(map(is_unit, fields))
 
 
 def _last_heading(lines: Sequence[Line], numeric: Sequence[bool]) -> int:
