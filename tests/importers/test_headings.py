@@ -44,6 +44,8 @@ def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str)
         ("Hauteur d’eau", "depth"),
         ("Niveau d'eau", "level"),
         ("Waterstand", "level"),
+        ("Debiet", "discharge"),
+        ("Peilschaal", "section"),
         ("Profundidad", "depth"),
         ("Caudal", "discharge"),
         ("Sección", "section"),

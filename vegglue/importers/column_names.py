@@ -17,7 +17,17 @@ class Role:
 
 
 # Columns that name the gauge of a level, and mean nothing beside velocities.
-NAMES_OF_GAUGES = ("gauge", "gage", "gauge name", "gage name", "gauge id", "gauge no", "staff gauge", "pegelname")
+NAMES_OF_GAUGES = (
+    "gauge",
+    "gage",
+    "gauge name",
+    "gage name",
+    "gauge id",
+    "gauge no",
+    "staff gauge",
+    "pegelname",
+    "peilschaal",
+)
 # Told apart from one another by their whole name, so that none of these is ambiguous. East and north components are
 # roles of their own: they turn with the map.
 ROLES = {
