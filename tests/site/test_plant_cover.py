@@ -64,6 +64,15 @@ def test_a_polygon_covers_its_area(tmp_path: Path, corners: list[list[float]]) -
     assert site.cover.max() <= 1.0
 
 
+@pytest.mark.parametrize(
+    "corners", [[[60, 0], [61, 0], [61, 1]], [[10, 20], [12, 20], [12, 21]], [[10, 0], [12, 0], [14, 0]]]
+)
+def test_a_polygon_beyond_the_grid_or_without_area_covers_nothing(tmp_path: Path, corners: list[list[float]]) -> None:
+    _, site = case_with(tmp_path, f"polygon: {corners}")
+    assert not site.cover.any()
+    assert (site.patch == -1).all()
+
+
 def test_a_polygon_is_the_range_that_it_draws(tmp_path: Path) -> None:
     sides = "x: [10.3, 14.1], y: [0.125, 1.375]"
     corners = "polygon: [[10.3, 0.125], [14.1, 0.125], [14.1, 1.375], [10.3, 1.375]]"

@@ -41,15 +41,25 @@ def _share_in_polygon(corners: Array, grid: Grid) -> Array:
 
     A line enters it where it crosses the outline for the first, third .. time, and leaves it in between.
     """
+    columns, rows = _met(corners[:, 0], grid.x, grid.dx), _met(corners[:, 1], grid.y, grid.dy)
     in_row = grid.dy * ((np.arange(LINES_IN_ROW) + 0.5) / LINES_IN_ROW - 0.5)
-    lines = (grid.y[:, None] + in_row).ravel()
-    edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
-    met = np.flatnonzero((lines >= corners[:, 1].min()) & (lines < corners[:, 1].max()))
+    x, y = grid.x[columns], grid.y[rows]
+    lines = (y[:, None] + in_row).ravel()
+    edges = np.append(x - 0.5 * grid.dx, x[-1:] + 0.5 * grid.dx)
     length = np.zeros((lines.size, edges.size))
-    for turn, crossing in enumerate(_crossings(corners, lines[met])):
-        length[met] += (-1.0) ** turn * np.maximum(edges - crossing[:, None], 0.0)
-    share = np.diff(length, axis=1) / grid.dx
-    return np.asarray(share.reshape(grid.y.size, LINES_IN_ROW, grid.x.size).mean(axis=1).T)
+    for turn, crossing in enumerate(_crossings(corners, lines)):
+        length += (-1.0) ** turn * np.maximum(edges - crossing[:, None], 0.0)
+    along = np.diff(length, axis=1).reshape(y.size, LINES_IN_ROW, x.size) / grid.dx
+    share = np.zeros((grid.x.size, grid.y.size))
+    share[columns, rows] = along.mean(axis=1).T
+    return share
+
+
+def _met(values: Array, centres: Array, step: float) -> slice:
+    """The cells (n,) between the least and the largest of some places [m]."""
+    first = int(np.searchsorted(centres + 0.5 * step, values.min(), "right"))
+    last = int(np.searchsorted(centres - 0.5 * step, values.max(), "left"))
+    return slice(min(first, last), last)
 
 
 def _crossings(corners: Array, lines: Array) -> Array:
