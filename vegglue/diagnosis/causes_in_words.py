@@ -210,9 +210,19 @@ def p_in_words(p: float) -> str:
 
 def undecided_in_words(undecided: Undecided) -> str:
     """The likeliest contenders with their chances among all of them."""
+    return " or ".join(f"{_contender_words(one)} ({_percent(chance)})" for one, chance in _told_of(undecided))
+
+
+def places_told(found: Findings) -> list[tuple[float, float]]:
+    """x and y [m] of what the sentence on causes tells at places outside the list."""
+    rivals = [one.what for one, _ in _told_of(found.undecided) if one.kind != "effect"] if found.undecided else []
+    of_rivals = [(one.shapes["x"], one.shapes["y"]) for one in rivals if not isinstance(one, Instrument)]
+    return [(one.x, one.y) for one in found.places] or of_rivals
+
+
+def _told_of(undecided: Undecided) -> list[tuple[Contender, float]]:
     pairs = zip(undecided.contenders, undecided.chances, strict=True)
-    told = sorted(pairs, key=lambda one: -one[1])[:UNDECIDED_TOLD]
-    return " or ".join(f"{_contender_words(one)} ({_percent(chance)})" for one, chance in told)
+    return sorted(pairs, key=lambda one: -one[1])[:UNDECIDED_TOLD]
 
 
 def _contender_words(one: Contender) -> str:

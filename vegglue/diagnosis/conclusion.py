@@ -10,12 +10,14 @@ from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, i
 from vegglue.calibration.noise import with_correlation
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.diagnosis.between_sections import largest_error_between
+from vegglue.diagnosis.causes_in_words import places_told
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds
 from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
+from vegglue.diagnosis.places_on_map import places_on_map_in_words
 from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded, suspects_of
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
@@ -133,6 +135,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         strained=_strained(last),
         between=largest_error_between(last.base) if silent else 1.0,
         stretch=stretch_in_words(model.case, model.station),
+        on_map=places_on_map_in_words(model.case, places_told(found)),
         places_searched=any(one.x.size for one in last.fingerprints.places),
         carried=tuple(carried_otherwise(model.case, model.site, model.station)),
         standing_out=beside,

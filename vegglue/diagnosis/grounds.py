@@ -22,11 +22,11 @@ class Grounds:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; by_chance:
     what of that errors alone exceed in 5 % of cases; neighbours: whether readings side by side were set aside;
     strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
-    measured, over those of the data [-], at most; laws: those that stand out; stretch: what is told of the part of the
-    channel that was measured, '' for nothing; places_searched: whether there was water deep enough to look for
-    something at a place; carried: sections that clearly carry another discharge than stated; standing_out: effects
-    that stand out in the last model, with the family-wise p of each [-]; remainder: whether all of these may be what
-    is left of what was accepted.
+    measured, over those of the data [-], at most; laws: those that stand out; on_map: where places lie on the map;
+    stretch: what is told of the part of the channel that was measured, '' for nothing; places_searched: whether there
+    was water deep enough to look for something at a place; carried: sections that clearly carry another discharge than
+    stated; standing_out: effects that stand out in the last model, with the family-wise p of each [-]; remainder:
+    whether all of these may be what is left of what was accepted.
     """
 
     errors: EstimatedErrors
@@ -42,6 +42,7 @@ class Grounds:
     by_chance: float = 1.0
     laws: LawsSuspected | None = None
     stretch: str = ""
+    on_map: str = ""
     places_searched: bool = True
     carried: tuple[CarriedDischarge, ...] = ()
     standing_out: Mapping[str, float] = by_default(default_factory=dict)

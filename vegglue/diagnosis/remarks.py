@@ -30,7 +30,7 @@ def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Stateme
     remarks += _implausible(found.steps, suspects)
     remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     remarks += _besides(grounds, suspects, statement)
-    remarks += [grounds.stretch] if grounds.stretch else []
+    remarks += [one for one in (grounds.on_map, grounds.stretch) if one]
     remarks += [] if grounds.places_searched else [TOO_SHALLOW]
     if (
         statement.kind in ("identified", "one-of", "none-of-these", "instrument")
