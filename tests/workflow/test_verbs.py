@@ -116,7 +116,7 @@ def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
     vegglue.infer(case, ensemble, runs=runs, method="glue")
     assert vegglue.report(case, runs=runs).exists(), "a page is of the members that are there"
     assert vegglue.report(case, runs=runs, members=8).exists()
-    with pytest.raises(vegglue.InputError, match=r"run `vegglue simulate .*brook\.yaml`"):
+    with pytest.raises(vegglue.InputError, match=r"run `vegglue simulate .*brook\.yaml --runs .*runs`"):
         vegglue.report(case, runs=runs, members=9)
 
 
@@ -124,7 +124,7 @@ def test_another_size_of_the_ensemble_goes_through(tmp_path: Path) -> None:
 def test_draws_and_their_page_need_no_ensemble(tmp_path: Path) -> None:
     case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR))
     runs = tmp_path / "runs"
-    with pytest.raises(vegglue.InputError, match=r"`vegglue simulate .*brook\.yaml`"):
+    with pytest.raises(vegglue.InputError, match=r"`vegglue simulate .*brook\.yaml --runs .*runs`"):
         vegglue.infer(case, runs=runs, method="glue")
     posterior = vegglue.infer(case, runs=runs, jobs=2)
     assert posterior.weighting.effective_size >= 1000
