@@ -8,6 +8,8 @@ from sound_case import ROWS, SOUND
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
+from vegglue.checks.channel_and_plants import remarks_on_patches
+from vegglue.flow.closures import drag
 from vegglue.flow.problem_setup import build_problem
 from vegglue.site.channel_geometry import channel_geometry
 from vegglue.site.gridded_site import Site, build_site
@@ -89,6 +91,12 @@ def test_patches_side_by_side_share_a_cell(tmp_path: Path) -> None:
     assert site.patch[10, row] == 1
 
 
+def test_patches_that_meet_within_cells_lose_none_to_each_other(tmp_path: Path) -> None:
+    """Half of a row each: no cell is hidden by the later one."""
+    case, site = case_with(tmp_path, "x: [10, 14], y: [0, 0.75]", "x: [10, 14], y: [0.75, 1.5]")
+    assert not [one for one in remarks_on_patches(case, site) if "loses" in one]
+
+
 def test_a_later_patch_wins_where_it_lies_over_another(tmp_path: Path) -> None:
     _, site = case_with(tmp_path, PATCH, "x: [12, 13], y: [0, 1.5]")
     assert [int((site.patch == index).sum()) for index in (0, 1)] == [9, 3]
@@ -103,8 +111,6 @@ def test_a_range_beyond_the_grid_ends_with_it(tmp_path: Path) -> None:
 
 def test_friction_of_a_cell_is_that_of_both_its_parts(tmp_path: Path) -> None:
     """s k_p + (1 - s) k: half planted, half way between bare and planted."""
-    from vegglue.flow.closures import drag
-
     theta = {"n_b": np.array([0.05]), "phi": np.array([3.0])}
     depth = np.full((40, 20, 1), 0.9)
     rates = []

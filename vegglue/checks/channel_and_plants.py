@@ -45,7 +45,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[str]:
     for index, patch in enumerate(case.plants.patches):
         meant = area_of(corners_of(case, patch))
         share = share_in_patch(case, patch, site.grid)
-        covered, hidden = share.sum() * cell, int(((share >= 0.5) & (site.patch != index)).sum())
+        covered, hidden = share.sum() * cell, int(((share > 0.5) & (site.patch != index)).sum())
         if not share.any():
             yield f"Patch {patch.name} covers no cell: {_why_none(case, site, corners_of(case, patch))}."
         elif abs(covered - meant) > LARGEST_MISS * meant:
