@@ -197,11 +197,9 @@ def main() -> None:
                 return
             run(todo, path, {record["key"] for record in kept}, given.jobs)
     records = {record["key"]: record for record in (*kept, *records_in(path))}
-    sizes = {key: sum(of_kind.values()) for key, of_kind in SIZES.items()}
     write_page(
         list(records.values()),
         ROOT / "docs",
-        sizes,
         values_by_key(LENGTHS, "truth"),
         values_by_key(PLACE_LIMITS, "near"),
         lines_by_key(OBJECT_LIMITS),
