@@ -5,16 +5,16 @@ from dataclasses import fields, replace
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.effects import bed_laws
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
+from vegglue.effects.plant_laws import PLANT_LAWS
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
+from vegglue.flow.newton import newton
 from vegglue.flow.problem import LEVEL, BedFriction, Boundaries, InflowSegment, Problem, VegetatedCells, take
-from vegglue.resistance import bed_laws
-from vegglue.resistance.plant_laws import PLANT_LAWS
-from vegglue.solver.newton import newton
-from vegglue.solver.prolongation import on_grid
+from vegglue.flow.prolongation import on_grid
 
 GRAVITY = 9.81
 

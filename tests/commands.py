@@ -12,11 +12,11 @@ import numpy as np
 from reach import write_reach
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import sample_of
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_chunk import solve_chunk
+from vegglue.inference.solve_chunk import solve_chunk
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 
 # Python without site packages: nothing of vegglue is loaded, as in another code.
 BARE = f"{sys.executable} -I -S"

@@ -9,8 +9,8 @@ from coarse_twin import coarse_twin
 
 from vegglue.compilation import is_kept
 from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.flow.block_elimination import solve
 from vegglue.parallel import at_most, one_thread
-from vegglue.solver.block_elimination import solve
 
 
 @one_thread()

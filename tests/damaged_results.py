@@ -14,8 +14,8 @@ from stored import ALL, HASH, WINDOW, a_header, write_chunks
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.diagnosis_json import diagnosis_json
-from vegglue.storage.digest import LENGTH, with_digest
-from vegglue.storage.result_files import (
+from vegglue.results.digest import LENGTH, with_digest
+from vegglue.results.result_files import (
     flow_that_fits,
     read_diagnosis,
     read_ensemble,

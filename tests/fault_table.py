@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 
 from vegglue.case.config import load_case
-from vegglue.ensemble import solve_ensemble
+from vegglue.inference import solve_ensemble
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import Progress
 

@@ -10,10 +10,10 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import MapEstimate, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import NEWTON
-from vegglue.site.gridded_site import build_site
 
 CASE_OF_TWINS = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")
 

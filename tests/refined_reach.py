@@ -6,10 +6,10 @@ from reach import write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_ensemble import solve_ensemble
+from vegglue.inference.solve_ensemble import solve_ensemble
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 FEW_MEMBERS = ("simulate: {members: 1024, seed: 7}", "simulate: {members: 64, seed: 7}\ninfer: {sigma: known}")
 STATED_ERRORS = ("velocities.csv, experiment: June}", "velocities.csv, experiment: June, standard_error: 0.01}")

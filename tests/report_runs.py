@@ -7,18 +7,18 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
+from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
-from vegglue.report_page.page import write_report
-from vegglue.report_page.run import Run
+from vegglue.report.page import write_report
+from vegglue.report.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
-from vegglue.site.gridded_site import Site, build_site
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 MEMBERS = 2048

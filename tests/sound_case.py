@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from vegglue.case.config import load_case
-from vegglue.checks.case_check import check_case
+from vegglue.case.gridded_site import build_site
+from vegglue.diagnosis.case_check import check_case
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 
 SOUND = """
 name: sound

@@ -14,8 +14,8 @@ import pytest
 
 from vegglue.results.ensemble import Header
 from vegglue.results.fields import FieldWindow
-from vegglue.storage.result_files import read_ensemble, read_fields
-from vegglue.storage.resume import EnsembleWriter, ensemble_writer
+from vegglue.results.result_files import read_ensemble, read_fields
+from vegglue.results.resume import EnsembleWriter, ensemble_writer
 
 MEMBERS, CHUNKS = 12, 3
 ALL = set(range(CHUNKS))

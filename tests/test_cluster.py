@@ -41,7 +41,7 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
 
 @pytest.fixture
 def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
-    monkeypatch.setattr("vegglue.ensemble.solve_ensemble.FEWEST_CHUNKS", CHUNKS)
+    monkeypatch.setattr("vegglue.inference.solve_ensemble.FEWEST_CHUNKS", CHUNKS)
     return vegglue.load_case(write_reach(tmp_path, *CHANGES))
 
 

@@ -13,7 +13,7 @@ from house import FILES, PACKAGE
 from vegglue.compilation import SHARED, _of_loops, _stamp
 
 CHEZY = """
-from vegglue.resistance.plant_laws import baptist_chezy
+from vegglue.effects.plant_laws import baptist_chezy
 print(baptist_chezy(1.0, 0.5, 1.0, 60.0), sum(baptist_chezy.stats.cache_hits.values()))
 """
 
@@ -98,7 +98,7 @@ def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
 
 FIRST_USE = """
 import numpy as np
-from vegglue.solver.block_elimination import solve
+from vegglue.flow.block_elimination import solve
 from vegglue.engine.first_use import with_compilation
 print(with_compilation("calibrating"))
 solve(np.zeros((2, 3, 2, 2)), np.zeros((2, 2)), np.zeros((2, 2, 1)))

@@ -14,11 +14,11 @@ from open_cases import WANTED, assert_found
 from reach import ROOT, block, here, write_reach
 
 import vegglue
+from vegglue.calibration.candidates import NOT_SEARCHED
 from vegglue.case.resolved_config import case_hash
 from vegglue.cli.main import app
 from vegglue.effects.library import library
-from vegglue.screening.candidates import NOT_SEARCHED
-from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.results.kept_words import ladder_that_fits
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 # Pages whose commands are run, in this order, in one folder.

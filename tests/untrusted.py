@@ -10,12 +10,12 @@ from reach import COARSE, block, write_reach
 from untrusted_imports import IMPORTS
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
+from vegglue.case.terrain import read_raster, survey_levels
 from vegglue.errors import InputError, StorageError
 from vegglue.importers.site_file import read_site
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plant_survey import read_survey
-from vegglue.site.gridded_site import build_site
-from vegglue.site.terrain import read_raster, survey_levels
 
 ROOT = Path(__file__).parents[1]
 # Parts of files that readers stumble over.

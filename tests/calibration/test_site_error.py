@@ -9,9 +9,9 @@ from coarse_twin import CASE, coarse_twin
 from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.site_error import site_error_columns
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case, ModelError
 from vegglue.engine.interface import Model, Point, linearise
-from vegglue.site.gridded_site import build_site
 
 PARTS = ("stems", "edges", "probes", "discharge")
 

@@ -3,8 +3,8 @@
 from typing import get_args
 
 from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, Stand
-from vegglue.resistance.bed_laws import BED_LAWS
-from vegglue.resistance.plant_laws import PLANT_LAWS
+from vegglue.effects.bed_laws import BED_LAWS
+from vegglue.effects.plant_laws import PLANT_LAWS
 
 
 def test_a_config_knows_the_laws_there_are() -> None:

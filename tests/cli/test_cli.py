@@ -13,8 +13,8 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.cli.main import app
-from vegglue.solver.batch import CLUSTER_SIZE
-from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash
+from vegglue.flow.batch import CLUSTER_SIZE
+from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash
 
 pytestmark = pytest.mark.slow  # whole runs through the shell
 MEMBERS = 128

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from reach import COARSE, block, said_to, write_reach
 
+from vegglue.calibration.candidates import Candidate
 from vegglue.case.config import load_case
 from vegglue.diagnosis.child_config import child_name
 from vegglue.effects.library import library
-from vegglue.screening.candidates import Candidate
 
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
 WITH_ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.01}")

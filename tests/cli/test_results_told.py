@@ -13,7 +13,7 @@ from reach import COARSE, here, vegglue, write_reach
 
 from vegglue.cli.brief_posterior import COLUMNS, LINES, brief_posterior
 from vegglue.cli.output import left_out_of
-from vegglue.storage.result_files import read_posterior
+from vegglue.results.result_files import read_posterior
 
 MEMBERS = 32
 SMALL = ("members: 1024", f"members: {MEMBERS}")

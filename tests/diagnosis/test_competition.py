@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from vegglue.calibration import score_test
 from vegglue.diagnosis import competition
 from vegglue.diagnosis.competition import contenders_of
 from vegglue.diagnosis.rivals import followed_further, with_chances
 from vegglue.diagnosis.tempered_chances import tempered_chances, tempered_odds
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
-from vegglue.screening import score_test
 
 ROWS, SLOPES, PRINTS = 60, 3, 8
 

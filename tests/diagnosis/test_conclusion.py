@@ -10,14 +10,14 @@ from diagnoses import NOTHING, a_location, a_suspect, laws_suspected_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from verdicts import grounds, step
 
+from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.noise import GRID_ERROR_SHARE, with_correlation, with_grid_error
+from vegglue.calibration.residual_screening import Screening
 from vegglue.case.parameter_space import theta_at
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, standing_out
 from vegglue.diagnosis.findings import Findings, Undecided
-from vegglue.screening.candidates import with_effect
-from vegglue.screening.residual_screening import Screening
 
 
 @pytest.mark.parametrize(("kinds", "told"), [(("velocity", "discharge"), 0.001), (("level", "discharge"), np.nan)])

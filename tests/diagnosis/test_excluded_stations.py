@@ -18,7 +18,7 @@ from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.result_files import write_diagnosis
+from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow import run_folder
 from vegglue.workflow.extend import write_child
 from vegglue.workflow.set_aside import left_out

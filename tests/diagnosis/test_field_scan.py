@@ -12,9 +12,9 @@ from vegglue.calibration.baseline import SearchModel, search_model
 from vegglue.calibration.cell_responses import CellResponses
 from vegglue.calibration.model_error import bumps, field_columns
 from vegglue.calibration.noise import covariance_of
+from vegglue.case.gridded_site import build_site
 from vegglue.diagnosis.field_scan import FIELD_SIZES, FieldHypothesis, best_field, map_of_field, scanned_fields
 from vegglue.flow.local_changes import Term
-from vegglue.site.gridded_site import build_site
 
 SECTIONS, POINTS, PARAMETERS = ("A", "B"), 6, 3
 GRID = build_site(CASE_OF_TWINS).grid

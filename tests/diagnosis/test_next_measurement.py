@@ -7,11 +7,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import in_experiment
 from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, _with_other_discharges, planned
 from vegglue.engine.interface import Model
-from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import in_experiment
 from vegglue.workflow.run_folder import model_in
 
 

@@ -9,17 +9,17 @@ import pytest
 from coarse_twin import CASE, coarse_twin
 
 from vegglue.calibration.baseline import Baseline, search_model
+from vegglue.calibration.candidates import place_candidate, with_effect
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
+from vegglue.calibration.places import Places
+from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.parameter_space import z_of
 from vegglue.diagnosis.competition import promising_spots
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.engine.interface import linearise
-from vegglue.screening.candidates import place_candidate, with_effect
-from vegglue.screening.places import Places
-from vegglue.screening.residual_screening import Screening, screen
 
 # Between the spots, which stand 0.5 m and 0.45 m apart: drag below zero pushes, as a jet does.
 OBJECT = library()["unlisted_object"]

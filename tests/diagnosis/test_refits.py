@@ -12,6 +12,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.calibration.fit import covariance
 from vegglue.case.parameter_space import theta_at, z_of
 from vegglue.diagnosis import refits
@@ -20,7 +21,6 @@ from vegglue.diagnosis.refits import RefitTrial
 from vegglue.diagnosis.rivals import rivals_among
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.effects.library import library
-from vegglue.screening.candidates import Candidate, with_effect
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 

@@ -8,6 +8,7 @@ from coarse_twin import coarse_twin
 from diagnoses import a_suspect
 
 from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.residual_screening import screen
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.diagnosis import rivals_again
 from vegglue.diagnosis.child_config import candidate_named, with_additions
@@ -18,7 +19,6 @@ from vegglue.diagnosis.suspects import suspects_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
-from vegglue.screening.residual_screening import screen
 
 # What is hidden, what was taken for the first of both, and amplitudes that are clearly seen.
 TRUE, LATER, TAKEN = "viscosity", "discharge_error[high]", "edge_mixing"

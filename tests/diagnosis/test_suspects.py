@@ -7,12 +7,12 @@ import pytest
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import Candidate
+from vegglue.calibration.fingerprints import Fingerprints
+from vegglue.calibration.residual_screening import screen
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.effects.library import library
 from vegglue.results.diagnosis import Suspect
-from vegglue.screening.candidates import Candidate
-from vegglue.screening.fingerprints import Fingerprints
-from vegglue.screening.residual_screening import screen
 
 STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
 

@@ -18,8 +18,8 @@ from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_besi
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import Step
-from vegglue.twins.twin import measured_twin, true_place, twin_base
 from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")

@@ -10,12 +10,12 @@ from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspec
 from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 
 from vegglue.calibration.fit import chance_of_misfit
+from vegglue.calibration.instruments import Instrument
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.rivals import undecided_of
 from vegglue.diagnosis.verdict import judged
 from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step
-from vegglue.screening.instruments import Instrument
 
 
 def test_nothing_is_missing_only_where_it_would_be_seen() -> None:

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vegglue.calibration.candidates import candidates_of
 from vegglue.case.config import load_case
-from vegglue.checks.effect_contract import breaches
-from vegglue.checks.trial_channel import moving_water, trial
+from vegglue.diagnosis.effect_contract import breaches
+from vegglue.diagnosis.trial_channel import moving_water, trial
 from vegglue.effects.definition import Effect
 from vegglue.effects.grammar import EFFECTS, LAWS, PRODUCTS, SAME_AS
 from vegglue.effects.law import Law
@@ -16,7 +17,6 @@ from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces
 from vegglue.measurements.observations import read_observations
-from vegglue.screening.candidates import candidates_of
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 

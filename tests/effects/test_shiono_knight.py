@@ -11,11 +11,11 @@ import pytest
 from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import quad
 
+from vegglue.effects import bed_laws
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.equations import faces
-from vegglue.resistance import bed_laws
 
 pytestmark = pytest.mark.slow
 

@@ -13,8 +13,8 @@ from kills import same
 from reach import COARSE, said_to, write_reach
 from stored import CHUNKS, a_header, append
 
-from vegglue.ensemble import solve_ensemble
-from vegglue.storage.resume import ensemble_writer
+from vegglue.inference import solve_ensemble
+from vegglue.results.resume import ensemble_writer
 
 # Four chunks, and the quicker way to a posterior.
 CHANGES = (COARSE, ("simulate: {members: 1024,", "infer: {method: glue}\nsimulate: {members: 256,"))

@@ -16,12 +16,12 @@ import pytest
 from reach import COARSE, begin, here, said_to, vegglue, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.ensemble.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.errors import StorageError
+from vegglue.flow.status import SOLVED_BY_NEWTON
+from vegglue.inference.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.solver.status import SOLVED_BY_NEWTON
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 pytestmark = pytest.mark.slow
 
@@ -243,7 +243,7 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("vegglue.storage.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
+        patch.setattr("vegglue.results.resume.os.fsync", lambda handle: fill_up(handle) if chunks else None)
         with pytest.raises(StorageError, match=r"ensemble\.h5\.part: the disk is full; .* run the same command again"):
             solve_ensemble(case, observations, path, 1, chunks.append)
     assert [progress.done for progress in chunks] == [0, CHUNK]

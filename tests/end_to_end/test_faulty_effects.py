@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from reach import COARSE, said_to, write_reach
 
-from vegglue.checks.effect_contract import breaches
+from vegglue.diagnosis.effect_contract import breaches
 from vegglue.effects.library import effects_of
 from vegglue.errors import InputError
 

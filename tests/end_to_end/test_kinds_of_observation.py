@@ -10,34 +10,34 @@ import pytest
 from reach import COARSE, write_reach
 
 from vegglue.calibration.baseline import baseline
+from vegglue.calibration.candidates import candidates_of, cause_of
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
-from vegglue.checks.case_check import check_case
+from vegglue.diagnosis.case_check import check_case
 from vegglue.diagnosis.comparison import held_out_rmse, rung
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
 from vegglue.engine.model import model_of
-from vegglue.ensemble.solve_chunk import solve_flow
-from vegglue.ensemble.solve_ensemble import solve_ensemble
-from vegglue.figures.channel import save_channel_figure
-from vegglue.figures.error_ladder import save_ladder_figure
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine
+from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_ensemble
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
-from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report_page.page import write_report
-from vegglue.report_page.run import Run
+from vegglue.report.channel import save_channel_figure
+from vegglue.report.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report.error_ladder import save_ladder_figure
+from vegglue.report.page import write_report
+from vegglue.report.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.screening.candidates import candidates_of, cause_of
-from vegglue.site.gridded_site import build_site
-from vegglue.storage.result_files import read_ensemble, read_posterior, write_posterior
-from vegglue.twins.twin_files import write_twin
+from vegglue.results.result_files import read_ensemble, read_posterior, write_posterior
+from vegglue.workflow.twin_files import write_twin
 
 pytestmark = pytest.mark.slow
 

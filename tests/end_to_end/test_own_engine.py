@@ -15,7 +15,7 @@ from reach import vegglue as shell
 import vegglue
 from vegglue.case.schema import Case
 from vegglue.results.ensemble import Ensemble
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 PAGE = ROOT / "docs" / "own_engine.md"
 SMALL = ("members: 1024", "members: 16")

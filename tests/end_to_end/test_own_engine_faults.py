@@ -17,9 +17,9 @@ from reach import vegglue as shell
 import vegglue
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.errors import InputError
+from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.solver.status import FAILED, RUN_BY_COMMAND
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 from vegglue.workflow import command_model
 
 MEMBERS = 8

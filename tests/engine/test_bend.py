@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise, predict
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
-from vegglue.site.gridded_site import build_site
 
 LINE = {"parts": [{"length": 1.5}, {"radius": 2.0, "angle": 90.0}, {"length": 1.5}]}
 TREE = {

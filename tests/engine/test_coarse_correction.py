@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.case.config import load_case
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse
 from vegglue.engine.marching import marching
 from vegglue.engine.model import coarser
-from vegglue.screening.candidates import Candidate, with_effect
-from vegglue.solver.prolongation import on_grid
-from vegglue.solver.wet_band import widen
+from vegglue.flow.prolongation import on_grid
+from vegglue.flow.wet_band import widen
 from vegglue.workflow.run_folder import model_in
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"

@@ -7,8 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from vegglue.calibration.candidates import candidates_of, cause_of, with_effect
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import (
@@ -23,8 +25,6 @@ from vegglue.engine.interface import (
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.local_changes import TERMS, Term
-from vegglue.screening.candidates import candidates_of, cause_of, with_effect
-from vegglue.site.gridded_site import build_site
 
 pytestmark = pytest.mark.slow
 

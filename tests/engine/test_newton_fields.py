@@ -8,13 +8,13 @@ import pandas as pd
 import pytest
 
 from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate, cause_of, place_candidate, with_effect
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise, responses, responses_to_cells
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.local_changes import Term
-from vegglue.screening.candidates import Candidate, cause_of, place_candidate, with_effect
-from vegglue.site.gridded_site import build_site
 
 TERMS: tuple[Term, ...] = ("drag", "bed", "inflow", "viscosity")
 CASE = Case.model_validate(

@@ -10,8 +10,8 @@ from vegglue.arrays import Array
 from vegglue.engine import newton
 from vegglue.engine.interface import Point
 from vegglue.engine.newton import SteadyFlow
-from vegglue.solver.chord import ChordSolution
-from vegglue.solver.newton import CLOSE
+from vegglue.flow.chord import ChordSolution
+from vegglue.flow.newton import CLOSE
 
 SHAPE = (4, 5)
 SLOPES = np.random.default_rng(1).standard_normal((4, 3, 5, 2))

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 from reach import COARSE, write_reach
 
+from vegglue.calibration.candidates import candidates_of, cause_of
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.prior import sample_prior
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
@@ -13,8 +15,6 @@ from vegglue.flow.joined_problems import joined
 from vegglue.flow.problem import Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.measurements.observations import read_observations
-from vegglue.screening.candidates import candidates_of, cause_of
-from vegglue.site.gridded_site import build_site
 
 
 def with_each_cause(folder: Path) -> list[Problem]:

@@ -10,9 +10,9 @@ from vegglue.effects.library import library
 from vegglue.flow import kernels
 from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
+from vegglue.flow.newton import newton
 from vegglue.flow.problem import InflowSegment
 from vegglue.flow.stretch import Bend
-from vegglue.solver.newton import newton
 
 NONE = np.zeros((0, 0, 0))
 SIZE = (6, 5, 2)

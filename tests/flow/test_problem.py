@@ -8,13 +8,13 @@ import pytest
 from house import FILES
 from reach import COARSE, write_reach
 
+from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Numerics
 from vegglue.flow.problem import BedFriction, Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import build_site
 
 
 def test_choices_of_the_solver_have_their_defaults_in_the_schema() -> None:

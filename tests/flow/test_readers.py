@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from channels import centres, even_geometry, river, solved
 
+from vegglue.case.grid import Grid
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.errors import InputError
@@ -16,7 +17,6 @@ from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, take
 from vegglue.flow.readers import nearest_face
 from vegglue.flow.sensor import read_sensors, reading_weights
 from vegglue.measurements.kinds import KINDS
-from vegglue.site.grid import Grid
 
 CELLS = (30, 24)
 # At centres of cells and between them, in the water beside and among the plants, and on a bank that is partly dry.

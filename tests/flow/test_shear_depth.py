@@ -8,18 +8,18 @@ import pytest
 from channels import changed, even_geometry, make_problem, mixed, river, trapezoid
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.effects.surroundings import weighted_across
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
+from vegglue.flow.jacobian import factors
+from vegglue.flow.newton import FROM_AFAR, newton
 from vegglue.flow.problem import ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.site.gridded_site import build_site
-from vegglue.solver.jacobian import factors
-from vegglue.solver.newton import FROM_AFAR, newton
-from vegglue.solver.tangent import tangents
+from vegglue.flow.tangent import tangents
 
 FROM_THE_ROOT = replace(FROM_AFAR, time_step=1e4)  # s, as a start at the root of a flow hardly changed allows
 

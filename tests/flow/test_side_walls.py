@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import dumped
 from vegglue.case.schema import Case
@@ -15,7 +16,6 @@ from vegglue.engine.interface import Model, by_itself, linearise, predict, respo
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.problem_setup import build_problem
-from vegglue.site.gridded_site import build_site
 
 TREE = {
     "source": Path("flume"),

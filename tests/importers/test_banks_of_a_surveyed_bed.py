@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import vegglue
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.cli.loop_commands import import_command
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_folder import unnamed_banks
 
 

@@ -9,16 +9,16 @@ import pytest
 from reach import COARSE, said_to, write_reach
 
 import vegglue
+from vegglue.case.centreline import centreline_of
 from vegglue.case.config import load_case
 from vegglue.case.frame import Frame
+from vegglue.case.grid import build_grid, places_on_map
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import CentrelineShape
 from vegglue.errors import InputError
 from vegglue.importers.placement import Placement
 from vegglue.measurements.observations import read_observations
-from vegglue.site.centreline import centreline_of
-from vegglue.site.grid import build_grid, places_on_map
-from vegglue.site.gridded_site import build_site
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0, crs="EPSG:2056")
 SAID = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.cli.loop_commands import import_command
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import linearise
@@ -13,7 +14,6 @@ from vegglue.errors import InputError
 from vegglue.importers.confluence import case_from_confluence, discharge, flat_bed, holds_confluence
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.run_folder import model_in, validation_of
 
 PUBLISHED = Path(__file__).parents[3] / "shared" / "real" / "confluence"

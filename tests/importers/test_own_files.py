@@ -12,6 +12,7 @@ from reach import said_to
 
 import vegglue
 from vegglue.case.frame import Frame
+from vegglue.case.gridded_site import build_site
 from vegglue.errors import InputError
 from vegglue.importers.column_names import role_of
 from vegglue.importers.file_words import FileWords, file_words
@@ -19,7 +20,6 @@ from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import read_rows
 from vegglue.importers.unit_words import in_si, unit_named
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_folder import assumptions_of
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)

@@ -10,14 +10,14 @@ from field_folders import JUNE, folder_of
 import vegglue
 from vegglue.arrays import Array
 from vegglue.case.frame import Frame
+from vegglue.case.grid import Grid
+from vegglue.case.gridded_site import build_site
+from vegglue.case.polygons import area_of, in_polygon
 from vegglue.errors import InputError
 from vegglue.importers.file_words import FileWords
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import planted_polygons, read_polygons
 from vegglue.importers.terrain_files import read_geotiff, read_terrain
-from vegglue.site.grid import Grid
-from vegglue.site.gridded_site import build_site
-from vegglue.site.polygons import area_of, in_polygon
 
 FRAME = Frame(origin=(5000.0, 2000.0), angle=30.0)
 # Of the tags of a GeoTIFF: size of a pixel, where its first corner lies, keys, and what stands for no level.

@@ -13,16 +13,16 @@ from posteriors import changed
 from vegglue.case.config import load_case
 from vegglue.case.prior import quantile, sample_prior
 from vegglue.case.schema import CanopyCorrection, Case, Parameter
+from vegglue.effects.plant_laws import baptist_chezy
 from vegglue.errors import InputError
+from vegglue.flow.status import FAILED
 from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
 from vegglue.inference.posterior_summary import marginals, prior_mass_near_bounds
 from vegglue.measurements.observations import Observations
-from vegglue.report_page.posterior_words import posterior_in_words
-from vegglue.resistance.plant_laws import baptist_chezy
+from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import LEVELS, Posterior
-from vegglue.solver.status import FAILED
 
 MEMBERS = 32768
 SIGMA = 0.08

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from vegglue.report_page.key_numbers import against_measurement_error
-from vegglue.report_page.posterior_words import measurement_error
+from vegglue.report.key_numbers import against_measurement_error
+from vegglue.report.posterior_words import measurement_error
 from vegglue.results.posterior import Posterior
 
 

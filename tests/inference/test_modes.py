@@ -13,13 +13,13 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
-from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.inference.refine import refine
+from vegglue.inference.solve_ensemble import solve_ensemble
 from vegglue.inference.tried_members import grids_of
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
 from vegglue.results.posterior import Posterior
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 PRIOR = '  {}: {{distribution: loguniform, low: {}, high: 100, unit: "-"}}'
 # Not coarsened: with two cells across the floor water does not part around the patches.

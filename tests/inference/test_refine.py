@@ -18,14 +18,14 @@ from vegglue.case.prior import sample_prior
 from vegglue.engine.interface import linearise, predict
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
+from vegglue.flow.status import FAILED
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
 from vegglue.parallel import at_most
-from vegglue.report_page.posterior_words import posterior_in_words
-from vegglue.report_page.validation_words import validation_in_words
+from vegglue.report.posterior_words import posterior_in_words
+from vegglue.report.validation_words import validation_in_words
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut
-from vegglue.solver.status import FAILED
-from vegglue.storage.result_files import read_posterior, write_posterior
+from vegglue.results.result_files import read_posterior, write_posterior
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from vegglue.inference.tried_members import points_of_prior
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
 from vegglue.progress import silent
-from vegglue.report_page.posterior_words import posterior_in_words
+from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.posterior import Posterior
 
 

@@ -13,6 +13,7 @@ from report_runs import a_toy
 from verdicts import grounds, said, step
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.cli.tables import show_carried
 from vegglue.diagnosis.verdict import OF_DISCHARGES
@@ -20,9 +21,8 @@ from vegglue.effects.library import library
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
 from vegglue.measurements.observations import read_observations
-from vegglue.report_page.answer_words import why_not_to_rely
+from vegglue.report.answer_words import why_not_to_rely
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE
-from vegglue.site.gridded_site import build_site
 
 # Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
 REALLY_OTHERWISE = {"open-d": ("high", 1.087), "open-m": ("low", 1.11)}
@@ -200,7 +200,7 @@ def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, m
     doubting = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}{DOUBT}: check it."})
     explained, toy = (replace(a_toy(tmp_path), diagnosis=one) for one in (a_diagnosis(), doubting))
     before = why_not_to_rely(toy)
-    monkeypatch.setattr("vegglue.report_page.answer_words.carried_otherwise", lambda *_: [HIGHER])
+    monkeypatch.setattr("vegglue.report.answer_words.carried_otherwise", lambda *_: [HIGHER])
     assert carried_in_short([HIGHER]) in why_not_to_rely(toy)
     assert carried_in_short([HIGHER]) not in before
     assert carried_in_short([HIGHER]) not in why_not_to_rely(explained)  # what was found may be why

@@ -11,11 +11,11 @@ from open_cases import imported
 from reach import write_reach
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.measurements.missing_marks import MARKS_OF_ANY_COLUMN, MARKS_OR_VALUES, is_mark
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.suspicious_values import absurd_values
-from vegglue.site.gridded_site import build_site
 
 LEVELS = [(8.0, 0.97), (14.5, 0.965), (20.0, 0.955)]  # x, level [m]
 Change = Callable[[pd.DataFrame], pd.DataFrame]

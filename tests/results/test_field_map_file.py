@@ -10,7 +10,7 @@ from diagnoses import a_diagnosis
 
 from vegglue.results.causes import FieldFound, FieldMapKept
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.result_files import read_diagnosis, write_diagnosis
+from vegglue.results.result_files import read_diagnosis, write_diagnosis
 
 MAP = FieldMapKept(
     x=np.array([1.0, 2.0, 3.0]), y=np.array([-0.5, 0.5]), value=np.arange(6.0).reshape(3, 2), error=np.full((3, 2), 0.1)

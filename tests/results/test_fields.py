@@ -27,8 +27,8 @@ from stored import (
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.fields import FieldWindow, fields_group
-from vegglue.storage.result_files import read_fields
-from vegglue.storage.resume import ensemble_writer
+from vegglue.results.result_files import read_fields
+from vegglue.results.resume import ensemble_writer
 
 HEADER = a_header(window=WINDOW)
 

@@ -17,7 +17,7 @@ from vegglue.results.posterior import (
     Transfer,
 )
 from vegglue.results.refinement import Refinement
-from vegglue.storage.result_files import read_posterior, stored_hash, write_posterior
+from vegglue.results.result_files import read_posterior, stored_hash, write_posterior
 
 
 @pytest.mark.parametrize("canopy", [True, False])

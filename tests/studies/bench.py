@@ -16,25 +16,25 @@ import startup
 from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import parameters_at, sobol_sample
 from vegglue.case.prior import sample_prior, sobol_points
-from vegglue.ensemble.solve_chunk import linearised_medians, solve_chunk
-from vegglue.ensemble.solve_ensemble import solve_ensemble, starts_and_chunks
 from vegglue.flow.backwater import backwater
+from vegglue.flow.batch import MEMBER_LANES, solve_members
 from vegglue.flow.chord_equations import eased
 from vegglue.flow.equations import faces
+from vegglue.flow.march import advance, march
+from vegglue.flow.parameter_metric import clusters, parameter_metric
 from vegglue.flow.problem import crop, take
 from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import read_sensors
+from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
+from vegglue.flow.wet_band import rows_inside, widen
+from vegglue.inference.solve_chunk import linearised_medians, solve_chunk
+from vegglue.inference.solve_ensemble import solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
-from vegglue.solver.batch import MEMBER_LANES, solve_members
-from vegglue.solver.march import advance, march
-from vegglue.solver.parameter_metric import clusters, parameter_metric
-from vegglue.solver.reference_member import settled
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
-from vegglue.solver.wet_band import rows_inside, widen
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {

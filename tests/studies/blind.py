@@ -33,15 +33,15 @@ from blind_sets import (
     told,
 )
 
+from vegglue.calibration.candidates import candidates_of
 from vegglue.case.text_files import write_text
 from vegglue.cluster import on_cluster
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.errors import InputError
 from vegglue.parallel import as_finished, at_most
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.candidates import candidates_of
-from vegglue.twins.hidden_effect import VisibilityError
-from vegglue.twins.sealed_answer import UNLISTED
+from vegglue.workflow.hidden_effect import VisibilityError
+from vegglue.workflow.sealed_answer import UNLISTED
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"

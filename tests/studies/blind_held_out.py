@@ -12,6 +12,7 @@ from blind_sets import DataSet
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import start_amplitude
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
@@ -29,7 +30,6 @@ from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.candidates import start_amplitude
 from vegglue.workflow.run_folder import calibrated_anew
 
 Errors = dict[str, Any]

@@ -23,7 +23,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import MODEL_ERROR, VISCOSITY, VISCOSITY_FACTOR, viscosity_prior
-from vegglue.twins.hidden_effect import (
+from vegglue.workflow.hidden_effect import (
     BAD_PROBE_EXCESS,
     LARGEST_SIZE,
     TwinBase,
@@ -33,9 +33,9 @@ from vegglue.twins.hidden_effect import (
     chosen_effect,
     visible_length,
 )
-from vegglue.twins.sealed_answer import UNLISTED, Hidden
-from vegglue.twins.twin import errors_named, finer, true_place
 from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.sealed_answer import UNLISTED, Hidden
+from vegglue.workflow.twin_measurements import errors_named, finer, true_place
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # True places of the prior, each seen by the model once.

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vegglue.calibration.candidates import candidates_in_case
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
@@ -16,7 +17,6 @@ from vegglue.diagnosis.comparison import held_out_rmse, rung
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
-from vegglue.screening.candidates import candidates_in_case
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import extend_stepwise
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of

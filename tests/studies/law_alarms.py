@@ -17,17 +17,17 @@ from blind_sets import PLACES, place_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.candidates import with_effect
+from vegglue.calibration.evidence import alarm_p
+from vegglue.calibration.law_screening import law_fingerprints, screen_laws
 from vegglue.calibration.noise import noise_of
+from vegglue.calibration.product_screening import screen_products
+from vegglue.calibration.residual_screening import screen
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
+from vegglue.diagnosis.product import PRODUCT_ALARMS
 from vegglue.diagnosis.unlisted_laws import LAW_ALARMS
-from vegglue.discovery.product import PRODUCT_ALARMS
 from vegglue.engine.interface import Point, linearise
 from vegglue.parallel import at_most
-from vegglue.screening.candidates import with_effect
-from vegglue.screening.evidence import alarm_p
-from vegglue.screening.law_screening import law_fingerprints, screen_laws
-from vegglue.screening.product_screening import screen_products
-from vegglue.screening.residual_screening import screen
 
 # Laws that are true in turn at the true places, where the alarm of products is asked for: of each term and many forms.
 TRUE_LAWS = (

@@ -23,16 +23,16 @@ from law_limits import WAYS
 from law_sets import LAW_EDITION, RATIOS, STUDY, knowing_hidden
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.discovery.chances import chances_in_set
-from vegglue.discovery.search import HELD, MOST_QUANTITIES
+from vegglue.calibration.candidates import Candidate, cause_of
+from vegglue.calibration.evidence import log_factors
+from vegglue.calibration.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
+from vegglue.calibration.residual_screening import GROUPS
+from vegglue.diagnosis.chances import chances_in_set
+from vegglue.diagnosis.search import HELD, MOST_QUANTITIES
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
-from vegglue.screening import score_test
-from vegglue.screening.candidates import Candidate, cause_of
-from vegglue.screening.evidence import log_factors
-from vegglue.screening.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
-from vegglue.screening.residual_screening import GROUPS
 
 ANGLES = Path(__file__).parents[2] / "data" / "blind" / "law_angles.jsonl"
 # A hidden law is left out where the plausible strength leaves less than this [standard errors]: the study of laws

@@ -21,15 +21,15 @@ from blind_truth import Site, flows_of, perfect_site, site_of_nature, true_value
 from second_solver import Flow
 
 from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate
 from vegglue.calibration.noise import noise_of, with_grid_error, with_model_error
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.screening.candidates import Candidate
-from vegglue.twins.hidden_effect import TwinBase, VisibilityError, chosen_effect
-from vegglue.twins.sealed_answer import Hidden
+from vegglue.workflow.hidden_effect import TwinBase, VisibilityError, chosen_effect
+from vegglue.workflow.sealed_answer import Hidden
 
 STUDY = "twin"
 # Standard errors that are left of what is hidden after calibration; a listed effect that cannot be as visible is hidden

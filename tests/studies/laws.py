@@ -21,18 +21,18 @@ from law_sets import LAW_EDITION, LawDataSet, LawTrial, knowing_hidden, law_data
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
+from vegglue.calibration.candidates import Candidate, start_amplitude, with_effect
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.discovered import Discovery
 from vegglue.diagnosis.refits import Refit
-from vegglue.discovery.discovered import Discovery
-from vegglue.discovery.search import laws_beyond
+from vegglue.diagnosis.search import laws_beyond
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.likelihood import root_mean_square
 from vegglue.parallel import at_most
 from vegglue.progress import silent
-from vegglue.screening.candidates import Candidate, start_amplitude, with_effect
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "laws"

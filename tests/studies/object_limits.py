@@ -23,22 +23,22 @@ from place_limits import traces_of
 from scipy.special import logsumexp
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
+from vegglue.calibration.candidates import cause_of
+from vegglue.calibration.evidence import HypothesisKind
+from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
+from vegglue.calibration.instruments import instruments_of, offset_columns
 from vegglue.calibration.noise import Noise, noise_of
+from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
+from vegglue.case.channel_geometry import half_width
 from vegglue.diagnosis.competition import LEAST_ODDS
 from vegglue.diagnosis.contender_choice import What, chosen_contender
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
-from vegglue.screening import score_test
-from vegglue.screening.candidates import cause_of
-from vegglue.screening.evidence import HypothesisKind
-from vegglue.screening.fingerprints import Fingerprints, fingerprints_of
-from vegglue.screening.instruments import instruments_of, offset_columns
-from vegglue.screening.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
-from vegglue.site.channel_geometry import half_width
-from vegglue.twins.hidden_effect import candidate_of
+from vegglue.workflow.hidden_effect import candidate_of
 
 # Draws of errors for each of what is hidden, and of errors alone for the alarm [-].
 DRAWS, NULL_DRAWS = 200, 3000

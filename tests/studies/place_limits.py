@@ -23,13 +23,13 @@ from blind_lengths import KIND
 from blind_sets import hash_of, place_number, place_of, sizing_errors
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
+from vegglue.calibration.candidates import cause_of
 from vegglue.calibration.noise import noise_of
 from vegglue.engine.interface import responses
 from vegglue.parallel import as_finished, at_most
-from vegglue.screening import score_test
-from vegglue.screening.candidates import cause_of
-from vegglue.twins.hidden_effect import candidate_of, with_unlisted_objects
-from vegglue.twins.sealed_answer import Hidden
+from vegglue.workflow.hidden_effect import candidate_of, with_unlisted_objects
+from vegglue.workflow.sealed_answer import Hidden
 
 # Places that are tried lie so far apart along and across [m]: a third of what counts as near, and two rows of cells.
 STEP = (0.5, 0.375)

@@ -15,11 +15,11 @@ import numpy as np
 from instrument_files import winriver
 from scipy.interpolate import RegularGridInterpolator
 
+from vegglue.case.centreline import centreline_of, heading_at
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.flow.sensor import FlowFields
 from vegglue.importers.placement import Placement
-from vegglue.site.centreline import centreline_of, heading_at
+from vegglue.inference.solve_chunk import solve_flow
 
 ROOT = Path(__file__).parents[2]
 BEND, FLUME = ROOT / "data/samples/bend", ROOT / "data/samples/flume"

@@ -21,14 +21,14 @@ import numpy as np
 from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import sobol_sample
 from vegglue.cluster import on_cluster
-from vegglue.ensemble.solve_chunk import solve_chunk
-from vegglue.ensemble.solve_ensemble import solve_ensemble, starts_and_chunks
+from vegglue.flow.status import FAILED, members_with
+from vegglue.inference.solve_chunk import solve_chunk
+from vegglue.inference.solve_ensemble import solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
-from vegglue.solver.status import FAILED, members_with
-from vegglue.storage.result_files import read_ensemble
+from vegglue.results.result_files import read_ensemble
 
 # Members that are timed on the brook: seconds of work. And on cells of half the size.
 TIMED, FINE = 32768, ("cell: [1.0, 0.5]", "cell: [0.25, 0.1875]")

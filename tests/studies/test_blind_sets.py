@@ -11,7 +11,7 @@ from second_channel import SHORT
 from second_solver import Flow
 from site_reach import Truth, bed_level, reach_of
 
-from vegglue.screening.candidates import candidates_of
+from vegglue.calibration.candidates import candidates_of
 
 pytestmark = pytest.mark.slow
 

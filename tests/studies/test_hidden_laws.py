@@ -10,8 +10,8 @@ from hidden_laws import BY_NAME, EFFECTS, HIDDEN_LAWS, RANGES, acting
 from law_sets import LISTED, NOTHING, TIMES, held_out_stations, law_trials
 from second_hidden_laws import LAW_DRAG, LAW_MIXING
 
+from vegglue.calibration.candidates import candidates_of
 from vegglue.effects.grammar import LAWS
-from vegglue.screening.candidates import candidates_of
 
 
 def test_every_set_is_planned_once_and_all_kinds_begin_early() -> None:

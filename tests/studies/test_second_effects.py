@@ -7,12 +7,12 @@ import pytest
 from blind_sets import OBJECTS, model_of
 from blind_truth import perfect_site, true_values
 
+from vegglue.calibration.candidates import candidates_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import linearise
-from vegglue.screening.candidates import candidates_of
-from vegglue.twins.hidden_effect import candidate_of, case_hiding
-from vegglue.twins.sealed_answer import Hidden
-from vegglue.twins.twin import true_place
+from vegglue.workflow.hidden_effect import candidate_of, case_hiding
+from vegglue.workflow.sealed_answer import Hidden
+from vegglue.workflow.twin_measurements import true_place
 
 # One of each kind: bed, inflow, plants, drag, mixing, momentum flux, force, instrument, and something in no list.
 SOME = (

@@ -7,8 +7,8 @@ import pytest
 from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
 from scipy.integrate import solve_ivp
 
+from vegglue.effects import bed_laws
 from vegglue.flow.problem import LEVEL
-from vegglue.resistance import bed_laws
 
 FLOW, MANNING, SLOPE, REACH = 2.0, 0.03, 0.001, 2000.0
 NORMAL = (MANNING * FLOW / np.sqrt(SLOPE)) ** 0.6

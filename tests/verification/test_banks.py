@@ -11,8 +11,8 @@ from channels import GRAVITY, centres, even_geometry, make_problem, mixed, mixed
 from scipy.linalg import solve_banded
 
 from vegglue.arrays import Array
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces
-from vegglue.resistance import bed_laws
 
 FLOOR, BANK, SLOPE, DEPTH = 0.03, 0.3, 0.001, 1.1
 # Developed flow is the same along the reach: 60 columns gave the same to 0.4 mm/s and 0.4 mm, for twice the time.

@@ -8,18 +8,18 @@ from channels import GRAVITY, changed, discharge, even_geometry, make_problem, s
 from scipy.optimize import brentq
 
 from vegglue.arrays import Array
+from vegglue.case.centreline import centreline_of
+from vegglue.case.grid import Grid, cell_stretch, curvature_of
 from vegglue.case.site_schema import CentrelineShape, Stretch
 from vegglue.effects.active_effect import ActiveEffect
+from vegglue.effects.bed_laws import CHEZY
 from vegglue.effects.exchange import curvature
 from vegglue.effects.library import library
 from vegglue.effects.surroundings import Cells
 from vegglue.flow.equations import faces
+from vegglue.flow.march import march
 from vegglue.flow.problem import ACROSS, ALONG, InflowSegment, Problem
 from vegglue.flow.problem_setup import bend_of
-from vegglue.resistance.bed_laws import CHEZY
-from vegglue.site.centreline import centreline_of
-from vegglue.site.grid import Grid, cell_stretch, curvature_of
-from vegglue.solver.march import march
 
 WIDTH, RADIUS, LEVEL_OUT, FLOW = 4.0, 16.0, 0.5, 1.6
 

@@ -5,9 +5,9 @@ import pytest
 from channels import GRAVITY, centres, changed, filled, make_problem, order, shown, solved, trapezoid
 from scipy.optimize import brentq
 
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import residual
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment
-from vegglue.resistance import bed_laws
 
 LENGTH, FLUX, OUTLET = 24.0, 0.6, 0.9  # m, m2/s, m
 SMOOTH = (bed_laws.CHEZY, 1e5)  # loses a micrometre over the length

@@ -16,11 +16,11 @@ import pytest
 from channels import centres, even_geometry, make_problem, mixed, mixed_from, plants_at, solved, trapezoid
 from open_cases import OPEN_CASES
 
+from vegglue.case.grid import Grid
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import LEVEL
 from vegglue.flow.sensor import read_sensors
-from vegglue.resistance import bed_laws
-from vegglue.site.grid import Grid
 
 pytestmark = pytest.mark.slow
 

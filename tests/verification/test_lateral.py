@@ -9,8 +9,8 @@ from channels import GRAVITY, centres, discharge, make_problem, order, shown, sl
 from scipy.integrate import quad, solve_bvp
 
 from vegglue.arrays import Array
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces
-from vegglue.resistance import bed_laws
 
 WIDTH, DEPTH, SLOPE = 6.0, 0.5, 0.001
 SMOOTH, ROUGH = 45.0, 25.0

@@ -5,12 +5,12 @@ import pytest
 from channels import GRAVITY, changed, filled, make_problem, order, shown
 from scipy.integrate import cumulative_simpson
 
+from vegglue.case.centreline import Centreline, heading_at, on_map
+from vegglue.case.grid import Grid
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces, push_momentum, residual, storage
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
 from vegglue.flow.problem_setup import bend_of
-from vegglue.resistance import bed_laws
-from vegglue.site.centreline import Centreline, heading_at, on_map
-from vegglue.site.grid import Grid
 
 VISCOSITY, CHEZY, REACH = 0.3, 20.0, (12.0, 9.0)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from channels import GRAVITY, discharge, make_problem, planted, sloping, solved
 
+from vegglue.effects import bed_laws
 from vegglue.flow.backwater import backwater
 from vegglue.flow.closures import drag
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ALONG, LEVEL
-from vegglue.resistance import bed_laws
 
 SLOPE, LENGTH, COLUMNS, ROWS = 0.002, 40.0, 20, 3
 # The law's speed is rounded at 1 mm/s so that its slope exists at rest.

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from channels import filled, make_problem, river
 
+from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces, residual
+from vegglue.flow.march import march
 from vegglue.flow.problem import ALONG, LEVEL
-from vegglue.resistance import bed_laws
-from vegglue.solver.march import march
 
 
 def rough_bed(shape: tuple[int, int]) -> np.ndarray:

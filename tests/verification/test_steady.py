@@ -9,18 +9,18 @@ from channels import GRAVITY, centres, changed, discharge, family, make_problem,
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from vegglue.checks.trial_channel import mirrored
+from vegglue.case.grid import Grid
+from vegglue.diagnosis.trial_channel import mirrored
+from vegglue.effects import bed_laws
 from vegglue.flow.backwater import backwater
+from vegglue.flow.batch import solve_members
+from vegglue.flow.chord import chord
 from vegglue.flow.equations import faces, residual
+from vegglue.flow.jacobian import factors, jacobian
+from vegglue.flow.march import USUAL_FALL_BACK, march, march_to_rest
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment, take
 from vegglue.flow.sensor import read_sensors
-from vegglue.resistance import bed_laws
-from vegglue.site.grid import Grid
-from vegglue.solver.batch import solve_members
-from vegglue.solver.chord import chord
-from vegglue.solver.jacobian import factors, jacobian
-from vegglue.solver.march import USUAL_FALL_BACK, march, march_to_rest
-from vegglue.solver.status import SOLVED_BY_NEWTON
+from vegglue.flow.status import SOLVED_BY_NEWTON
 
 pytestmark = pytest.mark.slow
 

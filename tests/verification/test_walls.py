@@ -13,8 +13,8 @@ from scipy.optimize import fsolve
 from vegglue.arrays import Array
 from vegglue.flow.closures import wall_rates
 from vegglue.flow.equations import cell_depths, faces, residual
+from vegglue.flow.march import march
 from vegglue.flow.problem import ALONG, LEVEL, Problem, SideWalls, crop, take
-from vegglue.solver.march import march
 
 WIDTH, DEPTH, SLOPE, ROWS = 3.0, 0.5, 0.001, 6
 DY = WIDTH / ROWS

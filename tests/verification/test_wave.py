@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from channels import GRAVITY, centres, filled, make_problem
 
+from vegglue.effects import bed_laws
+from vegglue.flow.march import march
 from vegglue.flow.problem import LEVEL
-from vegglue.resistance import bed_laws
-from vegglue.solver.march import march
 
 DEPTH, LENGTH, CELLS, HEIGHT = 1.0, 20.0, 40, 1e-6
 

@@ -15,9 +15,9 @@ import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.ensemble import solve_ensemble
 from vegglue.errors import InputError
-from vegglue.storage.result_files import stored_hash
+from vegglue.inference import solve_ensemble
+from vegglue.results.result_files import stored_hash
 from vegglue.workflow import compare, extend, infer, next_measurement, run_folder, stepwise_extension
 
 FEW = ("simulate: {members: 1024,", "infer: {method: glue}\nsimulate: {members: 16,")

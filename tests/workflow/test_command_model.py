@@ -10,6 +10,7 @@ from commands import SMOOTH, commanded
 from reach import COARSE
 
 import vegglue
+from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, with_effect
 from vegglue.calibration.command_place import command_place
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
@@ -21,7 +22,6 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import silent
-from vegglue.screening.candidates import Candidate, candidates_of, cause_of, with_effect
 from vegglue.workflow.command_model import _beside_what_was_reckoned, _kept_place, command_tried, with_command
 from vegglue.workflow.run_folder import validation_of
 

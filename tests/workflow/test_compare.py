@@ -15,8 +15,8 @@ from vegglue.case.schema import Case, Validation
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
+from vegglue.results.kept_words import ladder_that_fits, write_ladder
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.storage.kept_words import ladder_that_fits, write_ladder
 from vegglue.workflow import compare, set_aside
 from vegglue.workflow.run_folder import folder_of
 from vegglue.workflow.set_aside import judged_by

@@ -9,6 +9,8 @@ from diagnoses import a_diagnosis, a_suspect, laws_suspected_of
 from linear_baseline import stations_of
 from reach import said_to
 
+from vegglue.calibration.candidates import candidates_in_case, candidates_of, with_effect
+from vegglue.calibration.places import EFFECT_AT_PLACE
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -26,9 +28,7 @@ from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis, Location, Step
-from vegglue.screening.candidates import candidates_in_case, candidates_of, with_effect
-from vegglue.screening.places import EFFECT_AT_PLACE
-from vegglue.storage.result_files import write_diagnosis
+from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow.extend import extend, in_words, write_child
 
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,8 @@ from posteriors import a_posterior
 from stored import ALL, HASH, MEMBERS, WINDOW, a_header, write_chunks
 
 import vegglue
-from vegglue.storage import labelled_arrays
-from vegglue.storage.result_files import write_diagnosis, write_posterior
+from vegglue.results import labelled_arrays
+from vegglue.results.result_files import write_diagnosis, write_posterior
 
 pytestmark = pytest.mark.slow
 

@@ -7,12 +7,12 @@ import pytest
 from reach import said_to
 
 import vegglue
-from vegglue.checks.case_check import check_case
+from vegglue.case.gridded_site import build_site
+from vegglue.diagnosis.case_check import check_case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.new import Reach
 
 

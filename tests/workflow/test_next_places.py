@@ -11,7 +11,9 @@ import pytest
 from diagnoses import NOTHING, a_diagnosis, a_location, a_suspect
 from verdicts import step
 
+from vegglue.calibration.candidates import place_candidate, with_effect
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.effects.library import library
@@ -19,10 +21,8 @@ from vegglue.engine.interface import Model
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import ParameterEstimates, Step
+from vegglue.results.kept_words import write_questions
 from vegglue.results.open_questions import ProposedMeasurement, Question
-from vegglue.screening.candidates import place_candidate, with_effect
-from vegglue.site.gridded_site import build_site
-from vegglue.storage.kept_words import write_questions
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of

@@ -8,8 +8,8 @@ from small_case import SMALL
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.errors import InputError
+from vegglue.results.kept_words import write_ladder
 from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.storage.kept_words import write_ladder
 from vegglue.workflow.overview import overview
 
 

@@ -13,6 +13,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -20,7 +21,6 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, Point, Wanted, always
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow import run_folder
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"

@@ -8,7 +8,7 @@ from reach import COARSE, write_reach
 import vegglue
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.progress import Progress
-from vegglue.storage.result_files import stored_hash
+from vegglue.results.result_files import stored_hash
 
 
 def write_beside(folder: Path, name: str, line: str) -> Path:

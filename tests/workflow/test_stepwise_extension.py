@@ -14,7 +14,7 @@ import vegglue
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.storage.kept_words import write_rung
+from vegglue.results.kept_words import write_rung
 from vegglue.workflow import extend
 from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
 from vegglue.workflow.stepwise_extension import kept_extension

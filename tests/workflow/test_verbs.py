@@ -14,10 +14,10 @@ import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.measurements.observations import SET_ASIDE, read_observations
 from vegglue.progress import Progress
-from vegglue.report_page.posterior_words import posterior_in_words
+from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
-from vegglue.storage.result_files import stored_hash, write_diagnosis
+from vegglue.results.kept_words import ladder_that_fits, questions_that_fit
+from vegglue.results.result_files import stored_hash, write_diagnosis
 from vegglue.workflow.infer import is_inferred
 from vegglue.workflow.report import results_of
 

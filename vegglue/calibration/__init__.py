@@ -1,5 +1,6 @@
-"""The calibration of a model: the covariance of all errors, least squares with exact slopes, errors of grid and model.
+"""The calibration of a model: the covariance of all errors, least squares with exact slopes, errors of grid and model;
+candidate effects, their fingerprints, score tests and evidence.
 
-May import: case, site, measurements, flow, engine.
-Open first: noise.py, model_error.py, fit.py.
+May import: case, effects, engine, flow, measurements.
+Open first: noise.py, model_error.py, fit.py, candidates.py, residual_screening.py.
 """

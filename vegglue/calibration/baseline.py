@@ -14,12 +14,12 @@ from vegglue.calibration.noise import (
     with_independent_grid_errors,
     with_model_error,
 )
+from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.engine.interface import Model, Point, by_itself, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
-from vegglue.site.channel_geometry import cells_across
 
 # Points of the prior that are computed on the coarse grid, and how many of them the fit starts from. Chosen, not
 # measured: more cost runs of the coarse model and guard against a local minimum.

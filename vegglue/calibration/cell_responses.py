@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vegglue.case.grid import Grid
 from vegglue.engine.interface import Model, Point, responses_to_cells
 from vegglue.flow.local_changes import Term
 from vegglue.parallel import in_threads
-from vegglue.site.grid import Grid
 
 
 @dataclass(frozen=True)

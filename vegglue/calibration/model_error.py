@@ -27,13 +27,13 @@ from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.site_error import site_error_columns
 from vegglue.case.case_effects import effect_of, value_of
+from vegglue.case.channel_geometry import half_width
+from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, ModelError
 from vegglue.engine.interface import Model, Point
 from vegglue.flow.local_changes import Term
-from vegglue.site.channel_geometry import half_width
-from vegglue.site.grid import Grid
 
 # The term that each unlisted effect of the library changes at its place.
 TERM_OF: dict[str, Term] = {

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.calibration.cell_responses import CellResponses
 from vegglue.case.case_effects import effect_of
+from vegglue.case.channel_geometry import patches_present
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.engine.interface import Cause, Model, Point, responses
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.site.channel_geometry import patches_present
 
 # The name of an effect that is tried alone, and of its amplitude; no case has it.
 TRIED, AMOUNT = "error_of_the_site", "error_of_the_site_amount"

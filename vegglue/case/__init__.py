@@ -1,5 +1,6 @@
-"""A case: what a YAML file may say, read, checked and hashed, and the priors of its parameters.
+"""A case: the YAML file, read, checked and hashed, the priors of its parameters, and its site on the grid: bed levels,
+friction classes, patches of plants and the channel.
 
-May import: effects.
-Open first: schema.py, config.py.
+May import: effects, wording.
+Open first: schema.py, config.py, gridded_site.py.
 """

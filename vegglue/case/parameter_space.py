@@ -15,7 +15,7 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_digits
+from vegglue.wording.numbers import in_digits
 
 Bounds = tuple[float, float]
 # Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.

@@ -11,7 +11,7 @@ from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly,
 from vegglue.case.prior_width import unusable
 from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
 from vegglue.case.size_limits import MOST_MEMBERS
-from vegglue.in_short import in_short, so_many
+from vegglue.wording.numbers import in_short, so_many
 
 
 class Experiment(Part):

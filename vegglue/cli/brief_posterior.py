@@ -7,12 +7,12 @@ from pathlib import Path
 from vegglue.case.schema import Case
 from vegglue.cli.output import command_line
 from vegglue.errors import shown_path
-from vegglue.figures.typography import PLAIN_TEXT
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.report_page.homogeneity_words import homogeneity_rejected, moving_parameters
-from vegglue.report_page.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
-from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
-from vegglue.report_page.validation_words import chi2_in_words, where_it_stands
+from vegglue.report.homogeneity_words import homogeneity_rejected, moving_parameters
+from vegglue.report.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
+from vegglue.report.prior_words import off_its_prior, pressed_bounds
+from vegglue.report.typography import PLAIN_TEXT
+from vegglue.report.validation_words import chi2_in_words, where_it_stands
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
 
 # A terminal as it opens is 24 lines high; lines up to 100 columns are read without turning the head.

@@ -12,7 +12,7 @@ from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Member
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import shown_path
-from vegglue.in_short import without_asides
+from vegglue.wording.numbers import without_asides
 
 
 def check_command(
@@ -128,8 +128,8 @@ def run_command(
 
 def _in_short(extension: Any, results: Sequence[tuple[Any, Any]]) -> list[str]:
     """A line each: the verdict, what was added, laws, the verdict on the last model, and parameters at bounds."""
-    from vegglue.figures.typography import PLAIN_TEXT
-    from vegglue.report_page.prior_words import ends_at_bounds
+    from vegglue.report.prior_words import ends_at_bounds
+    from vegglue.report.typography import PLAIN_TEXT
     from vegglue.results.posterior import Posterior
     from vegglue.workflow.discover import DiscoveredCase
 

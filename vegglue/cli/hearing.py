@@ -9,8 +9,8 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from vegglue.cli.output import console
-from vegglue.in_short import duration_in_short
 from vegglue.progress import Progress, Watch, silent
+from vegglue.wording.numbers import duration_in_short
 
 if TYPE_CHECKING:
     from rich.console import Console

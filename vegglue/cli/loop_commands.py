@@ -13,7 +13,7 @@ from vegglue.cli.options import FLAG, RUNS, Cluster, Config, Force, Jobs, Json, 
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.telling import tell
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import so_many
+from vegglue.wording.numbers import so_many
 
 if TYPE_CHECKING:
     from vegglue.results.diagnosis import Diagnosis

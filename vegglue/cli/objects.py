@@ -7,16 +7,16 @@ from typing import Any
 
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
-from vegglue.discovery.discovered import LawFound
+from vegglue.diagnosis.discovered import LawFound
+from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.measurements.carried_discharge import CarriedDischarge
-from vegglue.report_page.posterior_words import posterior_in_words
-from vegglue.report_page.prior_words import off_its_prior, pressed_bounds
+from vegglue.report.posterior_words import posterior_in_words
+from vegglue.report.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.posterior import Posterior
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase

@@ -8,13 +8,13 @@ from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
-from vegglue.in_short import in_digits, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
-from vegglue.report_page.homogeneity_words import REJECTED_BELOW
+from vegglue.report.homogeneity_words import REJECTED_BELOW
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import Question
 from vegglue.results.rung import Rung
+from vegglue.wording.numbers import in_digits, so_many
 from vegglue.workflow.compare import Comparison
 
 # Said where parameters differ between experiments, as `infer` may say of the same that they do not.

@@ -8,11 +8,11 @@ from vegglue.case.schema import Case
 from vegglue.cli.brief_posterior import show_posterior
 from vegglue.cli.tables import show_carried, show_diagnosis, show_ladder, show_questions
 from vegglue.errors import shown_path
-from vegglue.in_short import so_many
+from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.solver.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.wording.numbers import so_many
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase

@@ -1,5 +1,6 @@
-"""From misfit to missing effect: screening, refits, the verdict, the next measurement, and models side by side.
+"""From misfit to missing effect: checks of a case, screening, refits, the verdict, the next measurement, laws outside
+the library, and models side by side.
 
-May import: effects, case, site, measurements, flow, engine, results, calibration, screening, inference.
-Open first: diagnose.py, competition.py, verdict.py.
+May import: calibration, case, effects, engine, flow, inference, measurements, results, wording.
+Open first: diagnose.py, competition.py, verdict.py, case_check.py.
 """

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from vegglue.calibration.instruments import Instrument
+from vegglue.calibration.places import EFFECT_AT_PLACE
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.diagnosis.rivals import HARDLY
-from vegglue.in_short import in_digits, listed
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     EstimatedErrors,
@@ -19,8 +20,7 @@ from vegglue.results.diagnosis import (
     Step,
     Suspect,
 )
-from vegglue.screening.instruments import Instrument
-from vegglue.screening.places import EFFECT_AT_PLACE
+from vegglue.wording.numbers import in_digits, listed
 
 # Chance of what is named, below which it is stated: above, it would be told as 100 %.
 STATED_BELOW = 0.995

@@ -10,15 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vegglue.case.messages import nearest_effect
-from vegglue.case.resolved_config import Tree
-from vegglue.case.schema import Case
-from vegglue.case.text_files import LONGEST_NAME, case_name
-from vegglue.effects.definition import Effect
-from vegglue.effects.library import library
-from vegglue.errors import InputError
-from vegglue.results.diagnosis import Location
-from vegglue.screening.candidates import (
+from vegglue.calibration.candidates import (
     Candidate,
     acting_in,
     at_work,
@@ -30,6 +22,14 @@ from vegglue.screening.candidates import (
     where_it_may_act,
     with_effect,
 )
+from vegglue.case.messages import nearest_effect
+from vegglue.case.resolved_config import Tree
+from vegglue.case.schema import Case
+from vegglue.case.text_files import LONGEST_NAME, case_name
+from vegglue.effects.definition import Effect
+from vegglue.effects.library import library
+from vegglue.errors import InputError
+from vegglue.results.diagnosis import Location
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:

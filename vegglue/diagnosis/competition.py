@@ -18,17 +18,17 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
+from vegglue.calibration.candidates import place_candidate
+from vegglue.calibration.evidence import HypothesisKind, kind_named
+from vegglue.calibration.instruments import Instrument
+from vegglue.calibration.places import EFFECT_AT_PLACE, Places
+from vegglue.calibration.residual_screening import Screening, refit_start
+from vegglue.calibration.second_looks import SecondLook, second_looks
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.tempered_chances import tempered_chances, tempering
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
-from vegglue.screening.candidates import place_candidate
-from vegglue.screening.evidence import HypothesisKind, kind_named
-from vegglue.screening.instruments import Instrument
-from vegglue.screening.places import EFFECT_AT_PLACE, Places
-from vegglue.screening.residual_screening import Screening, refit_start
-from vegglue.screening.second_looks import SecondLook, second_looks
 
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.

@@ -5,10 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
+from vegglue.calibration.evidence import kind_named
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
+from vegglue.calibration.law_screening import LawScreening
 from vegglue.calibration.noise import with_correlation
+from vegglue.calibration.residual_screening import Screening
 from vegglue.case.case_effects import parameters_of_effects
+from vegglue.case.channel_geometry import half_width
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.causes_in_words import places_told
 from vegglue.diagnosis.child_config import candidate_at
@@ -41,11 +46,6 @@ from vegglue.results.diagnosis import (
     Predictions,
     Suspect,
 )
-from vegglue.screening import score_test
-from vegglue.screening.evidence import kind_named
-from vegglue.screening.law_screening import LawScreening
-from vegglue.screening.residual_screening import Screening
-from vegglue.site.channel_geometry import half_width
 from vegglue.version import VERSION
 
 # Odds by which a field must beat the rest: 100 to 1, where evidence is decisive (Jeffreys 1961, by Kass and Raftery

@@ -12,9 +12,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.calibration.instruments import InstrumentKind
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.tempered_chances import tempering
-from vegglue.screening.instruments import InstrumentKind
 
 # Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
 MOST_FOLLOWED = 3

@@ -15,9 +15,13 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, log_evidence
+from vegglue.calibration.candidates import candidate_in_case
+from vegglue.calibration.evidence import alarm_p
 from vegglue.calibration.fit import chi2, fit, interval95
+from vegglue.calibration.instruments import Instrument, error_columns
 from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_unknown_errors
+from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.diagnosis.competition import (
     Contender,
     chances_of,
@@ -47,10 +51,6 @@ from vegglue.measurements.suspicious_values import absurd_values
 from vegglue.parallel import begun, in_threads
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
-from vegglue.screening.candidates import candidate_in_case
-from vegglue.screening.evidence import alarm_p
-from vegglue.screening.instruments import Instrument, error_columns
-from vegglue.screening.residual_screening import Screening, screen
 
 # How often errors alone sound the first alarm; 5 % is usual. Later alarms are sounded five times less often.
 FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2

@@ -19,9 +19,9 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.cell_responses import CellResponses, cell_responses
 from vegglue.calibration.model_error import Bumps, bumps, field_columns
 from vegglue.calibration.noise import covariance_of
+from vegglue.calibration.residual_screening import GROUPS
 from vegglue.flow.local_changes import Term
 from vegglue.parallel import in_threads
-from vegglue.screening.residual_screening import GROUPS
 
 # Half lengths and half widths of bumps over the half width of the floor [-], from those of the model's own error to a
 # trend along the channel. Chosen, not measured.

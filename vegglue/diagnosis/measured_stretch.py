@@ -5,8 +5,8 @@ import pandas as pd
 from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.effects.definition import Stage
-from vegglue.in_short import listed
 from vegglue.measurements.kinds import velocity_rows
+from vegglue.wording.numbers import listed
 
 # Share of the channel below which it is said that velocities come from a part of it. Chosen, not measured.
 SMALL_PART = 0.5

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from vegglue.calibration.noise import Noise, covariance_of_data
+from vegglue.case.channel_geometry import channel_geometry
+from vegglue.case.gridded_site import cells_at
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.engine.interface import Model, Point
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of
-from vegglue.site.channel_geometry import channel_geometry
-from vegglue.site.gridded_site import cells_at
 
 # Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
 AT_EDGE = 0.2

@@ -19,16 +19,16 @@ import pandas as pd
 import scipy.linalg
 
 from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
+from vegglue.case.channel_geometry import expected_depth
+from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, Point, linearise_from, responses
-from vegglue.in_short import in_digits
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.sections import section_places
-from vegglue.screening.candidates import Candidate, cause_of
-from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import Site, in_experiment
+from vegglue.wording.numbers import in_digits
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
 HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import Candidate
 from vegglue.case.schema import Case
 from vegglue.diagnosis.between_sections import acts_elsewhere
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
@@ -11,7 +12,6 @@ from vegglue.diagnosis.comparison import By, rung
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.results.diagnosis import Diagnosis, Location
 from vegglue.results.rung import Rung
-from vegglue.screening.candidates import Candidate
 
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
+from vegglue.calibration.candidates import place_candidate, with_effect
+from vegglue.calibration.evidence import HypothesisKind, expected_gain, log_factors
+from vegglue.calibration.places import Places, places_around
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.tempered_chances import tempered_chances
-from vegglue.screening import score_test
-from vegglue.screening.candidates import place_candidate, with_effect
-from vegglue.screening.evidence import HypothesisKind, expected_gain, log_factors
-from vegglue.screening.places import Places, places_around
 
 # Distance of the places that are looked at around a refitted one, over that of the spots of the screening [-]. Chosen,
 # not measured.

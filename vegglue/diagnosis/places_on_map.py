@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vegglue.case.centreline import on_map
+from vegglue.case.grid import centreline_in
 from vegglue.case.schema import Case
-from vegglue.in_short import listed
-from vegglue.site.centreline import on_map
-from vegglue.site.grid import centreline_in
+from vegglue.wording.numbers import listed
 
 
 def places_on_map_in_words(case: Case, places: Sequence[tuple[float, float]]) -> str:

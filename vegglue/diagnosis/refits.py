@@ -25,6 +25,7 @@ from vegglue.calibration.baseline import (
     with_own_error_again,
     with_own_error_at,
 )
+from vegglue.calibration.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
@@ -33,7 +34,6 @@ from vegglue.normal_range import NORMAL95
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import Suspect
-from vegglue.screening.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 
 # Steps that a refit may take. Chosen, not measured: most need four.
 REFIT_STEPS = 10

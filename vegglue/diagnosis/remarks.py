@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from vegglue.calibration.places import LEAST_DEPTH
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
 from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
 from vegglue.measurements.carried_in_words import carried_in_words
@@ -9,7 +10,6 @@ from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.results.small_misfit import small_misfit_in_words
 from vegglue.results.suspect import counted_in_words
-from vegglue.screening.places import LEAST_DEPTH
 
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
 IMPLAUSIBLE = 3.0

@@ -6,8 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.evidence import kind_named, prior_shrinkage
 from vegglue.calibration.fit import chi2
+from vegglue.calibration.instruments import Instrument, error_columns
+from vegglue.calibration.residual_screening import Screening
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.findings import Undecided
 from vegglue.diagnosis.refits import Refit
@@ -15,10 +19,6 @@ from vegglue.diagnosis.tempered_chances import tempered_odds
 from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
-from vegglue.screening import score_test
-from vegglue.screening.evidence import kind_named, prior_shrinkage
-from vegglue.screening.instruments import Instrument, error_columns
-from vegglue.screening.residual_screening import Screening
 
 # Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
 # others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).

@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import candidate_in_case, effect_entry
+from vegglue.calibration.residual_screening import screen
 from vegglue.case.schema import Case
 from vegglue.diagnosis.competition import Contender, contenders_of
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
 from vegglue.diagnosis.rivals import step_found
 from vegglue.progress import Progress, Watch
 from vegglue.results.diagnosis import Step, Suspect
-from vegglue.screening.candidates import candidate_in_case, effect_entry
-from vegglue.screening.residual_screening import screen
 
 # The model, the steps and the suspects, as they are now.
 Again = tuple[Baseline, tuple[Step, ...], dict[str, Suspect]]

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from vegglue.calibration import score_test
+from vegglue.calibration.evidence import prior_shrinkage
 from vegglue.calibration.fit import objective
+from vegglue.calibration.residual_screening import Screening
 from vegglue.normal_range import NORMAL95
 from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
-from vegglue.screening import score_test
-from vegglue.screening.evidence import prior_shrinkage
-from vegglue.screening.residual_screening import Screening
 
 # Rate at which errors alone make some listed effect score higher than what counts as detectable.
 FALSE_ALARMS_OF_EFFECTS = 0.04

@@ -11,12 +11,12 @@ from collections.abc import Callable
 import numpy as np
 
 from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.calibration.residual_screening import Screening
 from vegglue.diagnosis.competition import LEAST_ODDS
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.results.causes import LawsSuspected, LawSuspected
-from vegglue.screening.law_screening import LawScreening, law_fingerprints, screen_laws
-from vegglue.screening.residual_screening import Screening
 
 # How often errors alone sound the alarm of laws [-]: it comes on top of that of everything listed, which is sounded at
 # 5 %. Share of the chance of all laws that those told hold together.

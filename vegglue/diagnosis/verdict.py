@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vegglue.calibration.candidates import START_OFF_ENDS
 from vegglue.case.parameter_space import FURTHEST
 from vegglue.diagnosis.causes_in_words import (
     TO_DISCOVER,
@@ -28,7 +29,6 @@ from vegglue.measurements.carried_in_words import CHECK, carried_in_short
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 from vegglue.results.suspect import counted_in_words
-from vegglue.screening.candidates import START_OFF_ENDS
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3

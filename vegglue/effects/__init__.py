@@ -1,5 +1,6 @@
-"""The library of physical effects: what one is, what it gets to see, and one file for each stage it may act at.
+"""The library of physical effects, one file for each stage at which an effect may act, and the laws of resistance of
+beds and plants, in compiled loops.
 
-May import: resistance.
-Open first: definition.py, library.py.
+May import: no other folder.
+Open first: definition.py, library.py, bed_laws.py, plant_laws.py.
 """

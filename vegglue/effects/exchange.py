@@ -7,8 +7,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.physical_constants import KARMAN
 from vegglue.effects.surroundings import Cells
-from vegglue.resistance.physical_constants import KARMAN
 
 # Smallest depth over the mean one [-]: towards the waterline their ratio would grow without end.
 LEAST_RELATIVE_DEPTH = 0.2

@@ -7,8 +7,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.physical_constants import AIR_OVER_WATER, GRAVITY
 from vegglue.effects.surroundings import Cells
-from vegglue.resistance.physical_constants import AIR_OVER_WATER, GRAVITY
 
 WIND_DRAG = 1.3e-3  # C_w [-], of winds of some 8 m/s by Garratt (1977)
 LEAST_WINDY_DEPTH = 0.05  # m; a stress on less water would be a force without end

@@ -7,9 +7,9 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.effects.exchange import dispersion
 from vegglue.effects.law import Law, LawForm, LawQuantity, LawTerm
+from vegglue.effects.physical_constants import GRAVITY
 from vegglue.effects.resistance import LEAST_DEPTH_OF_POWER
 from vegglue.effects.surroundings import Cells
-from vegglue.resistance.physical_constants import GRAVITY
 
 
 def _friction(cells: Cells, factor: Array) -> dict[str, Array]:

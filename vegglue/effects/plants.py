@@ -7,8 +7,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
+from vegglue.effects.physical_constants import WATER_VISCOSITY
 from vegglue.effects.surroundings import PlantCells
-from vegglue.resistance.physical_constants import WATER_VISCOSITY
 
 # Speed [m/s] below which plants do not yield further: a negative exponent would give infinite drag at rest.
 LEAST_YIELDING_SPEED = 0.02

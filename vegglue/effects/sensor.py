@@ -7,8 +7,8 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.physical_constants import GRAVITY, KARMAN
 from vegglue.effects.surroundings import Reading
-from vegglue.resistance.physical_constants import GRAVITY, KARMAN
 
 
 def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:

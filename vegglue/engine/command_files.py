@@ -16,12 +16,12 @@ import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.case.case_effects import value_of
+from vegglue.case.channel_geometry import patches_present
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import LARGEST_READING
-from vegglue.site.channel_geometry import patches_present
 
 PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"
 COLUMNS_LEFT = ("station", "prediction")

@@ -32,7 +32,7 @@ from vegglue.engine.command_run import CommandEnd, run_command_once
 from vegglue.errors import InputError, shown_path
 from vegglue.parallel import cores_allowed, is_taken
 from vegglue.progress import Progress, Watch, silent
-from vegglue.storage.lock import hold_lock
+from vegglue.results.lock import hold_lock
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 OneTheta = Mapping[str, float]

@@ -1,7 +1,7 @@
 """What a command says where the loops of the solver are yet to be compiled: once for a machine and a version."""
 
 from vegglue.compilation import is_kept
-from vegglue.solver.block_elimination import solve
+from vegglue.flow.block_elimination import solve
 
 
 def with_compilation(phase: str) -> str:

@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array, Single
+from vegglue.case.gridded_site import Site
 from vegglue.case.schema import Case
 from vegglue.effects.definition import Amplitude
 from vegglue.flow.local_changes import Term
-from vegglue.site.gridded_site import Site
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
+from vegglue.case.grid import filter_width_of
+from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
+from vegglue.case.zones import ranges_without_cells
 from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
 from vegglue.measurements.observations import Observations
-from vegglue.site.grid import filter_width_of
-from vegglue.site.gridded_site import Site, build_site
-from vegglue.site.zones import ranges_without_cells
 
 # Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.
 FEWEST_CELLS = 6

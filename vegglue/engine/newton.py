@@ -13,18 +13,18 @@ from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.engine.newton_fields import responses_by_adjoints
 from vegglue.engine.newton_runs import predict_members
+from vegglue.flow.chord import ChordSolution
 from vegglue.flow.equations import faces, residual
+from vegglue.flow.jacobian import Factors, factors
+from vegglue.flow.newton import CLOSE
 from vegglue.flow.problem import EMPTY, Problem, crop
 from vegglue.flow.problem_setup import with_effects_of
+from vegglue.flow.prolongation import on_grid
+from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import predictions_at_sensors
+from vegglue.flow.tangent import CAUSE_LANES, tangents
+from vegglue.flow.wet_band import chord_in_band, rows_inside, widen
 from vegglue.parallel import in_threads
-from vegglue.solver.chord import ChordSolution
-from vegglue.solver.jacobian import Factors, factors
-from vegglue.solver.newton import CLOSE
-from vegglue.solver.prolongation import on_grid
-from vegglue.solver.reference_member import settled
-from vegglue.solver.tangent import CAUSE_LANES, tangents
-from vegglue.solver.wet_band import chord_in_band, rows_inside, widen
 
 # Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
 DIFFERENCE_STEP = 1e-3

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array, Single
+from vegglue.case.channel_geometry import ChannelGeometry, channel_geometry, rows_of
 from vegglue.compilation import compiled
 from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Model, Point
@@ -30,9 +31,8 @@ from vegglue.flow.shared_inflow import (
     shared_inflows,
     with_kept_shares,
 )
-from vegglue.site.channel_geometry import ChannelGeometry, channel_geometry, rows_of
-from vegglue.solver.tangent import adjoints
-from vegglue.solver.wet_band import widen
+from vegglue.flow.tangent import adjoints
+from vegglue.flow.wet_band import widen
 
 # Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
 CELL_STRIDE = 5

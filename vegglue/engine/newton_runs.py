@@ -9,12 +9,12 @@ from scipy.special import ndtr, ndtri
 from vegglue.arrays import Array
 from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Model, Point
+from vegglue.flow.batch import solve_members
+from vegglue.flow.march import fall_back
 from vegglue.flow.problem import Problem
 from vegglue.flow.sensor import predictions_at_sensors
+from vegglue.flow.status import FAILED
 from vegglue.parallel import side_by_side
-from vegglue.solver.batch import solve_members
-from vegglue.solver.march import fall_back
-from vegglue.solver.status import FAILED
 
 # Points solved together: as many as fit the lanes of chord steps from one point.
 RUNS_TOGETHER = 32

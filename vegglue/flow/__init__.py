@@ -1,5 +1,6 @@
-"""The shallow-water equations of a case: the problem, its residual, where water meets land, and what sensors read.
+"""The shallow-water equations of a case, their residual and their steady states: Newton for one member, chord steps for
+its neighbours, marching where both fail; tangents, adjoints and sensors.
 
-May import: resistance, effects, case, site, measurements.
-Open first: problem.py, equations.py.
+May import: case, effects, measurements.
+Open first: problem.py, equations.py, newton.py, batch.py.
 """

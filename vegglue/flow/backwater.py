@@ -3,9 +3,9 @@
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.effects import physical_constants
 from vegglue.flow.closures import bed_drag
 from vegglue.flow.problem import ALONG, LEVEL, Problem
-from vegglue.resistance import physical_constants
 
 # Largest slope of the energy line [-]: above it the estimate in one dimension would run away from the bed. Chosen, not
 # measured, twenty times that of a bed of 1 in 1,000; it decides where Newton starts, not where it ends.

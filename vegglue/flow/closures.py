@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import part_of
+from vegglue.effects import bed_laws, plant_laws
 from vegglue.effects.active_effect import applied
 from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells, speed_of
 from vegglue.flow.problem import ACROSS, ALONG, EMPTY, LEVEL, Problem
 from vegglue.flow.wet_and_dry import afloat
-from vegglue.resistance import bed_laws, plant_laws
-from vegglue.site.channel_geometry import part_of
 
 # Columns worked on together [-], so that what lies between fits the cache. On 200 x 48 cells strips of 40 take a fifth
 # longer than all columns at once with one member, and an eighth with 16. No number hangs on it.

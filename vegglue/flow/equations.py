@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.flow import kernels, wet_and_dry
 from vegglue.flow.closures import Closures, closures, wall_rates
 from vegglue.flow.problem import ALONG, EMPTY, LEVEL, InflowSegment, Problem, above_bed
-from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from vegglue.compilation import compiled
+from vegglue.effects.physical_constants import GRAVITY
 from vegglue.flow.columns import (
     beside_x,
     beside_y,
@@ -31,7 +32,6 @@ from vegglue.flow.columns import (
 )
 from vegglue.flow.stretch import at_cell, at_face, columns_of
 from vegglue.flow.wet_and_dry import afloat, depths
-from vegglue.resistance.physical_constants import GRAVITY
 
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest. Chosen, not measured, below
 # what instruments resolve: larger ones add friction to slow water, smaller ones sharpen the bend that Newton meets.

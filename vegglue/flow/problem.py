@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import rows_of
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.stretch import Bend
-from vegglue.site.channel_geometry import rows_of
 
 LEVEL, ACROSS, ALONG = 0, 1, 2
 # An array (nx, ny, m) of something that is not there.

@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.case_effects import Theta, active_effects, value_of
+from vegglue.case.channel_geometry import channel_geometry, expected_depth, patches_present
+from vegglue.case.grid import Grid, cell_stretch, curvature_of
+from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.site_schema import Inflow, Stand, StandOverride
+from vegglue.case.zones import centres_within, inflow_cells, refuse_ranges_without_cells
+from vegglue.effects import bed_laws, plant_laws
 from vegglue.effects.active_effect import ActiveEffect, applied
 from vegglue.effects.definition import REPLACED
 from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
+from vegglue.effects.wall_laws import wall_coefficient
 from vegglue.flow.problem import (
     EMPTY,
     SMOOTH_WALLS,
@@ -26,12 +32,6 @@ from vegglue.flow.problem import (
     VegetatedCells,
 )
 from vegglue.flow.stretch import Bend
-from vegglue.resistance import bed_laws, plant_laws
-from vegglue.resistance.wall_laws import wall_coefficient
-from vegglue.site.channel_geometry import channel_geometry, expected_depth, patches_present
-from vegglue.site.grid import Grid, cell_stretch, curvature_of
-from vegglue.site.gridded_site import Site, in_experiment
-from vegglue.site.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 
 # Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
 WHERE_WATER_ENTERS = 0.2

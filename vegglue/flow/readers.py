@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.grid import Grid
+from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.effects.surroundings import across
 from vegglue.flow.equations import Faces, faces
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
-from vegglue.resistance.physical_constants import FILM_ON_LAND
-from vegglue.site.grid import Grid
 
 
 @dataclass(frozen=True)

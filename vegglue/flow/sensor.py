@@ -8,15 +8,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.grid import Grid
 from vegglue.effects.active_effect import applied
+from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.effects.surroundings import Reading
 from vegglue.flow.closures import bent_plants, closures
 from vegglue.flow.equations import Faces, faces, side_discharges
 from vegglue.flow.problem import Problem, above_bed, stretch_of_cells
 from vegglue.flow.readers import READERS, GriddedFlow, bilinear, nearest_face
 from vegglue.measurements.kinds import Kind, kind_of
-from vegglue.resistance.physical_constants import FILM_ON_LAND
-from vegglue.site.grid import Grid
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ import math
 import numpy as np
 
 from vegglue.compilation import compiled
+from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.wet_and_dry import wet_depth
-from vegglue.resistance.physical_constants import FILM_ON_LAND
 
 # Films of depth above which a face stays as it is [-]. Of the rows, 2 needs two more steps in ten, 10 none fewer;
 # of rho, 20 and 100 none fewer.

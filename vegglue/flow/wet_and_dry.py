@@ -3,7 +3,7 @@
 import numpy as np
 
 from vegglue.compilation import compiled
-from vegglue.resistance.physical_constants import FILM_ON_LAND
+from vegglue.effects.physical_constants import FILM_ON_LAND
 
 
 @compiled

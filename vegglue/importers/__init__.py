@@ -6,6 +6,6 @@ further instrument is a file with a reader (path, what the site file says of it)
 tape in `tape_tables.py`, records of a probe their means in `point_records.py`. A new
 ending stands among those of `instruments.py`, or of text in `measured_files.py`.
 
-May import: case, site, measurements.
+May import: case, measurements, wording.
 Open first: field_folder.py, measured_files.py, instruments.py, column_names.py.
 """

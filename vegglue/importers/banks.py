@@ -3,12 +3,12 @@
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.grid import Grid
 from vegglue.case.resolved_config import Tree
+from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.importers.config_parts import loguniform_prior
 from vegglue.importers.field_site import Channel, FieldSite
-from vegglue.in_short import in_digits
-from vegglue.site.grid import Grid
-from vegglue.site.zones import beyond_slope_break, slope
+from vegglue.wording.numbers import in_digits
 
 BANK = "bank"
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}

@@ -10,13 +10,13 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import Role
 from vegglue.importers.loose_table import LooseTable
-from vegglue.in_short import so_many
 from vegglue.measurements.missing_marks import (
     LARGEST_COORDINATE,
     MARKS_OF_ANY_COLUMN,
     MARKS_OR_VALUES,
     is_of_nines,
 )
+from vegglue.wording.numbers import so_many
 
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 # What no reading of a quantity or a role exceeds [SI]: no stream among plants runs at 7 m/s, a direction is less than

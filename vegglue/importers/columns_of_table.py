@@ -19,7 +19,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable
 from vegglue.importers.number_words import is_number
 from vegglue.importers.unit_words import UNITS, is_like_unit, unit_named
-from vegglue.in_short import listed
+from vegglue.wording.numbers import listed
 
 # Words of a heading that say across; V alone says none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vegglue.case.centreline import Centreline, centreline_of
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
@@ -26,8 +27,7 @@ from vegglue.importers.map_files import (
 )
 from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, read_rows, taken_in_words
 from vegglue.importers.placement import Placement
-from vegglue.in_short import in_digits
-from vegglue.site.centreline import Centreline, centreline_of
+from vegglue.wording.numbers import in_digits
 
 # Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
 MOST_POINTS = 1000

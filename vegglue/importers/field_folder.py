@@ -15,6 +15,7 @@ from pathlib import Path
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name, told_apart
+from vegglue.case.zones import BANK_SLOPE
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.banks import bank_break, roughness_of_banks, with_banks
 from vegglue.importers.config_parts import (
@@ -38,7 +39,6 @@ from vegglue.importers.polygon_files import planted_in_words, planted_polygons
 from vegglue.importers.site_file import read_site, site_file
 from vegglue.importers.standing_water import refuse_standing_water
 from vegglue.importers.surveyed_bed import Ground, surveyed_bed
-from vegglue.site.zones import BANK_SLOPE
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).

@@ -7,7 +7,7 @@ import numpy as np
 
 from vegglue.importers.lost_places import VELOCITIES
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.in_short import so_many
+from vegglue.wording.numbers import so_many
 
 # Values of one discharge are alike to so much [-]: those of one are copied, not measured again.
 COPIED = 1e-6

@@ -17,7 +17,7 @@ from vegglue.importers.column_names import role_of
 from vegglue.importers.library_files import read_by_library, refuse_larger
 from vegglue.importers.number_words import MISSING_WORDS, has_decimal_comma, is_number, number_in
 from vegglue.importers.unit_words import is_unit
-from vegglue.in_short import listed, so_many
+from vegglue.wording.numbers import listed, so_many
 
 COMMENTS = ("#", "%", "//", "!", "$")
 CHECK_OR_MOVE = "check the file, or move it out of the folder where it holds no measurements"

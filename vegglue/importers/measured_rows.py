@@ -16,7 +16,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, read_loosely
 from vegglue.importers.placement import Placement
 from vegglue.importers.unit_words import si_factor
-from vegglue.in_short import listed, so_many
+from vegglue.wording.numbers import listed, so_many
 
 MOST_UNREAD = 12  # columns that are named of those that were not read: more are a list that nobody reads
 # What an entry of `files` may say of other files, and does nothing to a table.

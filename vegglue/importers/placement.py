@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.centreline import Centreline, along_and_across, heading_at, on_map
 from vegglue.case.frame import Frame
-from vegglue.site.centreline import Centreline, along_and_across, heading_at, on_map
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from vegglue.importers.polygon_properties import (
     names_its_unit,
 )
 from vegglue.importers.polygon_tables import NONE_NAMED, columns_named, polygons_of_table
-from vegglue.in_short import listed, so_many
+from vegglue.wording.numbers import listed, so_many
 
 AREAS = ("Polygon", "MultiPolygon")  # geometries of GeoJSON
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xlsm")

@@ -17,7 +17,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.matlab_loading import numbers_of_variable, reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
-from vegglue.in_short import so_many
+from vegglue.wording.numbers import so_many
 
 QREV_VARIABLE = "meas_struct"  # the variable by which such a file is known
 

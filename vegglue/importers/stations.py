@@ -21,8 +21,8 @@ from vegglue.importers.placement import Placement
 from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
 from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
 from vegglue.importers.told_apart_repeats import refuse_told_apart
-from vegglue.in_short import listed, so_many
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
+from vegglue.wording.numbers import listed, so_many
 
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
 from vegglue.case.size_limits import MOST_CELLS
 from vegglue.case.text_files import case_name
@@ -20,7 +21,6 @@ from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.placement import Placement
 from vegglue.importers.polygon_files import read_polygons, units_taken
 from vegglue.importers.terrain_files import RASTERS, Terrain, filled, read_terrain
-from vegglue.site.grid import Grid, centres
 
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0

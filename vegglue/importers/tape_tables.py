@@ -17,7 +17,7 @@ from vegglue.importers.file_words import FileWords
 from vegglue.importers.loose_table import LooseTable, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, rows_of_table
 from vegglue.importers.number_words import is_number
-from vegglue.in_short import in_digits
+from vegglue.wording.numbers import in_digits
 
 # How a file of each program says what it is; its columns of place, depth and mean velocity of the vertical.
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)

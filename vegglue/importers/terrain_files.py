@@ -11,6 +11,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, Regul
 from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
+from vegglue.case.terrain import Raster, read_raster
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import role_of, words_of
 from vegglue.importers.file_words import FileWords
@@ -19,7 +20,6 @@ from vegglue.importers.loose_table import read_loosely
 from vegglue.importers.measured_rows import in_the_channel, read_rows, taken_in_words
 from vegglue.importers.nameless_sections import ONE_PLACE
 from vegglue.importers.placement import Placement
-from vegglue.site.terrain import Raster, read_raster
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")

@@ -9,7 +9,7 @@ from scipy.special import fdtrc
 from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.in_short import listed
+from vegglue.wording.numbers import listed
 
 DOWNSTREAM = ("u", "speed")
 # What a column must do to velocities before they are no repeats: more than chance would in one of a thousand, half of

@@ -1,5 +1,6 @@
-"""From an ensemble and measurements to a posterior: GLUE, or draws around the best members by importance sampling.
+"""From priors to a posterior: all members of an ensemble solved over the cores or run by a command; GLUE, or draws
+around the best members by importance sampling.
 
-May import: resistance, case, site, measurements, engine, results, calibration, screening.
-Open first: glue.py, refine.py.
+May import: calibration, case, effects, engine, flow, measurements, results, wording.
+Open first: solve_ensemble.py, glue.py, refine.py.
 """

@@ -4,10 +4,10 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
+from vegglue.effects.physical_constants import GRAVITY
+from vegglue.effects.plant_laws import above_canopy, baptist_chezy
 from vegglue.errors import InputError
 from vegglue.inference.weighted_statistics import weighted_median, weighted_quantile, weighted_sd
-from vegglue.resistance.physical_constants import GRAVITY
-from vegglue.resistance.plant_laws import above_canopy, baptist_chezy
 from vegglue.results.posterior import LEVELS, CorrectedCanopy
 
 

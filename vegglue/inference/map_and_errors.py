@@ -15,6 +15,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
 from vegglue.calibration.fit import MapEstimate, determined, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
+from vegglue.calibration.residual_screening import noise_given_all
 from vegglue.engine.interface import Model, Point, linearise, linearise_from
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError, shown_command
@@ -22,7 +23,6 @@ from vegglue.inference.likelihood import fit_members, sizes_as_stated
 from vegglue.inference.tried_members import TriedMembers, grids_of
 from vegglue.parallel import in_threads, side_by_side
 from vegglue.progress import Progress, Watch, counted
-from vegglue.screening.residual_screening import noise_given_all
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
 # prior]. Chosen, not measured: more starts find more modes and each costs a fit.

@@ -19,7 +19,6 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Model, predict
 from vegglue.engine.model import model_of
 from vegglue.engine.newton import NEWTON
-from vegglue.in_short import so_many
 from vegglue.inference.glue import check_stations
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import Sample, sample
@@ -35,6 +34,7 @@ from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
 from vegglue.version import VERSION
+from vegglue.wording.numbers import so_many
 
 # Effective draws that are asked for: an end of the 95 % range then rests on 25 of them.
 EFFECTIVE_DRAWS = 1000

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters, z_at
 from vegglue.case.prior import sample_prior
 from vegglue.engine.interface import Model, linearise, predict
 from vegglue.engine.model import ever_coarser
 from vegglue.results.ensemble import Ensemble
-from vegglue.site.channel_geometry import cells_across
 
 # Grids that fits go through: chosen. With the third the search for modes of the demo takes 24 s of one core, not 31; a
 # fourth hardly resolves a section.

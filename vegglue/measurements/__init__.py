@@ -1,5 +1,5 @@
-"""What was measured, read from files, judged, and brought into one table of stations.
+"""Measurements: read from files, checked for quality, and gathered in one table of stations.
 
-May import: case, site.
+May import: case, wording.
 Open first: observations.py, kinds.py.
 """

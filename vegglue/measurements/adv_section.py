@@ -8,10 +8,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.bed import bed_levels
+from vegglue.case.grid import Grid, centreline_in
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, Observation
+from vegglue.case.zones import cells_of_patch
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_digits, so_many
 from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
 from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
@@ -34,9 +36,7 @@ from vegglue.measurements.vertical_profile import (
     linear_average,
     sampling_error,
 )
-from vegglue.site.bed import bed_levels
-from vegglue.site.grid import Grid, centreline_in
-from vegglue.site.zones import cells_of_patch
+from vegglue.wording.numbers import in_digits, so_many
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others

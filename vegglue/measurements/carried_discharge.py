@@ -10,14 +10,14 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.case_effects import effect_of
+from vegglue.case.channel_geometry import discharges_upstream_of, expected_depth
+from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, middle_value, prior_range
 from vegglue.case.schema import Case, Experiment
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 from vegglue.measurements.plausible_flow import plausible_flow
 from vegglue.measurements.section_discharge import CrossSection, conveyance_weights, neighbour_error
 from vegglue.normal_range import NORMAL95
-from vegglue.site.channel_geometry import discharges_upstream_of, expected_depth
-from vegglue.site.gridded_site import Site, in_experiment
 
 # Strips that each cell is cut into across a section, and water shallower than which tells no velocity there [m].
 STRIPS, SHALLOWEST = 10, 0.01

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from vegglue.case.gridded_site import Site
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.case.schema import Case
-from vegglue.in_short import experiments_in_words, in_digits, listed, so_many
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges, changing_discharge
 from vegglue.measurements.sections import section_in_words
 from vegglue.measurements.suspicious_values import absurd_values
-from vegglue.site.gridded_site import Site
+from vegglue.wording.numbers import experiments_in_words, in_digits, listed, so_many
 
 CHECK = "check the discharge, the velocities and their unit, the bed and the levels"
 

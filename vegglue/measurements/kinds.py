@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.errors import InputError
-from vegglue.in_short import listed, so_many
+from vegglue.wording.numbers import listed, so_many
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from vegglue.case.centreline import along_and_across
+from vegglue.case.grid import centreline_in
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
 from vegglue.case.size_limits import MOST_STATIONS
@@ -15,8 +17,6 @@ from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_r
 from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
-from vegglue.site.centreline import along_and_across
-from vegglue.site.grid import centreline_in
 
 STATION_COLUMNS = (
     "experiment",

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import expected_depth
+from vegglue.case.gridded_site import Site
 from vegglue.case.parameter_space import Bounds, prior_range
 from vegglue.case.schema import Case, Experiment
-from vegglue.site.channel_geometry import expected_depth
-from vegglue.site.gridded_site import Site
 
 # Manning's n [s m^(-1/3)] above which no reach as a whole lies: weedy lowland brooks reach 0.3 to 0.5.
 THICKEST_GROWTH = 0.5

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.missing_marks import is_mark
 from vegglue.measurements.plausible_flow import PlausibleFlow, plausible_flow
 from vegglue.measurements.suspicion_in_words import outlet_in_words, suspicions_in_words
-from vegglue.site.gridded_site import Site, in_experiment
 
 # Factor [-] between what was measured in a section and Q / A up to which nothing is said. The sections of 16 campaigns
 # and of a surveyed confluence lie within 0.5 and 1.1; no unit in use but feet is nearer than 10.

@@ -1,5 +1,6 @@
-"""Results as values, and how each lies in a file: ensemble, fields, posterior, diagnosis.
+"""Results as values, and the files that hold them: ensemble, fields, posterior, diagnosis; locks, and how a killed run
+resumes.
 
-May import: case, site, measurements, flow, solver.
-Open first: ensemble.py, posterior.py.
+May import: case, flow, measurements, wording.
+Open first: ensemble.py, posterior.py, diagnosis.py, result_files.py.
 """

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import stations_in_short
 from vegglue.results.causes import (
     FaultyInstrument,
@@ -23,6 +22,7 @@ from vegglue.results.causes import (
     PlaceMap,
 )
 from vegglue.results.suspect import Suspect, counted_in_words
+from vegglue.wording.numbers import in_short, interval_in_short, so_many
 
 # instrument: some readings are off. Whether more is missing says `Verdict.clears_the_model`.
 VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]

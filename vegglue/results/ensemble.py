@@ -7,12 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from vegglue.in_short import in_short, so_many
-from vegglue.measurements.kinds import KINDS, stations_in_short
-from vegglue.results.fields import FieldWindow
-from vegglue.results.fitting import IN_WORDS, fitting, names_of, stated_as, stations_from
-from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
-from vegglue.solver.status import (
+from vegglue.flow.status import (
     FAILED,
     NOT_YET,
     RUN_BY_COMMAND,
@@ -21,6 +16,11 @@ from vegglue.solver.status import (
     STATUS_WORDS,
     members_with,
 )
+from vegglue.measurements.kinds import KINDS, stations_in_short
+from vegglue.results.fields import FieldWindow
+from vegglue.results.fitting import IN_WORDS, fitting, names_of, stated_as, stations_from
+from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
+from vegglue.wording.numbers import in_short, so_many
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from vegglue.arrays import Array, Single
+from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
 from vegglue.flow.readers import between
 from vegglue.results.fitting import fitting, names_of
 from vegglue.results.layout import Group, Stored, Variable, stored_fields
-from vegglue.site.grid import Grid
 
 Quantity = Literal["level", "u", "v"]
 DIMS = ("member", "experiment", "x", "y")

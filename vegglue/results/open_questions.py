@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from vegglue.in_short import in_digits, so_many
+from vegglue.wording.numbers import in_digits, so_many
 
 # What stands in a question between an effect that calibration hides and the parameter that hides it.
 HIDDEN_BEHIND = " from a change of "

@@ -9,12 +9,12 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from vegglue.in_short import in_short, interval_in_short, so_many
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
 from vegglue.results.fitting import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO
 from vegglue.results.layout import Stored
 from vegglue.results.refinement import OWN_UNIT, Refinement
+from vegglue.wording.numbers import in_short, interval_in_short, so_many
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # of all quantiles and bands: the 95 % and 50 % ranges and the median
 IDENTIFIED_BELOW = 0.5  # 95 % range of the posterior over that of the prior

@@ -4,7 +4,7 @@ import math
 
 from scipy.special import chdtr
 
-from vegglue.in_short import in_digits
+from vegglue.wording.numbers import in_digits
 
 # Chance of a chi2 as small under errors alone [-], below which something is said: as rare as what is called missing.
 TOO_SMALL = 0.001

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegglue.in_short import so_many
+from vegglue.wording.numbers import so_many
 
 # |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
 # its trace (cos^2 = 0.64).

@@ -1,8 +1,9 @@
-"""The verbs of `import vegglue`, one file each: from a case to its results, kept in the folder of the run.
+"""The verbs of `import vegglue`, one file each: from a case to its results, kept in the folder of the run; twins with a
+hidden effect.
 
-What draws is imported where a figure is drawn, so that what is up to date is told sooner.
+What draws is imported where a figure is drawn, so that results that are up to date are shown sooner.
 
-May import: effects, case, site, measurements, flow, importers, engine, results, calibration, screening, storage,
-ensemble, inference, diagnosis, discovery, figures, twins, report_page, checks, solver.
+May import: calibration, case, diagnosis, effects, engine, flow, importers, inference, measurements, report, results,
+wording.
 Open first: run.py, run_folder.py.
 """

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from vegglue.calibration.beyond_seen import laws_beyond_their_range
 from vegglue.case.case_effects import effect_of
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
-from vegglue.checks.case_check import check_case, doubts_about
+from vegglue.diagnosis.case_check import check_case, doubts_about
 from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser, model_of
@@ -15,8 +17,6 @@ from vegglue.errors import InputError
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
-from vegglue.screening.beyond_seen import laws_beyond_their_range
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.command_model import command_tried
 from vegglue.workflow.run_folder import folder_of, model_in, validation_of
 
@@ -40,7 +40,7 @@ def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
 
     Errors: InputError for a file that cannot be read, or a command that fails.
     """
-    from vegglue.figures.channel import save_channel_figure  # late: every command says what is odd, one draws
+    from vegglue.report.channel import save_channel_figure  # late: every command says what is odd, one draws
 
     observations, site = read_observations(case), build_site(case)
     picture = folder_of(runs, case) / "channel.png"
@@ -87,6 +87,6 @@ def check_effects(file: Path, *, trust: bool = False) -> dict[str, list[str]]:
         raise InputError(f"{file}: runs as code when it is checked: read it, and add --trust if you trust it.")
     if not file.is_file():
         raise InputError(f"{file}: expected an existing Python file of effects; correct the path.")
-    from vegglue.checks.effect_contract import breaches
+    from vegglue.diagnosis.effect_contract import breaches
 
     return {effect.name: breaches(effect, file.resolve()) for effect in effects_of(file.resolve())}

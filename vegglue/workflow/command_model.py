@@ -19,12 +19,12 @@ from vegglue.engine.command_runs import command_predictions, command_runs, ended
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_digits, so_many
 from vegglue.inference.likelihood import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis, Verdict
 from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.numbers import in_digits, so_many
 
 PLACE_FILE = "place.json"
 # Share of a standard error [-] by which the command may differ from what was reckoned with before it is a doubt.

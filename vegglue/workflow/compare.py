@@ -12,13 +12,13 @@ from vegglue.diagnosis.comparison import held_out_rmse, rung, rung_in_short
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
-from vegglue.in_short import in_short, so_many
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
+from vegglue.results.kept_words import ladder_that_fits, rung_that_fits, write_ladder, write_rung
 from vegglue.results.ladder import Ladder, LadderStep
 from vegglue.results.rung import Rung
-from vegglue.storage.kept_words import ladder_that_fits, rung_that_fits, write_ladder, write_rung
+from vegglue.wording.numbers import in_short, so_many
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 from vegglue.workflow.set_aside import left_out
 
@@ -133,7 +133,7 @@ def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
 
 def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
     """Draw the ladder in the folder of its last case; returns the picture."""
-    from vegglue.figures.error_ladder import save_ladder_figure
+    from vegglue.report.error_ladder import save_ladder_figure
 
     picture = folder_of(runs, last) / "ladder.png"
     save_ladder_figure(found.rungs, picture)

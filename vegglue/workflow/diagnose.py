@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
@@ -14,8 +15,7 @@ from vegglue.engine.interface import responses
 from vegglue.parallel import at_most, import_beside, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.candidates import Candidate, cause_of
-from vegglue.storage.result_files import diagnosis_that_fits, write_diagnosis
+from vegglue.results.result_files import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.command_model import with_command, with_words_on_command
 from vegglue.workflow.run_folder import calibrated, folder_of, keep_best_fit, model_in, validation_of
 from vegglue.workflow.set_aside import set_aside_of
@@ -34,12 +34,12 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     kept = diagnosis_that_fits(path, wanted)
     if kept is not None:
         return kept
-    import_beside("vegglue.report_page.diagnosis_pictures")  # drawing takes a third of a second to import
+    import_beside("vegglue.report.diagnosis_pictures")  # drawing takes a third of a second to import
     with at_most(jobs):
         model = with_command(model_in(case), folder, watch)
         found = diagnose_model(model, watch, validation_of(case, folder, watch))
         found = with_words_on_command(found, model, folder, watch)
-    from vegglue.report_page.diagnosis_pictures import save_diagnosis_figure
+    from vegglue.report.diagnosis_pictures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     keep_best_fit(case, folder, found.parameters.first, wanted)
@@ -60,7 +60,7 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     amplitude = effect.amplitude
     plausible = amplitude.off + amplitude.scale
     size = f"{effect.name}, {amplitude.name} {plausible:g}{'' if amplitude.unit == '-' else f' {amplitude.unit}'}"
-    from vegglue.report_page.diagnosis_pictures import save_fingerprint_figure
+    from vegglue.report.diagnosis_pictures import save_fingerprint_figure
 
     save_fingerprint_figure(amplitude.gain(plausible) * trace, station, size, path)
     return path

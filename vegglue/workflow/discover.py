@@ -4,22 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from vegglue.calibration.candidates import Candidate
 from vegglue.case.config import load_case
 from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
+from vegglue.diagnosis.discovered import Discovery, LawFound
+from vegglue.diagnosis.effect_file import effect_name, effect_text
 from vegglue.diagnosis.excluded_stations import excluding, exclusion_in_words
-from vegglue.discovery.discovered import Discovery, LawFound
-from vegglue.discovery.effect_file import effect_name, effect_text
-from vegglue.discovery.search import discover_laws
+from vegglue.diagnosis.search import discover_laws
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.in_short import in_short
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
-from vegglue.screening.candidates import Candidate
+from vegglue.wording.numbers import in_short
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.set_aside import set_aside_of

@@ -8,24 +8,24 @@ from typing import Literal, get_args
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.grid import build_grid
 from vegglue.case.parameter_space import refuse_without_parameters, theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import names_in_files
 from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.first_use import with_compilation
-from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
+from vegglue.inference.solve_chunk import solve_flow
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.site.grid import build_grid
-from vegglue.storage.geotiff import write_geotiff
-from vegglue.storage.labelled_arrays import extra_library
-from vegglue.storage.mesh_file import quantities, write_mesh
-from vegglue.storage.point_tables import write_field_table, write_station_table
-from vegglue.storage.result_files import read_posterior, stored_hash
+from vegglue.results.geotiff import write_geotiff
+from vegglue.results.labelled_arrays import extra_library
+from vegglue.results.mesh_file import quantities, write_mesh
+from vegglue.results.point_tables import write_field_table, write_station_table
+from vegglue.results.result_files import read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
 from vegglue.workflow.median_flow import median_flow

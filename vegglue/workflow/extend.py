@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import Candidate, start_amplitude
 from vegglue.case.config import load_case
 from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.parameter_space import z_at
@@ -21,14 +22,13 @@ from vegglue.diagnosis.stepwise_choice import Choice, Names
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
-from vegglue.in_short import in_digits
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.screening.candidates import Candidate, start_amplitude
-from vegglue.storage.kept_words import write_rung
-from vegglue.storage.result_files import diagnosis_that_fits
+from vegglue.results.kept_words import write_rung
+from vegglue.results.result_files import diagnosis_that_fits
+from vegglue.wording.numbers import in_digits
 from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (

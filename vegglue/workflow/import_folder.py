@@ -7,18 +7,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from vegglue.case.config import load_case
+from vegglue.case.gridded_site import build_site
 from vegglue.case.made_files import refuse_not_made, write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
-from vegglue.checks.channel_and_plants import remarks_on_unnamed_banks
-from vegglue.checks.ensemble_and_priors import refused_for_errors
+from vegglue.diagnosis.channel_and_plants import remarks_on_unnamed_banks
+from vegglue.diagnosis.ensemble_and_priors import refused_for_errors
 from vegglue.errors import InputError
 from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 from vegglue.workflow.import_trial import refuse_unreadable_import
 
 ANOTHER_FILE = "give another file by --to"

@@ -18,8 +18,8 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash, write_posterior
-from vegglue.storage.resume import begun_or_finished
+from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash, write_posterior
+from vegglue.results.resume import begun_or_finished
 from vegglue.workflow.command_model import with_command
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import folder_of, of_size, other_size

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, TypeVar
 import pandas as pd
 
 from vegglue.errors import InputError, shown_command
-from vegglue.in_short import in_short, so_many
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.labelled_arrays import read_inference_data, read_labelled
-from vegglue.storage.result_files import read_diagnosis
+from vegglue.results.labelled_arrays import read_inference_data, read_labelled
+from vegglue.results.result_files import read_diagnosis
+from vegglue.wording.numbers import in_short, so_many
 
 if TYPE_CHECKING:
     import arviz

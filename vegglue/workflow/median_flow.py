@@ -4,10 +4,10 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
-from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.flow.sensor import FlowFields
+from vegglue.inference.solve_chunk import solve_flow
 from vegglue.results.posterior import Posterior
-from vegglue.storage.result_files import flow_that_fits, write_flow
+from vegglue.results.result_files import flow_that_fits, write_flow
 
 
 def median_flow(case: Case, posterior: Posterior, folder: Path) -> dict[str, FlowFields]:

@@ -8,9 +8,9 @@ import numpy as np
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name, write_text
-from vegglue.ensemble.solve_chunk import solve_flow
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
+from vegglue.inference.solve_chunk import solve_flow
 from vegglue.whole_files import failed_writes_told
 from vegglue.workflow.new_texts import CASE, README
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
+from vegglue.calibration.candidates import Candidate
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -21,9 +22,8 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import LawsSuspected, LawSuspected
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
+from vegglue.results.kept_words import questions_that_fit, write_questions
 from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
-from vegglue.screening.candidates import Candidate
-from vegglue.storage.kept_words import questions_that_fit, write_questions
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import calibrated, folder_of
 

@@ -7,8 +7,8 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.progress import Progress, Watch, silent
-from vegglue.report_page.overview import write_overview
-from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.report.overview import write_overview
+from vegglue.results.kept_words import ladder_that_fits
 from vegglue.workflow.report import results_of
 from vegglue.workflow.run_folder import as_solved, folder_of
 

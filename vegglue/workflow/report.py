@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from vegglue.case.gridded_site import build_site
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import without_stations
@@ -13,13 +14,12 @@ from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.report_page.page import write_report
-from vegglue.report_page.run import LoopResults, Run
+from vegglue.report.page import write_report
+from vegglue.report.run import LoopResults, Run
+from vegglue.results.kept_words import ladder_that_fits, questions_that_fit
 from vegglue.results.posterior import Posterior
-from vegglue.site.gridded_site import build_site
-from vegglue.storage.kept_words import ladder_that_fits, questions_that_fit
-from vegglue.storage.result_files import diagnosis_that_fits, read_ensemble, read_posterior
-from vegglue.storage.resume import begun_or_finished
+from vegglue.results.result_files import diagnosis_that_fits, read_ensemble, read_posterior
+from vegglue.results.resume import begun_or_finished
 from vegglue.workflow.median_flow import median_flow
 from vegglue.workflow.run_folder import as_solved, folder_of, of_size
 from vegglue.workflow.set_aside import set_aside_of

@@ -11,7 +11,7 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.storage.resume import begun_or_finished
+from vegglue.results.resume import begun_or_finished
 from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, ladder_of, rung_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover

@@ -27,7 +27,7 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import Watch, silent
-from vegglue.storage.result_files import read_ensemble, read_posterior, stored_hash
+from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 from vegglue.workflow.command_model import unseen_with_command, with_command
 

@@ -8,8 +8,8 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.storage.kept_words import ladder_that_fits
-from vegglue.storage.result_files import diagnosis_that_fits
+from vegglue.results.kept_words import ladder_that_fits
+from vegglue.results.result_files import diagnosis_that_fits
 
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:

@@ -8,16 +8,16 @@ from pathlib import Path
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command_runs import command_runs
-from vegglue.ensemble.command_ensemble import run_ensemble
-from vegglue.ensemble.solve_ensemble import solve_ensemble
 from vegglue.errors import InputError, StorageError, shown_path
+from vegglue.flow.status import FAILED
+from vegglue.inference.command_ensemble import run_ensemble
+from vegglue.inference.solve_ensemble import solve_ensemble
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
-from vegglue.solver.status import FAILED
-from vegglue.storage.result_files import read_ensemble, stored_hash
-from vegglue.storage.resume import remove_left_over_fields
+from vegglue.results.result_files import read_ensemble, stored_hash
+from vegglue.results.resume import remove_left_over_fields
 from vegglue.workflow.run_folder import folder_of, of_size, other_size
 
 

@@ -8,10 +8,10 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.errors import InputError
-from vegglue.in_short import in_short
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.kept_words import ladder_that_fits
 from vegglue.results.ladder import LadderStep
-from vegglue.storage.kept_words import ladder_that_fits
+from vegglue.wording.numbers import in_short
 from vegglue.workflow.compare import Comparison, kept_rung
 from vegglue.workflow.run_folder import folder_of
 

@@ -9,13 +9,13 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.errors import shown_command
 from vegglue.parallel import one_thread
-from vegglue.storage.result_files import diagnosis_that_fits
-from vegglue.twins.reveal import guess_in_words
-from vegglue.twins.sealed_answer import opened_answer, sealed_answer
-from vegglue.twins.twin import measured_twin, true_place, twin_base
-from vegglue.twins.twin_files import SEAL, config_in, in_rows_of_twin, write_twin
+from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.workflow.command_model import refuse_command
+from vegglue.workflow.reveal import guess_in_words
 from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.sealed_answer import opened_answer, sealed_answer
+from vegglue.workflow.twin_files import SEAL, config_in, in_rows_of_twin, write_twin
+from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
 
 
 @one_thread()

@@ -1,0 +1,203 @@
+"""The contract of effects over the whole library, no exclusions; and that it finds what breaks it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.case.gridded_site import build_site
+from vegglue.case.schema import Case
+from vegglue.diagnosis.effect_contract import breaches
+from vegglue.diagnosis.trial_channel import AMPLITUDE, CHANNEL, sizes
+from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
+from vegglue.effects.library import SHIPPED, library
+from vegglue.flow.backwater import backwater
+from vegglue.flow.march import march
+from vegglue.flow.newton import newton
+from vegglue.flow.problem import ALONG, take
+from vegglue.flow.problem_setup import build_problem
+
+
+@pytest.mark.parametrize("effect", SHIPPED, ids=lambda effect: effect.name)
+def test_every_shipped_effect_keeps_the_contract(effect):
+    assert breaches(effect) == []
+
+
+def test_the_library_covers_all_stages():
+    assert {effect.stage for effect in SHIPPED} == set(STAGES)
+    assert len({effect.name for effect in SHIPPED}) == len(SHIPPED) >= 26
+    for effect in SHIPPED:
+        assert effect.doi == "" or effect.doi.startswith("10."), effect.name
+        assert not effect.checked or effect.source.startswith("definition"), f"{effect.name}: was the source read?"
+        assert not (effect.checked and effect.read_in), f"{effect.name}: a definition needs no other program"
+
+
+@pytest.mark.parametrize("value", [-1.9, -0.5, 0.5, 0.8, 2.5])
+def test_an_amplitude_and_its_gain_undo_each_other(value):
+    amplitude = Amplitude("strength", "1/m", "drag c", 0.1, -2.0, 3.0, off=0.5, power=2)
+    gain = amplitude.gain(value)
+    assert gain == pytest.approx((value - 0.5) * abs(value - 0.5))
+    assert amplitude.at(gain) == pytest.approx(value)
+    assert amplitude.size(gain) == pytest.approx(value - 0.5)
+    assert amplitude.at(gain + 100.0) == 3.0
+    assert amplitude.gain(0.5 + amplitude.scale) == pytest.approx(amplitude.plausible_gain)
+
+
+def test_a_size_may_be_within_its_support_and_within_belief():
+    amplitude = Amplitude("strength", "1/m", "drag c", 0.1, -2.0, 3.0, off=0.5, power=2)
+    assert [amplitude.allows(gain, 30.0) for gain in (6.2, -6.2, 6.3, -6.3)] == [True, True, False, False]
+    assert amplitude.allows(0.2**2, 3.0), "two times its scale"
+    assert not amplitude.allows(0.4**2, 3.0), "four times"
+
+
+def drag(cells, strength):
+    return {"rate": cells.rate + strength}
+
+
+GOOD = Effect(
+    name="more_drag",
+    stage="resistance",
+    title="More drag",
+    equation="k -> k + c",
+    act=drag,
+    amplitude=Amplitude("strength", "1/m", "drag c", 0.1, 0.0, 1.0),
+    source="definition",
+)
+
+
+def pushing(cells, strength):
+    return {"rate": cells.rate - 50.0 * strength}
+
+
+def always(cells, strength):
+    return {"rate": cells.rate * (1.0 + strength + 1e-9)}
+
+
+def of_others(cells, strength):
+    return {"rate": cells.rate * (1.0 + strength * (1.0 + cells.u.mean(axis=2, keepdims=True)))}
+
+
+def of_far(cells, strength):
+    return {"rate": cells.rate * (1.0 + strength * cells.u.mean(axis=1, keepdims=True))}
+
+
+def northward(cells, strength):
+    return {"rate": cells.rate * np.exp(strength * cells.geometry.offset)}
+
+
+def over_speed(cells, strength):
+    return {"rate": cells.rate + strength / np.abs(cells.u)}
+
+
+def jumping(cells, strength):
+    return {"rate": cells.rate + 0.1 * (strength > 0.0) + strength}
+
+
+def nothing(cells, strength):
+    return {"rate": cells.rate + 0.0 * strength}
+
+
+def crashing(cells, strength):
+    return {"rate": cells.no_such_thing}
+
+
+def of_far_upstream(cells, strength):
+    return {"rate": cells.rate * (1.0 + strength * np.roll(cells.speed, -8, axis=0))}
+
+
+def root_of_a_speed(cells, strength):
+    return {"rate": cells.rate + strength * np.sqrt(cells.u)}
+
+
+def kinked(cells, strength):
+    return {"rate": cells.rate + np.abs(strength)}
+
+
+def by_lot(cells, strength):
+    return {"rate": cells.rate + strength * np.random.default_rng().uniform()}
+
+
+BOTH_SIGNS = replace(GOOD.amplitude, low=-0.05)
+WIDTH = Shape("width", "m", "width", 1.0, 0.1, 2.0)
+
+BROKEN = {
+    "far downstream": replace(GOOD, act=of_far_upstream),
+    "invalid value encountered in sqrt": replace(GOOD, act=root_of_a_speed),
+    "does not turn the answer round": replace(GOOD, act=kinked, amplitude=BOTH_SIGNS),
+    "asked again": replace(GOOD, act=by_lot),
+    "two parameters are called width": replace(GOOD, shapes=(WIDTH, WIDTH)),
+    "have to be finite": replace(GOOD, amplitude=replace(GOOD.amplitude, high=np.inf)),
+    "drag would push": replace(GOOD, act=pushing),
+    "look no further": replace(GOOD, act=of_far),
+    "each member alone": replace(GOOD, act=of_others),
+    "mirrored=False": replace(GOOD, act=northward),
+    ": FloatingPointError: ": replace(GOOD, act=over_speed),
+    "avoid a jump": replace(GOOD, act=jumping),
+    "nothing changes": replace(GOOD, act=nothing),
+    ": AttributeError: ": replace(GOOD, act=crashing),
+    "`source` is empty": replace(GOOD, source=""),
+    "lies outside": replace(GOOD, amplitude=replace(GOOD.amplitude, off=-0.1)),
+    "needs a `scale`": replace(GOOD, amplitude=replace(GOOD.amplitude, scale=0.0)),
+    "no unit": replace(GOOD, amplitude=replace(GOOD.amplitude, unit="")),
+    "default or grid": replace(GOOD, shapes=(Shape("width", "m", "width", 1.0, 0.1, 2.0, (3.0,)),)),
+}
+
+
+@pytest.fixture
+def tried_as_shipped(monkeypatch):
+    """Let a made-up effect be found in the library."""
+
+    def put(effect):
+        monkeypatch.setattr("vegglue.case.case_effects.library", lambda own: dict(library()) | {effect.name: effect})
+
+    return put
+
+
+def test_a_good_effect_passes(tried_as_shipped):
+    tried_as_shipped(GOOD)
+    assert breaches(GOOD) == []
+
+
+@pytest.mark.parametrize("complaint", BROKEN)
+def test_what_breaks_the_contract_is_named(complaint, tried_as_shipped):
+    tried_as_shipped(BROKEN[complaint])
+    assert any(complaint in sentence for sentence in breaches(BROKEN[complaint]))
+
+
+def test_an_effect_that_is_not_off_is_named(tried_as_shipped, monkeypatch):
+    """Nothing gets past `applied` at the off value; only a framework without that gate could let it."""
+    effect = replace(GOOD, act=always)
+    tried_as_shipped(effect)
+    assert breaches(effect) == []
+    monkeypatch.setattr("vegglue.effects.active_effect.ActiveEffect.on", property(lambda self: np.array([True])))
+    assert any("is off" in sentence for sentence in breaches(effect))
+
+
+@pytest.fixture(scope="module")
+def everyone():
+    """One member for each effect, which is on in that member alone."""
+    names = [effect.name for effect in SHIPPED]
+    parameters = dict.fromkeys(names, CHANNEL["parameters"][AMPLITUDE])
+    works = {effect.name: {"values": {effect.amplitude.name: effect.name}} for effect in SHIPPED}
+    case = Case.model_validate(CHANNEL | {"source": Path("contract"), "effects": works, "parameters": parameters})
+    off = np.array([effect.amplitude.off for effect in SHIPPED])[:, None] * np.ones(len(SHIPPED))
+    off[np.diag_indices(len(SHIPPED))] = [sizes(effect)[1] for effect in SHIPPED]
+    return build_problem(case, build_site(case), "flow", dict(zip(names, off, strict=True)))
+
+
+@pytest.mark.slow
+def test_marching_and_newton_agree_with_each_effect_on(everyone):
+    """Newton's states stay where they are when marched, and states marched from one flow come to them."""
+    count = everyone.members
+    start = backwater(everyone)
+    states = np.empty_like(start)
+    for k in range(count):
+        one = take(everyone, np.array([k]))
+        states[..., k : k + 1] = newton(one, np.ascontiguousarray(start[..., k : k + 1]), 1e-11).state
+    assert np.abs(march(everyone, states, 0.5, 4) - states).max() < 1e-8
+    shared = np.repeat(states[..., -1:], count, axis=3)
+    before = np.abs(shared - states)[:, ALONG].max(axis=(0, 1))
+    moved = march(everyone, shared, 0.5, 300)
+    after = np.abs(moved - states)[:, ALONG].max(axis=(0, 1))
+    assert (after < np.maximum(0.1 * before, 1e-7)).all(), after / before

@@ -1,0 +1,189 @@
+"""The search for a law in the small channel of twins: silent where nothing is hidden, and right where a law is.
+
+A listed effect is called by its name. One data set of an independent code in the end.
+"""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import at_point
+from vegglue.calibration.law_screening import law_fingerprints
+from vegglue.calibration.laws_in_case import LEAST_SPREAD, laws_in_case, products_in_case
+from vegglue.calibration.noise import noise_of
+from vegglue.case.config import load_case
+from vegglue.diagnosis.discovered import Discovery
+from vegglue.diagnosis.search import discover_laws
+from vegglue.effects.library import library
+from vegglue.engine.interface import Model, linearise
+from vegglue.engine.model import coarser
+from vegglue.progress import silent
+from vegglue.workflow.hidden_effect import TwinBase
+from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return model_in(load_case(CONFIG))
+
+
+def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
+    coarse = coarser(model)
+    assert coarse is not None
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    laws = {one.law.name: one for one in laws_in_case(coarse, point, ["bank_trend", "bed_trend"])}
+    assert len(laws) > 30
+    assert "law_bank_along_trend" not in laws, "bank_trend competes by itself"
+    assert "law_bank_depth_power" in laws, "depth_dependent_bank does not compete here"
+    for one in laws.values():
+        low, high = one.seen
+        assert low < high
+        for settings in one.candidate.settings():
+            rounded = 1.05  # a reference has two digits
+            assert low <= settings.get("reference", low) * rounded or one.law.quantity.name == "along"
+    low, high = laws["law_floor_depth_ramp"].seen
+    assert 0.5 < low < high < 1.3
+    assert high - low > LEAST_SPREAD
+    low, high = laws["law_plants_front_fading"].seen
+    assert 0.0 < low < high < 4.0, "no section crosses a patch; what is in it is seen all the same"
+
+
+def test_a_section_of_which_nothing_is_used_has_seen_nothing(model: Model) -> None:
+    """Outside the grid it counted as measured at the end of the channel, and laws as seen there."""
+    coarse = coarser(model)
+    assert coarse is not None
+    last = coarse.station["section"] == "C"
+    station = coarse.station.assign(
+        used=coarse.station["used"] & ~last, x=np.where(last, model.case.grid.x[1] + 5.0, coarse.station["x"])
+    )
+    without = station[station["used"]].reset_index(drop=True)
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    kept, left_out = (laws_in_case(replace(coarse, station=table), point, []) for table in (station, without))
+    assert [(one.law.name, one.seen) for one in kept] == [(one.law.name, one.seen) for one in left_out]
+
+
+def test_laws_are_looked_for_with_no_listed_effect_beside_them(model: Model) -> None:
+    """`--without` all of them ended in a traceback."""
+    coarse = coarser(model)
+    assert coarse is not None
+    point, noise = linearise(coarse, np.zeros(len(model.names))), noise_of(coarse.station)
+    assert point is not None
+    base = Baseline(coarse, noise, at_point(noise, point), None, None)
+    found = law_fingerprints(base, tuple(library()))
+    assert found.listed.candidates == []
+    assert found.listed.values.shape == (len(coarse.station), 0)
+    assert len(found.every.candidates) == len(found.laws) > 30
+
+
+@cache
+def ground_of(seed: int) -> TwinBase:
+    """The truth before something is hidden in it: most tests share it."""
+    model = model_in(load_case(CONFIG))
+    return twin_base(model, true_place(len(model.names), seed))
+
+
+def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
+    """What is found in measurements of a truth that hides something at a ratio of 8, errors white."""
+    station, _ = measured_twin(ground_of(seed), hidden, 8.0, "white", seed)
+    return discover_laws(replace(model, station=station), without=(), watch=silent)
+
+
+def test_products_have_the_references_of_both_laws(model: Model) -> None:
+    coarse = coarser(model)
+    assert coarse is not None
+    point = linearise(coarse, np.zeros(len(model.names)))
+    assert point is not None
+    law = next(one for one in laws_in_case(coarse, point, []) if one.law.name == "law_viscosity_offset_step")
+    products = {one.law.quantity.name: one for one in products_in_case(coarse, point, law, 0.6)}
+    assert {"depth", "speed", "along", "edge"} <= set(products)
+    assert "offset" not in products
+    for one in products.values():
+        assert {settings["first"] for settings in one.candidate.settings()} == {0.6}
+    assert len(products["along"].candidate.settings()) == 1
+    assert len(products["edge"].candidate.settings()) > 5
+    # The step changes by nearly 1 over what was seen, and the trend by what was seen of x/L.
+    low, high = products["along"].seen
+    assert products["along"].candidate.amplitude.scale == pytest.approx(0.5 / (high - low), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("p", "words"),
+    [
+        (0.4, "as much in 40 % of cases, 65 laws tried"),
+        (0.001, "as much in 0.1 % of cases, but no law or known effect"),
+    ],
+)
+def test_silence_says_how_often_errors_leave_as_much(p: float, words: str) -> None:
+    assert words in Discovery(p, 65, (), {}).sentence
+
+
+def test_silence_of_no_law_is_not_that_of_errors() -> None:
+    """Water below 5 cm has no cell of which a law could be told: errors alone left as much in 100 % of no cases."""
+    assert Discovery(1.0, 0, (), {}).sentence == "No law is tried: these data have seen too little of every quantity."
+
+
+@pytest.mark.slow
+def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
+    """Three seeds; each names one by chance in at most 5 %."""
+    for seed in (2, 6, 7):
+        found = searched(model, [], seed)
+        assert found.laws == (), found.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("hidden", "seed"),
+    [
+        ("law_viscosity_offset_step", 2),
+        ("law_floor_along_part", 2),
+        ("law_bank_along_part", 6),
+        ("law_advection_offset_step", 2),
+        ("law_advection_along_part", 2),
+        ("law_advection_depth_power", 2),
+    ],
+)
+def test_a_hidden_law_is_found(model: Model, hidden: str, seed: int) -> None:
+    """Its term and its quantity."""
+    found = searched(model, [hidden], seed)
+    assert found.best is not None, found
+    assert found.best.law.name.rsplit("_", 1)[0] == hidden.rsplit("_", 1)[0]
+    assert found.product is None, found.product
+
+
+@pytest.mark.slow
+def test_a_law_that_changes_along_the_channel_is_a_product(model: Model) -> None:
+    hidden = ["law_viscosity_offset_step=-1.12", "law_viscosity_offset_step_by_along=-3"]
+    found = searched(model, hidden, 2)
+    assert found.best is not None, found
+    assert found.best.law.subject == ("viscosity", "offset")
+    assert found.product is not None, found
+    assert found.product.found.law.name == f"{found.best.law.name}_by_along"
+    low, high = found.product.found.interval95
+    assert low < -3.0 < high
+
+
+@pytest.mark.slow
+def test_banks_smoother_in_fast_water(model: Model) -> None:
+    """The speed is in the set; depth and a listed law of depth leave the same trace, and the listed one goes first."""
+    found = searched(model, ["law_bank_speed_step"], 2)
+    assert {law.law.term.name for law in found.laws} == {"bank"}
+    assert "speed" in {law.law.quantity.name for law in found.laws}
+    assert set(found.others) <= {"depth_dependent_bank", "bank_vegetation"}
+
+
+@pytest.mark.slow
+def test_a_listed_effect_is_called_by_its_name(model: Model) -> None:
+    found = searched(model, ["bank_trend"], 2)
+    assert found.best is None
+    assert max(found.others, key=found.others.__getitem__) == "bank_trend"
+    left_out = "law_bank_along_trend"
+    assert left_out not in {law.law.name for law in found.laws}

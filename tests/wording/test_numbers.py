@@ -1,0 +1,148 @@
+"""How values show themselves in a notebook: a few lines, with units and the sentence that matters."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnoses import NOTHING, a_diagnosis
+from reach import write_reach
+from rungs import a_rung
+from stored import ALL, a_header, write_chunks
+
+from vegglue.case.config import load_case
+from vegglue.case.parameter_space import shown_bounds
+from vegglue.cli.tables import show_ladder
+from vegglue.diagnosis.excluded_stations import MEASUREMENT
+from vegglue.flow.status import FAILED
+from vegglue.measurements.kinds import errors_in_short
+from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.results.result_files import read_ensemble
+from vegglue.wording.numbers import duration_in_short, in_digits, in_short, interval_in_short, so_many
+from vegglue.workflow.compare import Comparison
+from vegglue.workflow.stepwise_extension import StepwiseExtension
+
+MOST_LINES, MOST_LETTERS = 12, 600
+
+
+def test_building_blocks() -> None:
+    assert in_short("heading", ["one", "", "two"]) == "heading\n  one\n  two"
+    assert (so_many(1, "patch", "patches"), so_many(2000, "patch", "patches")) == ("1 patch", "2,000 patches")
+    assert interval_in_short("phi", 8.123, 7.0, 9.35, "-") == "phi: 8.12, 95 % 7 to 9.35"
+    assert interval_in_short("k_s", 0.5, 0.4, 0.6, "m").endswith("0.6 m")
+    assert interval_in_short("outlet", 102.368, 102.346, 102.391, "m") == "outlet: 102.37, 95 % 102.35 to 102.39 m"
+    assert errors_in_short({"level": 0.0021, "velocity": np.nan}) == "level 0.0021 m"
+
+
+def test_a_case_says_what_it_holds(tmp_path: Path) -> None:
+    case = load_case(write_reach(tmp_path))
+    assert repr(case) == str(case)
+    assert repr(case).splitlines() == [
+        "Case brook: A short reach with one patch of willows",
+        "  grid of 30 m by 9 m, cells of 1 m by 0.5 m; 1 patch of plants",
+        "  experiments: June",
+        "  unknown: n_b [s m^(-1/3)], phi [-]; effects: none",
+        "  measured: velocity in velocities.csv",
+        "  1,024 members, seed 7; read from brook.yaml",
+    ]
+
+
+def test_an_ensemble_counts_its_members(tmp_path: Path) -> None:
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header())
+    shown = repr(read_ensemble(tmp_path / "ensemble.h5")).splitlines()
+    assert shown[0] == "Ensemble of 12 members: 4 solved by Newton's method, 4 by marching, 4 failed"
+    assert "  2 stations, in use 1 of velocity, 0 of level" in shown
+    assert "  largest mass error 1e-05 of the discharge" in shown
+
+
+def test_members_that_all_failed_were_run_by_a_command_only_where_there_is_one(tmp_path: Path) -> None:
+    write_chunks(tmp_path / "ensemble.h5", ALL, a_header())
+    found = read_ensemble(tmp_path / "ensemble.h5")
+    nothing = replace(found, status=np.full(12, FAILED, np.int8), mass_error=np.full(12, np.nan))
+    assert repr(nothing).startswith("Ensemble of 12 members: 0 solved by Newton's method, 0 by marching, 12 failed\n")
+    by_command = replace(nothing, config="name: brook\nengine:\n  command: own\n")
+    assert repr(by_command).startswith("Ensemble of 12 members: 0 run by the command, 12 failed\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "told"),
+    [
+        (1523.0, 2, "1500"), (312.0, 1, "300"), (-1523.0, 3, "-1520"), (99_600.0, 2, "100000"),
+        (123_456.0, 3, "1.23e+05"), (0.00123, 2, "0.0012"), (0.00965, 3, "0.00965"), (0.0, 3, "0"),
+        (float("inf"), 3, "inf"), (float("nan"), 2, "nan"),
+    ],
+)  # fmt: skip
+def test_sizes_that_people_read_are_written_in_full(value: float, digits: int, told: str) -> None:
+    assert in_digits(value, digits) == told
+
+
+def test_large_numbers_have_one_form_in_tables_and_sentences(capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = a_rung("brook"), a_rung("brook-wind")
+    worse = replace(before, held_out=replace(before.held_out, sections=np.array([0.045, 0.065])))
+    show_ladder(Comparison((worse, after), pd.DataFrame(columns=MEASUREMENT)))
+    assert "1900 ± 800" in capsys.readouterr().out, "it was 1.9e+03 ± 8e+02"
+    assert interval_in_short("force", 1523.4, 1200.0, 1900.0, "N") == "force: 1520, 95 % 1200 to 1900 N"
+    assert shown_bounds((1234.0, 5678.0)) == "1230 to 5680"
+
+
+@pytest.mark.parametrize("found", [a_diagnosis(), NOTHING])
+def test_a_diagnosis_says_its_sentence(found) -> None:
+    shown = repr(found)
+    assert shown.startswith(f"Diagnosis of open-x: {found.verdict.kind}\n  {found.verdict.sentence}\n")
+    assert all(f"  {name}: 0.3, 95 % -inf to 0.333 m2/s" in shown for name in found.set)
+    assert len(shown) < MOST_LETTERS
+
+
+def test_a_comparison_is_a_line_for_each_model() -> None:
+    nothing = pd.DataFrame(columns=MEASUREMENT)
+    found = Comparison((a_rung("brook"), a_rung("brook-wind", 0.025)), nothing)
+    assert repr(found).splitlines() == [
+        "Comparison of 2 models, root mean square errors of velocity [m/s]",
+        "  brook, 3 parameters: seen 0.021, section held out 0.035, noise floor 0.01",
+        "  brook-wind, 3 parameters: seen 0.021, section held out 0.035, never seen 0.025, noise floor 0.01",
+    ]
+    aside = pd.DataFrame([["June", "velocity", "A", 1.0, 2.0, 0.5]], columns=MEASUREMENT)
+    assert "1 station is left out of every model" in repr(Comparison(found.rungs, aside))
+    cases = tuple(SimpleNamespace(name=one.name) for one in found.rungs)
+    extension = repr(StepwiseExtension(cases, found, "Missing: wind.", "Added: wind."))
+    assert extension.startswith("Extension: brook -> brook-wind\n  Missing: wind.\n  Added: wind.\n")
+
+
+def test_a_question_names_its_best_measurements() -> None:
+    best = ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, 9.0)
+    useful = Question("wind from waves", tuple(replace(best, name=f"section {n}") for n in range(6)))
+    assert repr(useful).splitlines() == [
+        "To tell wind from waves (D2 now 2 squared standard errors):",
+        *(f"- section {n}: 9, 3 stations, 1.5 h" for n in range(4)),
+    ]
+    surer = Question("wind from waves", (replace(best, now=5.0),))
+    assert "(D2 now 5 squared standard errors: the data at hand should tell, what is listed makes it" in repr(surer)
+    useless = Question("wind from waves", (replace(best, then=2.1),))
+    few = "by itself, where 4 tells two apart (D2 at most 2.1: section 0)."
+    assert repr(useless).endswith(f"the one measurement would not {few}")
+    assert repr(Question("wind from waves", 2 * useless.measurements)).endswith(f"none of 2 measurements would {few}")
+    known = repr(Question("wind from waves", (replace(best, now=9.0, then=9.1),)))
+    assert "and the one measurement does not add a tenth to it" in known
+    assert repr(Question("wind from waves", ())).endswith(": no measurement would by itself.")
+
+
+@pytest.mark.parametrize(("now", "answered"), [(12.0, False), (26.0, True)])
+def test_what_these_data_would_have_shown_is_answered(now: float, answered: bool) -> None:
+    """Field work was ranked for what a diagnosis had looked for and not seen."""
+    section = ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, now, 60.0)
+    hidden = Question("bed_trend from a change of n_b", (section,), 25.0)
+    assert (hidden.answered, hidden.useful) == (answered, () if answered else (section,))
+    told = (
+        "To tell bed_trend from a change of n_b: answered, as D2 is 26 already, and from 25 on a diagnosis sees it."
+        if answered
+        else "To tell bed_trend from a change of n_b (D2 now 12 squared standard errors; a diagnosis sees it from 25 on"
+    )
+    assert repr(hidden).splitlines()[0].startswith(told)
+
+
+def test_a_time_is_told_in_the_unit_that_it_is_twice() -> None:
+    """A terminal told minutes from 90 s on, a page from 120 s on."""
+    told = [duration_in_short(seconds) for seconds in (0.4, 119.0, 120.0, 7199.0, 7200.0, 9000.0)]
+    assert told == ["0 s", "119 s", "2 min", "120 min", "2.0 h", "2.5 h"]

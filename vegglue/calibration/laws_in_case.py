@@ -1,0 +1,157 @@
+"""Laws of the grammar as candidates of a case: which of them have something to act on, with references from its flow.
+
+A law is measured by what its term has seen: the quantity in the cells of the term that lie under water at the measured
+sections, at the calibrated flow; in all cells of the term under water where hardly any lie there, for what is beside a
+section shows in it too. Of these the references and the range of validity are quantiles.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration.candidates import Candidate
+from vegglue.calibration.places import LEAST_DEPTH
+from vegglue.case.channel_geometry import channel_geometry
+from vegglue.effects.definition import Effect, Shape
+from vegglue.effects.grammar import LAWS, PRODUCTS, SAME_AS
+from vegglue.effects.law import PLAUSIBLE_STRENGTH, Law
+from vegglue.effects.surroundings import Cells
+from vegglue.engine.interface import Model, Point, flow_at_centres
+from vegglue.measurements.kinds import velocity_rows
+
+# Quantiles between which a law counts as seen, and the fewest cells that say what a term sees. Chosen, not measured.
+SEEN, FEWEST_SEEN = (0.05, 0.95), 10
+# Fewest values of a quantity: of the stems of two patches a law says no more than that one of them is denser.
+FEWEST_VALUES = 3
+# Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it can be told
+# from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.
+LEAST_SPREAD = 0.1
+# Values of a quantity over what was seen, enough to meet the top of a hump to a few per cent.
+VALUES_SEEN = 41
+# Significant digits of a reference: a person reads it.
+DIGITS = 2
+
+
+@dataclass(frozen=True)
+class LawInCase:
+    """A law, its candidate with the references to be tried, and the values of its quantity from 5 to 95 % of what its
+    term has seen [unit of the quantity].
+    """
+
+    law: Law
+    candidate: Candidate
+    seen: tuple[float, float]
+
+
+def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
+    """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
+    water = _water_of(model, point)
+    return [
+        found
+        for law in LAWS.values()
+        if SAME_AS.get(law.name) not in listed and law.name not in model.case.effects
+        if (found := _in_case(law, water)) is not None
+    ]
+
+
+def products_in_case(model: Model, point: Point, law: LawInCase, reference: float | None) -> list[LawInCase]:
+    """Products of a law that is in the model with other quantities; reference: of that law, where it has one."""
+    water, change = _water_of(model, point), _change_of(law.law, law.seen, reference)
+    products = [_in_case(product, water, reference, change) for product in PRODUCTS[law.law.name]]
+    return [product for product in products if product is not None]
+
+
+@dataclass(frozen=True)
+class _Water:
+    """The flow of each experiment: in all cells, and dry but for the sections that were measured."""
+
+    everywhere: list[Cells]
+    measured: list[Cells]
+
+
+def _water_of(model: Model, point: Point) -> _Water:
+    experiments = list(model.case.experiments)
+    flows = [centre_cells(model, point, experiment) for experiment in experiments]
+    return _Water(flows, [at_sections(model, cells, name) for cells, name in zip(flows, experiments, strict=True)])
+
+
+def _in_case(law: Law, water: _Water, first: float | None = None, change: float = 1.0) -> LawInCase | None:
+    """A law with its references and a plausible strength; None where the data have seen too little of its quantity.
+
+    first, change: reference of the law that it multiplies, and how much the g of that law changes over what was seen.
+    """
+    values = np.concatenate([_values(law, cells) for cells in water.measured])
+    if values.size < FEWEST_SEEN:
+        values = np.concatenate([_values(law, cells) for cells in water.everywhere])
+    if values.size < FEWEST_SEEN or np.unique(values).size < FEWEST_VALUES:
+        return None
+    low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
+    if high - low < LEAST_SPREAD * abs(middle):
+        return None
+    effect = _with_references(law, values, first)
+    default = next((shape.default for shape in effect.shapes if shape.name == "reference"), None)
+    whole = max(change * _change_of(law, (low, high), default), 1e-9)
+    scale = min(PLAUSIBLE_STRENGTH / whole, 0.5 * effect.amplitude.high)
+    return LawInCase(law, Candidate(effect, scale=scale), (low, high))
+
+
+def _change_of(law: Law, seen: tuple[float, float], reference: float | None) -> float:
+    """How much g changes over what was seen [-]. A strength a is plausible where a times that is PLAUSIBLE_STRENGTH.
+
+    So all laws are as free to change what the data see, however g is counted; at most half way to the support's end.
+    """
+    return float(np.ptp(law.form.of(np.linspace(*seen, VALUES_SEEN), 1.0 if reference is None else reference)))
+
+
+def _with_references(law: Law, values: Array, first: float | None) -> Effect:
+    """The effect of a law that is tried with the quantiles of its quantity as references; first: as in `_in_case`."""
+    tried = sorted({_rounded(value) for value in np.quantile(values, law.form.quantiles)})
+
+    def told(shape: Shape) -> Shape:
+        if shape.name == "reference":
+            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried))
+        return shape if first is None else replace(shape, default=first)
+
+    return replace(law.effect, shapes=tuple(map(told, law.shapes)))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _values(law: Law, cells: Cells) -> Array:
+    """The quantity of a law in the cells of its term that are under water, where it is finite."""
+    q = np.broadcast_to(law.quantity.of(cells), cells.depth.shape)
+    share = np.broadcast_to(law.term.share(cells), cells.depth.shape)
+    values = q[(share > 0.0) & (cells.depth > LEAST_DEPTH)]
+    return np.asarray(values[np.isfinite(values)])
+
+
+def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
+    """The flow at cell centres of one experiment, with friction and viscosity of 1."""
+    flow = flow_at_centres(model, point, experiment)
+    geometry = channel_geometry(model.case, model.site, experiment)
+    of_smallest = model.case.numerics.shear_depth == "smallest"
+    depth, of_one = flow.depth[..., None], np.ones_like(flow.depth)[..., None]
+    return Cells(
+        geometry=geometry,
+        depth=depth,
+        level=depth + geometry.bed,
+        u=flow.u[..., None],
+        v=flow.v[..., None],
+        rate=of_one,
+        bed_rate=of_one,
+        viscosity=of_one,
+        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) + 1e-9 if of_smallest else np.zeros((0, 0, 0)),
+    )
+
+
+def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
+    """The same, dry but for the columns in which velocities were measured."""
+    station, grid = model.station_of(experiment), model.site.grid
+    x = station["x"].to_numpy(float)[velocity_rows(station) & station["used"].to_numpy(bool)]
+    measured = np.zeros((grid.x.size, 1, 1), dtype=bool)
+    measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
+    return replace(cells, depth=np.where(measured, cells.depth, 0.0))

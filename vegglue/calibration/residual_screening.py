@@ -1,0 +1,229 @@
+"""Score tests of a calibrated model: which effect, place or instrument explains its residual best."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration import score_test
+from vegglue.calibration.baseline import Baseline, SearchModel, search_model, searched_by_itself
+from vegglue.calibration.candidates import start_amplitude, with_effect
+from vegglue.calibration.evidence import HypothesisKind, kind_of_hypotheses
+from vegglue.calibration.family_wise_p import Family, family_of
+from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
+from vegglue.calibration.fit import MapEstimate, at_point
+from vegglue.calibration.instruments import (
+    PLAUSIBLE_OFFSET,
+    Instrument,
+    InstrumentKind,
+    instruments_of,
+    offset_columns,
+)
+from vegglue.calibration.noise import Noise, draw_whitened_errors
+from vegglue.calibration.noise_estimate import estimate_noise
+from vegglue.case.channel_geometry import half_width
+from vegglue.case.parameter_space import z_of
+from vegglue.flow.local_changes import Term
+
+# Size [standard errors] given to the fingerprint with the best score when the noise is estimated again. So large that
+# its amplitude is free, else a missing effect passes for correlated errors (a floor 2 cm too high did, and its score
+# fell from 7.2 to 4.2). From 100 on verdicts are the same; with 1e6 the covariance can no longer be factored.
+FREE_SIZE = 1e4
+# Longest that it is made, before what calibration can mimic is taken off [standard errors]: at the largest of the sizes
+# that are tried, ten, its square is 1e15, the last that is factored beside errors of 1.
+LONGEST_FREE = 3e6
+# Sizes of spots over plausible ones when the noise is estimated [-]. Hundreds of spots overlap, one of them is there:
+# at their full sizes they explain, together, whatever neighbours share. Chosen, not measured.
+SPOTS_IN_NOISE = 0.3
+# Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
+GROUPS = 4
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
+
+    base: with the noise as estimated here, at the place of its fit; search: its model that is fitted again and again;
+    flagged: readings of instruments found to be off, indices among the used ones.
+    whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
+    projected out. effects: score tests of candidates. kinds: evidence of all kinds, that of
+    listed effects first, then of places by term, then of `instruments`; errors (draws, n): whitened errors alone.
+    """
+
+    base: Baseline
+    search: SearchModel
+    flagged: tuple[int, ...]
+    fingerprints: Fingerprints
+    whitened_slopes: Array
+    whitened_fingerprints: Array
+    projected: score_test.Projected
+    effects: Family
+    kinds: tuple[HypothesisKind, ...]
+    instruments: dict[str, tuple[Instrument, ...]]
+    errors: Array
+
+    def best_column(self, candidate: int) -> int:
+        """Column of the fingerprint of a candidate with the largest |T|, among the settings of its shapes."""
+        columns = self.fingerprints.columns[candidate]
+        return int(columns[np.argmax(self.effects.scores[columns] ** 2)])
+
+    def best_score(self, candidate: int) -> float:
+        """T of that column [standard errors]."""
+        return float(self.effects.scores[self.best_column(candidate)])
+
+    @property
+    def ranking(self) -> list[int]:
+        """Indices of the candidates, the largest |T| first."""
+        squares = [self.best_score(j) ** 2 for j in range(len(self.fingerprints.candidates))]
+        return [int(j) for j in np.argsort(-np.array(squares))]
+
+    def possible_signs(self, length: float, most: float) -> np.ndarray:
+        """Whether the amplitude of a fingerprint `length` [standard errors] long is allowed, for + and -, (2, c).
+
+        most: the largest amplitude allowed, over the plausible one; see `Amplitude.allows`.
+        """
+        return self.fingerprints.allowed(length / np.maximum(self.projected.length, 1e-300), most)
+
+
+def screen(
+    base: Baseline, flagged: tuple[int, ...] = (), known: Fingerprints | None = None, seed: int = 1
+) -> Screening:
+    """Score tests of the residual against all candidates, places everywhere and instruments.
+
+    The correlation of the errors is estimated first. known: fingerprints at the point of the search model, where they
+    are at hand; seed: of the draws of errors alone.
+    """
+    base = searched_by_itself(base)
+    search = search_model(base)
+    point = search.point
+    fingerprints = known or fingerprints_of(search, half_width(base.model.site))
+    slope, of_effects = (base.noise.used(values) for values in (point.slope, fingerprints.values))
+    residual, z = base.noise.residual(base.fitted.point.prediction), base.fitted.point.z
+    instruments = instruments_of(base.model.station.iloc[base.noise.rows])
+    noise = _estimated_noise(base.noise, (slope, _plausible(base.noise, fingerprints, instruments)), residual, z)
+    errors = draw_whitened_errors(noise, score_test.NULL_DRAWS, np.random.default_rng((seed, 1)))
+
+    def against(values: Array) -> score_test.Projected:
+        return score_test.project(noise.whiten(slope), noise.whiten(residual), z, noise.whiten(values))
+
+    projected, with_noise = against(of_effects), replace(base, noise=noise, fitted=_known_under(noise, base.fitted))
+    in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
+    of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
+    return Screening(
+        base=with_noise,
+        search=search_model(with_noise),
+        flagged=flagged,
+        fingerprints=fingerprints,
+        whitened_slopes=noise.whiten(slope),
+        whitened_fingerprints=noise.whiten(of_effects),
+        projected=projected,
+        effects=family_of(projected, fingerprints.only_sign, errors, seed),
+        kinds=(
+            kind_of_listed(fingerprints, projected),
+            *kinds_of_places(fingerprints, in_places),
+            *kinds_of_instruments(base.noise, instruments, of_instruments, flagged),
+        ),
+        instruments={str(name): some for name, some in instruments.items()},
+        errors=errors,
+    )
+
+
+def noise_given_all(base: Baseline) -> Noise:
+    """The noise that `screen` estimates, where nothing else of a screening is asked for."""
+    search = search_model(base)
+    fingerprints = fingerprints_of(search, half_width(base.model.site))
+    instruments = instruments_of(base.model.station.iloc[base.noise.rows])
+    used = base.noise.used(search.point.slope), _plausible(base.noise, fingerprints, instruments)
+    point = base.fitted.point
+    return _estimated_noise(base.noise, used, base.noise.residual(point.prediction), point.z)
+
+
+def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
+    """Listed effects: as likely before, and so are the settings of one."""
+    plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
+    prior = np.empty(plausible.size)
+    for columns in fingerprints.columns:
+        prior[columns] = 1.0 / (GROUPS * len(fingerprints.columns) * columns.size)
+    return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)
+
+
+def kinds_of_places(fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]) -> list[HypothesisKind]:
+    """A kind for each term: all its spots are as likely before, and all terms."""
+    kinds = []
+    for one in fingerprints.places:
+        spots = np.ones(one.x.size)
+        prior = spots / (GROUPS * len(fingerprints.places) * spots.size)
+        kinds.append(kind_of_hypotheses(one.term, in_places[one.term], one.plausible * spots, prior))
+    return kinds
+
+
+def kinds_of_instruments(
+    noise: Noise,
+    instruments: Mapping[InstrumentKind, tuple[Instrument, ...]],
+    projected: Mapping[InstrumentKind, score_test.Projected],
+    flagged: tuple[int, ...],
+) -> list[HypothesisKind]:
+    """A kind each for single readings, probes and gauges, without those that are known to be off."""
+    kinds = []
+    for name, of_kind in projected.items():
+        plausible = PLAUSIBLE_OFFSET[name] * np.array(
+            [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
+        )
+        known = np.array([set(i.readings) <= set(flagged) for i in instruments[name]])
+        prior = np.full(plausible.size, 1.0 / (GROUPS * len(projected) * plausible.size))
+        kinds.append(kind_of_hypotheses(name, of_kind, np.where(known, 0.0, plausible), prior))
+    return kinds
+
+
+def _plausible(
+    noise: Noise, fingerprints: Fingerprints, instruments: Mapping[InstrumentKind, tuple[Instrument, ...]]
+) -> Array:
+    """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c);
+    spots of SPOTS_IN_NOISE of theirs.
+    """
+    sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
+    parts = [noise.used(fingerprints.values) * sizes]
+    parts += [noise.used(one.fingerprints) * (SPOTS_IN_NOISE * one.plausible) for one in fingerprints.places]
+    for name in ("position", "probe", "gauge"):
+        columns = offset_columns(instruments[name], noise.rows.size)
+        parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))
+    return np.hstack(parts)
+
+
+def _known_under(noise: Noise, fitted: MapEstimate) -> MapEstimate:
+    """A fit under the errors as they are told now; its parameters are known no better than under those of the fit."""
+    here = at_point(noise, fitted.point)
+    wider = max(fitted, here, key=lambda one: float(np.linalg.slogdet(one.covariance)[1]))
+    return replace(here, covariance=wider.covariance)
+
+
+def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:
+    """The noise of a residual (n,); used: slopes, and changes by all that could be missing (n, ...), at used stations.
+
+    Estimated twice: the second time the amplitude of the change with the best score is free. Where nothing is missing
+    that is the slope of the parameter furthest off its prior, of which calibration leaves next to nothing.
+    """
+    slope, changes = used
+    systematic = np.hstack([slope, changes])
+    gram = systematic @ systematic.T
+    first = estimate_noise(noise, residual, gram)
+    projected = score_test.project(first.whiten(slope), first.whiten(residual), z, first.whiten(systematic))
+    best = int(np.argmax(projected.score**2))
+    column = systematic[:, best]
+    whole = float(np.linalg.norm(first.whiten(column)))
+    free = min(FREE_SIZE / max(float(projected.length[best]), 1e-300), LONGEST_FREE / max(whole, 1e-300))
+    return estimate_noise(first, residual, gram + np.outer(free * column, free * column))
+
+
+def refit_start(screening: Screening, candidate: int, column: int) -> Array:
+    """z (p + 1,) to start the refit with a candidate from: the joint linear step of all parameters."""
+    one, shapes = screening.fingerprints.candidates[candidate], screening.fingerprints.settings[column]
+    gain = float(screening.effects.scores[column] / max(screening.projected.length[column], 1e-300))
+    point, slope, noise = screening.base.fitted.point, screening.whitened_slopes, screening.base.noise
+    remaining = noise.whiten(noise.residual(point.prediction)) - screening.whitened_fingerprints[:, column] * gain
+    matrix = slope.T @ slope + np.eye(point.z.size)
+    step = np.linalg.solve(matrix, slope.T @ remaining - point.z)
+    step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
+    changed = with_effect(screening.base.model.case, one, shapes)
+    return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_amplitude(one.amplitude, gain)))

@@ -1,0 +1,189 @@
+"""The channel as effects see it: its axis, floor and banks, and the distance of each cell from patches of plants; and
+what of it is known before anything flows: discharges that have entered, and expected depths.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.case.grid import Grid, cell_stretch, curvature_of, filter_width_of
+from vegglue.case.gridded_site import Site, in_experiment
+from vegglue.case.parameter_space import middle_value
+from vegglue.case.schema import Case, Experiment
+from vegglue.case.zones import BANK_SLOPE, beyond_slope_break
+from vegglue.effects.surroundings import ChannelGeometry
+
+# Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over
+# a cell that lies half within is a fourth. Laws that fade out divide by such distances.
+NEAREST = 0.25
+# Pairs of a site and a set of patches whose fields are kept: those of a model and of its coarser ones.
+GEOMETRIES_KEPT = 8
+
+
+def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
+    """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
+    stems = np.array([patch.stems for patch in case.plants.patches])
+    relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
+    return _geometry(
+        in_experiment(site, experiment), filter_width_of(case), patches_present(case, experiment), relative
+    )
+
+
+def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
+    """Indices of the patches of the case that stand in an experiment."""
+    plants = case.experiments[experiment].plants
+    return tuple(
+        index for index, patch in enumerate(case.plants.patches) if plants is True or (plants and patch.name in plants)
+    )
+
+
+def discharges_upstream_of(case: Case, experiment: Experiment, x: float) -> list[float | str] | None:
+    """Discharges, numbers or parameters, of what has entered upstream of x [m]; None where a side inflow lets water in
+    on both sides of x.
+    """
+    given = []
+    for name, value in experiment.discharge.items():
+        inflow = case.inflows[name]
+        low, high = inflow.range or case.grid.x
+        if inflow.side == "west" or high <= x:
+            given.append(value)
+        elif not low >= x:
+            return None
+    return given
+
+
+def half_width(site: Site) -> float:
+    """Half width of the floor [m], the median of its cross-sections."""
+    return float(np.median(_section(site)[1]))
+
+
+def cells_across(site: Site) -> float:
+    """Width of the floor over that of a cell, 2 `half_width` / dy [-]."""
+    return 2.0 * half_width(site) / site.grid.dy
+
+
+@lru_cache(GEOMETRIES_KEPT)  # every problem of every member asks for the same
+def _geometry(
+    site: Site, filter_width: float, present: tuple[int, ...], relative_stems: tuple[float, ...]
+) -> ChannelGeometry:
+    grid, bed = site.grid, site.bed
+    axis, half_width, floor = _section(site)
+    patch = np.where(np.isin(site.patch, present), site.patch, -1)
+    cover = np.where(patch >= 0, site.cover, 0.0)
+    front, edge, wake = _distances(patch, cover, grid)
+    bent = {} if grid.centreline is None else _bent(grid)
+    return ChannelGeometry(
+        x=grid.x[:, None, None],
+        y=grid.y[None, :, None],
+        share_along=((np.arange(grid.x.size) + 0.5) / grid.x.size - 0.5)[:, None, None],
+        dx=grid.dx,
+        dy=grid.dy,
+        filter_width=filter_width,
+        bed=bed[..., None],
+        offset=((grid.y[None] - axis[:, None]) / half_width[:, None])[..., None],
+        half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
+        side_slope=_side_slope(site)[..., None],
+        bank=(~floor).astype(float)[..., None],
+        planted=cover[..., None],
+        front=front[..., None],
+        edge=edge[..., None],
+        wake=wake[..., None],
+        patch=patch[..., None],
+        relative_stems=np.array([*relative_stems, 1.0])[patch][..., None],  # the last one where none stands, at -1
+        **bent,
+    )
+
+
+def _section(site: Site) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Axis and half width of the floor (nx,) [m], and the cells that are floor (nx, ny)."""
+    floor = ~beyond_slope_break(_side_slope(site) > BANK_SLOPE, site.bed)
+    return *_extent(floor, site.grid.y, site.grid.dy), floor
+
+
+def _side_slope(site: Site) -> Array:
+    """|dz/dy| (nx, ny) [-]."""
+    return np.abs(np.gradient(site.bed, site.grid.dy, axis=1))
+
+
+def _bent(grid: Grid) -> dict[str, Array]:
+    """Stretch and turning of a grid along a centreline."""
+    stretch = cell_stretch(grid)[..., None]
+    return {"stretch": stretch, "turning": curvature_of(grid)[:, None, None] / stretch}
+
+
+def rows_of(geometry: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
+    """The geometry of rows south to north - 1."""
+    return part_of(geometry, slice(None), slice(south, north))
+
+
+def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGeometry:
+    """The geometry of some columns and rows."""
+    cut = {
+        name: getattr(geometry, name)[columns, rows]
+        for name in (
+            "bed",
+            "offset",
+            "half_width",
+            "side_slope",
+            "bank",
+            "planted",
+            "front",
+            "edge",
+            "wake",
+            "patch",
+            "relative_stems",
+        )
+    }
+    if geometry.turning.size:
+        cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
+    along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
+    whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width")}
+    return ChannelGeometry(y=geometry.y[:, rows], **whole, **along, **cut)
+
+
+def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:
+    """Axis and half width of the floor of each cross-section [m]; at least one cell."""
+    first, last = floor.argmax(axis=1), floor.shape[1] - 1 - floor[:, ::-1].argmax(axis=1)
+    low, high = y[first] - 0.5 * dy, y[last] + 0.5 * dy
+    return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy)
+
+
+def _distances(patch: NDArray[np.int64], cover: Array, grid: Grid) -> tuple[Array, Array, Array]:
+    """Front, edge and wake of ChannelGeometry, (nx, ny) [m]."""
+    x, y = grid.x, grid.y
+    front, edge, wake, own = (np.full(patch.shape, np.inf) for _ in range(4))
+    for index in np.unique(patch[patch >= 0]):
+        column, row = np.nonzero(patch == index)
+        held = np.where(patch == index, cover, 0.0)
+        west, east = _ends(held.max(axis=1), x, grid.dx)
+        south, north = _ends(held.max(axis=0), y, grid.dy)
+        front[column, row] = np.maximum(x[column] - west, NEAREST * grid.dx)
+        beside = np.abs(y - 0.5 * (south + north)) - 0.5 * (north - south)
+        beside = np.copysign(np.maximum(np.abs(beside), NEAREST * grid.dy), beside)
+        here = slice(column.min(), column.max() + 1)
+        edge[here] = np.where(np.abs(beside) < np.abs(edge[here]), beside, edge[here])
+        own[column, row] = beside[row]
+        behind = np.where(x > east, x - east, np.inf)[:, None]
+        spans = ((y > south) & (y < north))[None]
+        wake = np.where(spans & (behind < wake), behind, wake)
+    return front, np.where(patch >= 0, own, edge), wake  # plants stand within their own patch, whatever is near
+
+
+def _ends(share: Array, centres: Array, step: float) -> tuple[float, float]:
+    """Where what covers cells (n,) in a row begins and ends [m], from the share [-] of the first and of the last."""
+    first, last = np.flatnonzero(share)[[0, -1]]
+    return float(centres[first] + step * (0.5 - share[first])), float(centres[last] - step * (0.5 - share[last]))
+
+
+def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
+    """h = max(z_out, z_floor(x) + z_out - z_floor(L)) - z_b, shape (nx, ny) [m]; negative where dry.
+
+    A water surface parallel to the floor, but nowhere below the level at the outlet: good enough to see what is odd,
+    usually too low where plants hold the water up.
+    """
+    outlet = middle_value(case, experiment.level)
+    floor = site.bed.min(axis=1)
+    level = np.maximum(outlet, floor + outlet - floor[-1])
+    return level[:, None] - site.bed

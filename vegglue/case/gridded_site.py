@@ -1,0 +1,91 @@
+"""The site on its grid: bed level and friction class of each cell, read off at its centre, and plants that cover it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vegglue.arrays import Array
+from vegglue.case.bed import bed_levels
+from vegglue.case.grid import Grid, build_grid
+from vegglue.case.plant_cover import share_in_patch
+from vegglue.case.schema import Case
+from vegglue.case.zones import friction_classes
+
+# Nearer to an edge of its cell than this share of it [-], a place is on that edge: rounding errors are far smaller.
+ON_AN_EDGE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A site on its grid. bed: level of the bed (nx, ny) [m]; friction_class: index into class_names (nx, ny); patch:
+    index into the patches of the case (nx, ny), of the one that covers most of a cell, -1 without plants; cover: share
+    of a cell that plants cover (nx, ny) [-]; own: the site in experiments with another bed.
+
+    Compared by identity, so that what is computed of a site can be cached.
+    """
+
+    grid: Grid
+    bed: Array
+    friction_class: NDArray[np.int64]
+    class_names: tuple[str, ...]
+    patch: NDArray[np.int64]
+    cover: Array
+    own: Mapping[str, "Site"] = field(default_factory=dict)
+
+    @property
+    def main_patch(self) -> NDArray[np.int64]:
+        """The patch (nx, ny) of cells that plants cover half of or more, -1 elsewhere."""
+        return np.where(self.cover >= 0.5, self.patch, -1)
+
+
+def in_experiment(site: Site, experiment: str) -> Site:
+    """The site as it was in an experiment: with the bed of its own if it has one."""
+    return site.own.get(experiment, site)
+
+
+def build_site(case: Case) -> Site:
+    """The site of a case; where patches overlap, the later one counts.
+
+    Errors: InputError when a cell has no bed level or a file cannot be read.
+    """
+    grid = build_grid(case)
+    plants = _plants(case, grid)
+    own = {name: _with_bed(case, grid, plants, name) for name, one in case.experiments.items() if one.bed is not None}
+    return replace(_with_bed(case, grid, plants), own=own)
+
+
+def _plants(case: Case, grid: Grid) -> tuple[NDArray[np.int64], Array]:
+    """Patch and cover of each cell (nx, ny). Patches that share a cell are taken to lie side by side in it."""
+    shape = grid.x.size, grid.y.size
+    patch, cover = np.full(shape, -1, dtype=np.int64), np.zeros(shape)
+    for index, area in enumerate(case.plants.patches):
+        share = share_in_patch(case, area, grid)
+        cover = np.minimum(cover + share, 1.0)
+        patch[(share > 0.0) & (share >= cover - share)] = index
+    return patch, cover
+
+
+def _with_bed(case: Case, grid: Grid, plants: tuple[NDArray[np.int64], Array], experiment: str = "") -> Site:
+    """The site with the bed of the case or of an experiment, and the friction classes that follow from its slopes."""
+    bed = bed_levels(case, grid, experiment)
+    return Site(grid, bed, friction_classes(case, grid, bed), tuple(case.friction.classes), *plants)
+
+
+def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices (n,) each of the cells that places [m] lie in, the outermost beyond.
+
+    On the edge of two cells across, that of the lower one: a station at the toe of a bank stands on the floor, on
+    either side of the channel. On one along, that of the upstream one.
+    """
+    grid = site.grid
+    column = _index(x, grid.x, grid.dx, -1)
+    south, north = (_index(y, grid.y, grid.dy, side) for side in (-1, 1))
+    return column, np.where(site.bed[column, north] < site.bed[column, south], north, south)
+
+
+def _index(at: Array, centres: Array, step: float, side: int) -> NDArray[np.int64]:
+    """The cell a hair's breadth to one side (-1 or 1) of each point."""
+    nearest = np.rint((at - centres[0]) / step + side * ON_AN_EDGE)
+    return np.clip(nearest, 0, centres.size - 1).astype(np.int64)

@@ -1,0 +1,175 @@
+"""What a search for laws has found, and how it is told."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vegglue.calibration.laws_in_case import VALUES_SEEN
+from vegglue.diagnosis.diagnose import FALSE_ALARMS
+from vegglue.diagnosis.refits import Refit
+from vegglue.effects.law import Law
+from vegglue.wording.numbers import in_short
+
+MOST_ALIKE = 4  # told by name
+
+
+def chance_told(chance: float) -> str:
+    """A chance as it is told: never 100 %."""
+    return "over 99 %" if chance > 0.99 else f"{100 * chance:.0f} %"
+
+
+@dataclass(frozen=True)
+class LawFound:
+    """A law with its reference r, its strength a and the 95 % interval of it [-].
+
+    chance: that its term changes with its quantity, in whatever form; the law is the form that explains most.
+
+    scale: a plausible strength; same_as: the listed effect that it restates, or empty; seen: from where to where the
+    data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations; first: the
+    reference of the law that a product multiplies, where that has one.
+    """
+
+    law: Law
+    same_as: str
+    reference: float | None
+    scale: float
+    strength: float
+    interval95: tuple[float, float]
+    chance: float
+    log_evidence: float
+    seen: tuple[float, float]
+    alike: tuple[str, ...]
+    first: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Of the listed effect, where the law only restates it."""
+        return self.same_as or self.law.name
+
+    @property
+    def unit(self) -> str:
+        """Of its quantity, with a space before it; nothing for a pure number."""
+        return self.law.quantity.unit_behind
+
+    @property
+    def equation(self) -> str:
+        """With the references in it, the strength as a letter."""
+        return self.law.equation(self.reference, self.first)
+
+    @property
+    def factor(self) -> float:
+        """By what the term is larger where it differs most, over what was seen, than at the lower end of that [-]."""
+        g = self.law.form.of(np.linspace(*self.seen, VALUES_SEEN), 1.0 if self.reference is None else self.reference)
+        return float(np.exp(self.strength * (g - g[0])[np.abs(g - g[0]).argmax()]))
+
+    @property
+    def range_seen(self) -> str:
+        """From where to where the data have seen its quantity."""
+        low, high = self.seen
+        return f"{self.law.quantity.symbol} from {low:.2g} to {high:.2g}{self.unit}"
+
+    @property
+    def lines(self) -> list[str]:
+        """The law in words, as an equation, and how far to trust it."""
+        low, high = self.interval95
+        same = f" It is the listed effect {self.same_as}." if self.same_as else ""
+        letter, where = (
+            ("a", "there it") if self.law.times is None else ("c", "there the term, where the first g is 1,")
+        )
+        told = [
+            f"{self.law.title} (chance {chance_told(self.chance)}).{same}",
+            f"{self.equation}, {letter} = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
+            f"seen for {self.range_seen}: {where} changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
+        ]
+        more = f" and {len(self.alike) - MOST_ALIKE} more" if len(self.alike) > MOST_ALIKE else ""
+        return [*told, f"the same trace: {', '.join(self.alike[:MOST_ALIKE])}{more}"] if self.alike else told
+
+
+@dataclass(frozen=True)
+class ProductFound:
+    """found: a product of the best law with another quantity, told as any law; refit: of it, beside that law, whose a
+    is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
+    """
+
+    found: LawFound
+    refit: Refit
+    strength_of_law: float
+
+    @property
+    def lines(self) -> list[str]:
+        """As those of a law."""
+        first, equation, *further = self.found.lines
+        return [first, f"{equation}, beside a = {self.strength_of_law:.2f}", *further]
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """p: chance that errors alone make laws stand out as much; tried: the number of laws that had something to act on.
+
+    laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together; none
+    where nothing is found. compared: ln evidence of all that was calibrated, by name [-];
+    likeliest: the likeliest of these, where it is in the model and not in the data; product: of the best law with
+    another quantity, where that law leaves a misfit.
+    """
+
+    p: float
+    tried: int
+    laws: tuple[LawFound, ...]
+    others: dict[str, float]
+    compared: Mapping[str, float] = field(default_factory=dict)
+    likeliest: Refit | None = None
+    product: ProductFound | None = None
+
+    @property
+    def best(self) -> LawFound | None:
+        """The law that is likelier than any other cause, if there is one."""
+        if not self.laws or any(chance > self.laws[0].chance for chance in self.others.values()):
+            return None
+        return self.laws[0]
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in one sentence."""
+        best = self.best
+        if best is not None and best.same_as:
+            return f"The law that explains most is the listed effect {best.same_as}; add it by that name."
+        if best is not None:
+            more = "" if self.product is None else f" {self.product.found.law.title}."
+            return f"{best.law.title}: a law explains the misfit, with a chance of {chance_told(best.chance)}.{more}"
+        if self.others:
+            name, chance = max(self.others.items(), key=lambda pair: pair[1])
+            return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
+        if self.tried == 0:
+            return "No law is tried: these data have seen too little of every quantity."
+        if self.p <= FALSE_ALARMS:
+            rarely = f"errors alone leave as much in {100 * max(self.p, 0.001):.1g} % of cases"
+            return f"No law is found: {rarely}, but no law or known effect explains enough of it."
+        return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
+
+    def __repr__(self) -> str:
+        return in_short(f"Discovery: {self.sentence}", self.lines)
+
+    @property
+    def written(self) -> tuple[LawFound, ...]:
+        """What a child config holds: the best law and its product; none where it only restates a listed effect."""
+        best = self.best
+        if best is None or best.same_as:
+            return ()
+        return (best,) if self.product is None else (best, self.product.found)
+
+    @property
+    def ranked(self) -> list[list[str]]:
+        """Lines of every law and other cause, the likeliest first; those of the product after its law."""
+        told = [(law.chance, law.lines) for law in self.laws]
+        told += [(chance, [f"{name} (chance {chance_told(chance)})"]) for name, chance in self.others.items()]
+        told.sort(key=lambda pair: -pair[0])
+        ranked = [lines for _, lines in told]
+        if self.product is not None:
+            ranked.insert(1, self.product.lines)
+        return ranked
+
+    @property
+    def lines(self) -> list[str]:
+        """The same, one after the other."""
+        return [line for lines in self.ranked for line in lines]

@@ -1,0 +1,121 @@
+"""Steady states of one member: Newton with pseudo-time from afar, chord steps with its own factors at the end.
+
+Newton solves (D/dt + J) delta = -R, D the storage of each unknown, dt growing until it no longer matters (Kelley and
+Keyes 1998, doi:10.1137/S0036142996304796). However a member was reached, it is accepted on its own residual only: the
+largest correction J^-1 R, in m/s and m, is below the tolerance.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array, Single
+from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, chord
+from vegglue.flow.chord_equations import eased, slope_of_friction
+from vegglue.flow.equations import storage
+from vegglue.flow.jacobian import Factors, eliminate, factors, jacobian, solved
+from vegglue.flow.problem import LEVEL, Problem
+
+# Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there: chosen, not
+# measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).
+CLOSE = 2e-2
+# By how much the pseudo-time step grows after a correction below so much [m, m/s], the nearest first, and its longest
+# [s]. Chosen, not measured: faster growth saves factorisations where the root is near, and throws a member off where it
+# is not, which costs every cut of the step that follows.
+GROWTHS, LONGEST_TIME_STEP = ((0.02, 8.0), (0.12, 2.0)), 1e9
+# The pseudo-time step [s] from which a small correction is that of the steady state, at most: chosen, not measured. In
+# less time a member that is far from rest moves little, too.
+STEADY_TIME_STEP = 1e4
+# How often the pseudo-time step is cut at most, and by what. Chosen, not measured: twelve such cuts make 10 s a
+# millionth of a second, and no more would help; smaller cuts cost more factorisations, larger ones iterations after.
+MOST_CUTS, CUT = 12, 4.0
+# Chord steps with one set of factors, and sets of factors, at most. Chosen, not measured: fewer steps factorise more
+# often, more are wasted where factors made too far away do not pull; four sets leave a member that is not near to
+# Newton early.
+STEPS_PER_FACTORS, MOST_FACTORS = 14, 4
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Iterations of Newton at most, and its first pseudo-time step [s].
+
+    Chosen, not measured: a longer first step saves iterations where the root is near, and is cut again, at a
+    factorisation each, where it is not; more iterations seldom find what another way finds at their price.
+    """
+
+    most: int
+    time_step: float
+
+
+# From a backwater curve, from a member nearby, and from where a march stands.
+FROM_AFAR, FROM_NEARBY, FROM_A_MARCH = Beginning(60, 10.0), Beginning(12, 200.0), Beginning(25, 50.0)
+
+
+def _stored(problem: Problem, state: Array) -> Single:
+    """dh/dz_s of each level, 1 for velocities: (nx, n)."""
+    nx, _, ny, _ = state.shape
+    stored = np.ones((nx, 3, ny), np.float32)
+    stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
+    return stored.reshape(nx, 3 * ny)
+
+
+def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FROM_AFAR) -> ChordSolution:
+    """One member (m = 1) from a start that may be far away."""
+    state, size, time_step = start, np.inf, how.time_step
+    # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
+    nowhere = np.zeros(start.shape[2], dtype=bool)
+    for iteration in range(1, how.most + 1):
+        slope = slope_of_friction(problem, state)
+        rates, columns_far = eased(problem, state, slope, nowhere), jacobian(problem, state)
+        stored = _stored(problem, state)
+        step, time_step = _bounded_step(rates, columns_far, stored, time_step)
+        size = float(np.abs(step).max())
+        if not size < LONGEST_CORRECTION:
+            return _alone(state, size, iteration, False)
+        state = state + step
+        if size < tolerance and time_step > min(STEADY_TIME_STEP, 1.0 / tolerance):
+            return _alone(state, size, iteration, True)
+        growth = next((growth for below, growth in GROWTHS if size < below), 1.0)
+        time_step = min(time_step * growth, LONGEST_TIME_STEP)
+    return _alone(state, size, how.most, False)
+
+
+def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None]:
+    """One member from a start near its root: chord steps, the factors renewed while they help (Shamanskii 1967).
+
+    The factors handed back are those of a state that lies within CLOSE of the root, or none if there was no root.
+    """
+    state, spent, largest = near, 0, np.inf
+    for _ in range(MOST_FACTORS):
+        shared = factors(problem, state)
+        end = chord(problem, state, shared, tolerance, most=STEPS_PER_FACTORS)
+        spent += int(end.iterations[0])
+        moved = float(np.abs(end.state - state).max())
+        end = replace(end, iterations=np.array([spent]))
+        if end.converged[0]:
+            return end, shared if moved < CLOSE else factors(problem, end.state)
+        if not end.correction[0] < min(largest, LONGEST_CORRECTION):
+            break
+        state, largest = end.state, float(end.correction[0])
+    return end, None
+
+
+def _bounded_step(
+    rates: Array, columns_far: tuple[Single, Single], stored: Single, time_step: float
+) -> tuple[Array, float]:
+    """-(D/dt + J)^-1 R with dt cut until no entry is as long as LONGEST_CORRECTION; the last one tried if none is."""
+    columns, far = columns_far
+    diagonal = np.arange(far.shape[1])
+    for _ in range(MOST_CUTS):
+        shifted = columns.copy()
+        shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
+        eliminate(shifted, far)
+        step = -solved(shifted, far, rates)
+        if np.abs(step).max() < LONGEST_CORRECTION:
+            break
+        time_step /= CUT
+    return step, time_step
+
+
+def _alone(state: Array, size: float, iterations: int, converged: bool) -> ChordSolution:
+    return ChordSolution(state, np.array([size]), np.array([iterations]), np.array([converged]))

@@ -1,0 +1,196 @@
+"""One member solved alone or beside another, and what makes it the reference of its neighbours: factors, tangents, and
+the band of rows they hold for.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.flow.backwater import backwater
+from vegglue.flow.chord import ChordSolution
+from vegglue.flow.equations import residual
+from vegglue.flow.jacobian import Factors, factors
+from vegglue.flow.march import FallBack, march_to_rest
+from vegglue.flow.newton import CLOSE, FROM_AFAR, FROM_NEARBY, Beginning, finish, newton
+from vegglue.flow.problem import Problem, crop
+from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
+from vegglue.flow.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
+
+# Step [-] in the unit cube of the one-sided differences of tangents. Chosen, not measured: tangents only say where to
+# begin, and are off by the curvature over such a step.
+TANGENT_STEP = 1e-4
+# The problem of members at points (m, d) of the unit cube.
+ProblemOf = Callable[[Array], Problem]
+Attempt = tuple[ChordSolution, Factors | None, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class LinearisedMember:
+    """A state (nx, 3, ny, 1) at one point (d,) of the unit cube, rough where it was only a stride on the way to others,
+    and d state / d s_p there.
+    """
+
+    point: Array
+    state: Array
+    slopes: tuple[Array, ...]
+
+    def predict(self, points: Array) -> Array:
+        """state + sum_p slope_p (s_p - point_p), (nx, 3, ny, m)."""
+        predicted = np.repeat(self.state, len(points), axis=3)
+        for p, slope in enumerate(self.slopes):
+            predicted += slope * (points[:, p] - self.point[p])
+        return predicted
+
+
+@dataclass(frozen=True)
+class ReferenceMember:
+    """A member that others lean on: its state (nx, 3, ny, 1) and, unless it had to be marched, the factors in its band
+    of rows and, where they were asked for, its tangents.
+    """
+
+    state: Array
+    status: int
+    reason: str
+    iterations: int
+    linearised: LinearisedMember | None
+    factors: Factors | None
+    band: tuple[int, int]
+
+
+def linearised_median(
+    problem_of: ProblemOf, parameters: int, tolerance: float, how: FallBack
+) -> LinearisedMember | None:
+    """The member at the medians of all priors, for others to begin from; None if it has to be marched."""
+    point = np.full(parameters, 0.5)
+    return solve_reference(problem_of, problem_of(point[None]), point, None, tolerance, how).linearised
+
+
+def solve_reference(
+    problem_of: ProblemOf, problem: Problem, point: Array, warm: Array | None, tolerance: float, how: FallBack
+) -> ReferenceMember:
+    """A member solved alone, with its tangents. problem: of the one member at the point."""
+    alone = solve_alone(problem, warm, tolerance, how)
+    return alone if alone.factors is None else _with_tangents(problem_of, problem, point, alone)
+
+
+def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: FallBack) -> ReferenceMember:
+    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching. Without
+    tangents.
+    """
+    spent = 0
+    for start in [warm, None] if warm is not None else [None]:
+        solution, shared, band = settled(problem, start, tolerance)
+        spent += int(solution.iterations[0])
+        if shared is not None:
+            state = widen(solution.state, problem.shape[1], band)
+            return ReferenceMember(state, SOLVED_BY_NEWTON, "", spent, None, shared, band)
+    return _marched(problem, spent, tolerance, how)
+
+
+def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
+    """A member already solved, its state (nx, 3, ny, 1), as a reference."""
+    band = wet_band(problem, state)
+    shared = factors(crop(problem, *band), rows_inside(state, band))
+    solved = ReferenceMember(state, SOLVED_BY_NEWTON, "", 0, None, shared, band)
+    return _with_tangents(problem_of, problem, point, solved)
+
+
+def reference_beside(
+    problem_of: ProblemOf, problem: Problem, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
+) -> ReferenceMember:
+    """A reference near another: with the factors of that one, if they reach, else on its own."""
+    assert other.linearised is not None
+    assert other.factors is not None
+    start = other.linearised.predict(point[None])
+    end = chord_in_band(problem, rows_inside(start, other.band), other.factors, other.band, tolerance)
+    spent = int(end.iterations[0])
+    if end.converged[0]:
+        state = widen(end.state, problem.shape[1], other.band)
+        return replace(reference_at(problem_of, problem, point, state), state=state, iterations=spent)
+    alone = solve_reference(problem_of, problem, point, start, tolerance, how)
+    return replace(alone, iterations=spent + alone.iterations)
+
+
+def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
+    """One member: its state in the band of rows that may be wet, the factors there, and that band.
+
+    warm (nx, 3, ny, 1): a state nearby to begin from, else a rough estimate is. Without factors, it has not converged.
+    """
+    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
+    if warm is not None:
+        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance, FROM_NEARBY)]
+    spent = 0
+    for attempt in attempts:
+        solution, shared, band = attempt()
+        spent += int(solution.iterations[0])
+        solution = replace(solution, iterations=np.array([spent]))
+        if solution.converged[0] and shared is not None:
+            return solution, shared, band
+    return solution, None, band
+
+
+def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
+    band = wet_band(problem, warm)
+    solution, shared = finish(crop(problem, *band), rows_inside(warm, band), tolerance)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _by_newton(problem: Problem, warm: Array, tolerance: float, how: Beginning) -> Attempt:
+    band = wet_band(problem, warm)
+    part = crop(problem, *band)
+    near = newton(part, rows_inside(warm, band), CLOSE, how)
+    if not near.converged[0]:
+        return near, None, band
+    solution, shared = finish(part, near.state, tolerance)
+    solution = replace(solution, iterations=solution.iterations + near.iterations)
+    return _checked(problem, solution, shared, band, tolerance)
+
+
+def _from_cold(problem: Problem, tolerance: float) -> Attempt:
+    return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)
+
+
+def _checked(
+    problem: Problem, solution: ChordSolution, shared: Factors | None, band: tuple[int, int], tolerance: float
+) -> Attempt:
+    """Solved again in a wider band if water came to stand at the edge of this one."""
+    part = crop(problem, *band)
+    if not (solution.converged[0] and overflows(part, solution.state, band, problem.shape[1])[0]):
+        return solution, shared, band
+    wider = widen(solution.state, problem.shape[1], band)
+    band = wet_band(problem, wider)
+    solution, shared = finish(crop(problem, *band), rows_inside(wider, band), tolerance)
+    return solution, shared, band
+
+
+def _with_tangents(problem_of: ProblemOf, problem: Problem, point: Array, solved: ReferenceMember) -> ReferenceMember:
+    """A reference with factors, and its tangents at the point."""
+    assert solved.factors is not None
+    part, near = crop(problem, *solved.band), rows_inside(solved.state, solved.band)
+    slopes = _tangents(problem_of, point, part, solved.band, near, solved.factors)
+    wide = tuple(widen(slope, problem.shape[1], solved.band) for slope in slopes)
+    return replace(solved, linearised=LinearisedMember(point, solved.state, wide))
+
+
+def _tangents(
+    problem_of: ProblemOf, point: Array, part: Problem, band: tuple[int, int], state: Array, shared: Factors
+) -> list[Array]:
+    """-J^-1 dR/ds_p by one-sided differences of the residual in s, good enough to start from."""
+    base = residual(part, state)
+    steps = np.where(point < 0.5, TANGENT_STEP, -TANGENT_STEP)
+    moved = crop(problem_of(point + np.diag(steps)), *band)
+    rates = residual(moved, np.repeat(state, point.size, axis=3))
+    tangents = -shared.solve((rates - base) / steps)
+    return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
+
+
+def _marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
+    """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
+    start = backwater(problem)
+    marched = march_to_rest(problem, start, tolerance, how)
+    status = SOLVED_BY_MARCHING if marched.steady else FAILED
+    reason = "" if marched.steady else f"no steady state: {marched.sentence}"
+    state = marched.state if marched.steady else np.full_like(start, np.nan)
+    return ReferenceMember(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))

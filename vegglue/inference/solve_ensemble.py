@@ -1,0 +1,180 @@
+"""config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
+
+A chunk is neighbours in the prior, the same set whatever the number of jobs, so that the results are too. What one task
+solves is a chunk in one experiment.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.case.gridded_site import Site, build_site
+from vegglue.case.parameter_space import PriorSample, refuse_without_parameters, sobol_sample
+from vegglue.case.resolved_config import resolved_yaml, simulation_hash
+from vegglue.case.schema import Case
+from vegglue.case.size_limits import MOST_PREDICTIONS
+from vegglue.case.zones import refuse_ranges_without_cells
+from vegglue.engine.first_use import with_compilation
+from vegglue.errors import InputError, shown_path
+from vegglue.flow.batch import CLUSTER_SIZE
+from vegglue.flow.parameter_metric import clusters, parameter_metric
+from vegglue.flow.status import FAILED, members_with
+from vegglue.inference.solve_chunk import (
+    Rows,
+    StartFrom,
+    linearised_medians,
+    rows_of_chunk,
+    section_positions,
+    solve_in_experiment,
+)
+from vegglue.measurements.observations import Observations
+from vegglue.parallel import as_finished
+from vegglue.progress import Progress, Watch
+from vegglue.results.ensemble import Header
+from vegglue.results.fields import FieldWindow, excess, window_of
+from vegglue.results.resume import EnsembleWriter, ensemble_writer
+from vegglue.version import VERSION
+
+# Members of a chunk at most, to share what leads to the first of them, and chunks at least, to share the cores [-].
+# Chosen, not measured: smaller chunks share the work more evenly and lose less when a run is killed, larger ones reach
+# fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
+LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
+# Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
+# neighbours alone take (DECISIONS); more were not tried. Chunks then hold half of the members, and at most
+# SPARSE_CHUNK, or twice as many where several experiments share the cores: larger ones share more, or leave cores idle.
+SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
+
+
+def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch) -> None:
+    """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
+
+    Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
+    StorageError when another run holds the folder or the disk is full (what was written stays).
+    """
+    wanted = simulation_hash(case)  # before anything else is read: what changes meanwhile makes it out of date
+    refuse_too_many(case, observations)
+    site = build_site(case)
+    refuse_ranges_without_cells(case, site.grid)
+    if sentence := excess(case, site.grid):
+        raise InputError(f"{shown_path(case.source)}: {sentence}")
+    sample = sobol_sample(case)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    header = make_header(case, wanted, observations, sample.theta, chunks, window_of(case, site.grid))
+    with ensemble_writer(path, header) as writer:
+        todo = left_to_do(writer, case, chunks, watch)
+        resumed = sum(chunks[index].size for index in writer.done)
+        flows, failed, phase = resumed * len(case.experiments), 0, f"solving {case.name}"
+        watch(Progress(with_compilation(phase), resumed, header.members, "members", failed, resumed))
+        for index, rows in _solve_all(case, site, observations, sample, chunks, todo, start_from, jobs):
+            flows += chunks[index].size
+            if rows is not None:
+                failed += members_with(rows["status"], FAILED)
+                fields = rows.pop("fields")
+                writer.append(index, chunks[index], rows, fields)
+            watch(Progress(phase, flows // len(case.experiments), header.members, "members", failed, resumed))
+
+
+def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
+    """Chunks that an earlier run has not finished, or that are damaged since; what was set aside is told."""
+    if writer.set_aside is not None:
+        watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
+    writer.reopen_damaged(chunks)
+    return [index for index in range(len(chunks)) if index not in writer.done]
+
+
+def refuse_too_many(case: Case, observations: Observations) -> None:
+    """Errors: InputError for a case without parameters, or with more predictions than a file is laid out for."""
+    refuse_without_parameters(case)
+    if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
+        raise InputError(
+            f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "
+            f"have {predictions:,} predictions; expected at most {MOST_PREDICTIONS:,}, take fewer of either."
+        )
+
+
+def chunk_size(members: int, experiments: int) -> int:
+    """Members of a chunk at most; it depends on nothing but the size of the ensemble and the number of experiments."""
+    if members <= SPARSE_MEMBERS:
+        return min(-(-members // 2), SPARSE_CHUNK if experiments == 1 else 2 * SPARSE_CHUNK)
+    return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
+
+
+def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
+    """Where members come from, and the members of each chunk; those that are few come from coarser cells."""
+    size = chunk_size(len(points), len(case.experiments))
+    start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
+    slopes = [one.slopes for one in start_from.values() if one is not None]
+    return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
+
+
+def solved_members(case: Case, observations: Observations, sample: PriorSample, jobs: int) -> np.ndarray:
+    """Predictions (member, station) of the members of a sample, NaN where one failed."""
+    site, found = build_site(case), np.full((len(sample.points), len(observations.table)), np.nan)
+    start_from, chunks = starts_and_chunks(case, site, sample.points)
+    for index, rows in _solve_all(case, site, observations, sample, chunks, [*range(len(chunks))], start_from, jobs):
+        if rows is not None:
+            found[chunks[index]] = rows["prediction"]
+    return found
+
+
+def _solve_all(
+    case: Case,
+    site: Site,
+    observations: Observations,
+    sample: PriorSample,
+    chunks: list[np.ndarray],
+    todo: list[int],
+    start_from: StartFrom,
+    jobs: int,
+) -> Iterator[tuple[int, Rows | None]]:
+    """A chunk as it ends in each experiment, which is one task, and its rows as the last one ends; None before."""
+    work = partial(_solve_numbered, case, site, observations, start_from)
+    tasks = ((index, experiment, sample.take(chunks[index])) for index in todo for experiment in case.experiments)
+    ended: dict[int, dict[str, Rows]] = {}
+    for index, experiment, rows in as_finished(work, tasks, jobs):
+        parts = ended.setdefault(index, {})
+        parts[experiment] = rows
+        if len(parts) < len(case.experiments):
+            yield index, None
+        else:
+            yield index, rows_of_chunk(case, observations, [parts[one] for one in case.experiments])
+            del ended[index]
+
+
+def _solve_numbered(
+    case: Case,
+    site: Site,
+    observations: Observations,
+    start_from: StartFrom,
+    index: int,
+    experiment: str,
+    sample: PriorSample,
+) -> tuple[int, str, Rows]:
+    return index, experiment, solve_in_experiment(case, site, observations, start_from, experiment, sample)
+
+
+def make_header(
+    case: Case,
+    config_hash: str,
+    observations: Observations,
+    theta: dict[str, np.ndarray],
+    chunks: list[np.ndarray],
+    window: FieldWindow | None,
+) -> Header:
+    return Header(
+        parameters=theta,
+        units={name: parameter.unit for name, parameter in case.parameters.items()},
+        station=observations.table,
+        experiments=tuple(case.experiments),
+        sections=section_positions(observations),
+        chunks=len(chunks),
+        cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
+        config=resolved_yaml(case),
+        config_hash=config_hash,
+        seed=case.simulate.seed,
+        version=VERSION,
+        window=window,
+    )

@@ -1,0 +1,166 @@
+"""HDF5 files that xarray and ArviZ read without this package: groups written and read, each file whole or not at all.
+
+Every group holds its own dimensions as scales. What is stored of which result stands in `result_files`, how an ensemble
+grows in `resume`.
+"""
+
+import fcntl
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from vegglue.errors import InputError, StorageError
+from vegglue.first_look import why_unreadable
+from vegglue.results.digest import is_unchanged, state_of, with_digest
+from vegglue.results.foreign_files import why_foreign
+from vegglue.results.hdf5_reading import READ_HDF5
+from vegglue.results.layout import Group
+from vegglue.whole_files import write_file
+
+# What reading a damaged file may raise, of Python or of the HDF5 library.
+UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
+AGAIN = "remove it and run the step that makes it again"
+WRITTEN_STAYS = "what was written before is whole: make room, then run the same command again"
+
+
+def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
+    """Write a file that appears under its name only when it is whole.
+
+    Errors: StorageError when it cannot be written; a file of that name from before stays as it was.
+    """
+    write_file(path, with_digest(_image(groups, attributes)), WRITTEN_STAYS)
+
+
+def write_to_grow(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
+    """As write_whole, for a file that will change: without a digest. Errors: StorageError."""
+    write_file(path, _image(groups, attributes), WRITTEN_STAYS)
+
+
+def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
+    """A file in memory: on a full disk the HDF5 library crashes instead of raising."""
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs.update(attributes)
+        for name, content in groups.items():
+            _write_group(file, name, content)
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+@contextmanager
+def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
+    """An open file for the length of the block: "r" for one that is whole, "r+" for one that grows.
+
+    Without locks of the HDF5 library: whole files are never changed in place, and a growing one is guarded by the lock
+    of its folder and may be looked at. Errors: StorageError when it cannot be opened, has changed since it was written,
+    or holds what leads out of it.
+    """
+    try:
+        if mode == "r":
+            _refuse_damaged(path)
+        file = _without_locks(path, mode)
+    except StorageError:
+        raise
+    except UNREADABLE as error:
+        raise StorageError(f"{path}: cannot be opened ({error}); {AGAIN}.") from error
+    with file:
+        try:
+            foreign = why_foreign(file)
+        except UNREADABLE as error:
+            raise StorageError(f"{path}: is broken ({error}); {AGAIN}.") from error
+        if foreign:
+            raise StorageError(f"{path}: {foreign}, which vegglue never writes, and is not read; {AGAIN}.")
+        yield file
+
+
+def _refuse_damaged(path: Path) -> None:
+    """Errors: StorageError when a file is not what was written, or cannot be read to its end."""
+    state = state_of(path)
+    if is_unchanged(*state) is False:
+        refuse_in_use(path)
+        raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
+    why = why_unreadable(*state, by=READ_HDF5)
+    if why is not None:
+        refuse_in_use(path)
+        raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
+
+
+def refuse_in_use(path: Path) -> None:
+    """Errors: StorageError when another program has the file open to change it, which locks it; OSError without one."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise StorageError(f"{path} is in use by another program; close it there.") from error
+        except OSError:
+            pass  # a file system without locks cannot tell
+
+
+def _without_locks(path: Path, mode: str) -> h5py.File:
+    try:
+        return h5py.File(path, mode, locking=False)
+    except OSError as error:
+        if "locking flag" not in str(error):
+            raise
+        return h5py.File(path, mode)  # this very process has it open, with locks
+
+
+def stored_attribute(path: Path, attribute: str) -> str | None:
+    """An attribute of a file, None when there is no readable file or it has none of that name."""
+    try:
+        with open_hdf5(path, "r") as file:
+            return str(file.attrs[attribute])
+    except UNREADABLE:
+        return None
+
+
+def read_groups(file: h5py.File) -> dict[str, dict[str, np.ndarray]]:
+    """All groups of a file by name; see read_group."""
+    return {name: read_group(group) for name, group in file.items() if isinstance(group, h5py.Group)}
+
+
+def read_group(group: h5py.Group) -> dict[str, np.ndarray]:
+    """All datasets of a group by name, strings as str and booleans as bool."""
+    return {name: read_values(dataset) for name, dataset in group.items() if isinstance(dataset, h5py.Dataset)}
+
+
+def _write_group(file: h5py.File, name: str, content: Group) -> None:
+    """Coordinates as dimension scales of the group's own, one attached to every dimension of every variable."""
+    group = file.create_group(name, track_order=True)
+    clash = sorted(set(content.coordinates) & set(content.variables))
+    if clash:
+        raise InputError(f"parameters: {clash} are names of dimensions of the group {name}; rename them.")
+    for dim, values in content.coordinates.items():
+        scale = _dataset(group, dim, values)
+        scale.make_scale(dim)
+        if dim in content.units:
+            scale.attrs["units"] = content.units[dim]
+    for key, variable in content.variables.items():
+        dataset = _dataset(group, key, variable.values, variable.compressed)
+        dataset.attrs["units"] = variable.unit
+        for axis, dim in enumerate(variable.dims):
+            dataset.dims[axis].attach_scale(group[dim])
+
+
+def _dataset(group: h5py.Group, name: str, values: Any, compressed: tuple[int, ...] | None = None) -> h5py.Dataset:
+    values = np.asarray(values)
+    if compressed is not None:
+        return group.create_dataset(name, data=values, chunks=compressed, compression="gzip", shuffle=True)
+    if values.dtype.kind == "S":
+        return group.create_dataset(name, data=values.astype(h5py.string_dtype("utf-8", values.dtype.itemsize)))
+    if values.dtype.kind in "OUT":
+        return group.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
+    dataset = group.create_dataset(name, data=values.astype(np.int8) if values.dtype == bool else values)
+    if values.dtype == bool:
+        dataset.attrs["dtype"] = "bool"  # xarray's mark: netCDF knows no booleans
+    return dataset
+
+
+def read_values(dataset: h5py.Dataset) -> np.ndarray:
+    """All values of a dataset, strings as str and booleans as bool."""
+    if h5py.check_string_dtype(dataset.dtype):
+        return dataset.asstr()[...].astype(object)
+    return dataset[...].astype(bool) if dataset.attrs.get("dtype") == "bool" else dataset[...]

@@ -1,0 +1,269 @@
+"""How a killed run goes on: an ensemble grows in `ensemble.h5.part`, its fields in `fields.part`, chunk by chunk.
+
+The datasets of the part file are laid out whole before the first member is solved: appending then changes no structure
+and needs no more disk, so a run killed at any moment leaves a file that opens. The next run with the same config, seed,
+version and cut into chunks solves only the chunks that are not marked as finished, or whose digest is another.
+"""
+
+import os
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from vegglue.errors import StorageError
+from vegglue.results.digest import append_digest
+from vegglue.results.ensemble import ROWS, Header, unsolved
+from vegglue.results.fields import fields_group
+from vegglue.results.hdf5 import (
+    UNREADABLE,
+    WRITTEN_STAYS,
+    open_hdf5,
+    read_values,
+    refuse_in_use,
+    write_to_grow,
+    write_whole,
+)
+from vegglue.results.layout import Group
+from vegglue.results.lock import hold_lock
+from vegglue.results.unfinished_fields import (
+    FIELDS_PART,
+    UnfinishedFields,
+    all_fields,
+    is_reserved,
+    reserve,
+    unfinished_fields,
+    write_fields,
+)
+from vegglue.whole_files import failed_writes_told
+
+ENSEMBLE_FORMAT, FIELDS_FORMAT = "vegglue ensemble 1", "vegglue fields 1"
+# What changes while a run is on its way, by group.
+GROWING = {"members": tuple(ROWS), "progress": ("finished", "digest")}
+KeptRows = Mapping[str, Mapping[str, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class EnsembleWriter:
+    """The one writer of an unfinished ensemble."""
+
+    file: h5py.File
+    path: Path
+    set_aside: Path | None  # where an unfinished run of another config was moved to
+    unfinished: UnfinishedFields | None  # fields, if any are kept
+
+    @property
+    def done(self) -> set[int]:
+        """Chunks that need not be solved again."""
+        return set(np.flatnonzero(self.file["progress/finished"][:]).tolist())
+
+    def reopen_damaged(self, chunks: Sequence[np.ndarray]) -> None:
+        """Count a finished chunk as not solved where what is stored of its members is not what was written.
+
+        chunks: the members of each (indices into the ensemble).
+        """
+        stored = {name: self.file["members"][name][...] for name in ROWS}
+        fields = None if self.unfinished is None else all_fields(self.unfinished)
+        for chunk in self.done:
+            members = np.sort(chunks[chunk])
+            rows = [values[members] for values in stored.values() if values.size]
+            found = _digest([*rows, *(() if fields is None else [fields[members]])])
+            if found != self.file["progress/digest"][chunk]:
+                self.file["progress/finished"][chunk] = 0
+        self._sync()
+
+    def append(
+        self, chunk: int, members: np.ndarray, rows: Mapping[str, np.ndarray], fields: np.ndarray | None = None
+    ) -> None:
+        """Write one chunk: rows[name] has one entry for each of `members` (indices into the ensemble), name in ROWS;
+        so have fields (member, experiment, quantity, x, y) if the header has a window.
+
+        Errors: StorageError when it cannot be written; chunks appended before stay readable.
+        """
+        members = np.asarray(members)
+        order = np.argsort(members)
+        group = self.file["members"]
+        if self.unfinished is not None and fields is None:
+            raise ValueError(f"chunk {chunk}: expected fields, got none")
+        if set(rows) != set(ROWS):
+            raise ValueError(f"chunk {chunk}: expected the rows {sorted(ROWS)}, got {sorted(rows)}")
+        sorted_rows = {name: _fitted(rows[name], group[name].dtype)[order] for name in ROWS if group[name].size}
+        sorted_fields = [] if fields is None else [fields.astype(np.float32)[order]]
+        with failed_writes_told(self.path, WRITTEN_STAYS):
+            for name, values in sorted_rows.items():  # h5py cannot select members of nothing: a case without stations
+                group[name][members[order]] = values
+            if self.unfinished is not None and fields is not None:
+                write_fields(self.unfinished, members, fields)
+            self.file["progress/digest"][chunk] = _digest([*sorted_rows.values(), *sorted_fields])
+            self._sync()  # rows and fields must be on disk before they are called finished
+            self.file["progress/finished"][chunk] = 1
+            self._sync()
+
+    def _sync(self) -> None:
+        self.file.flush()
+        os.fsync(self.file.id.get_vfd_handle())
+
+
+@contextmanager
+def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
+    """Open `path`.part for appending, resuming what an earlier run of the same header left; rename it to `path` when
+    the block ends with every chunk appended. Fields wait in `fields.part` beside it and become `fields.h5` just before.
+
+    A part file of another config, seed, version or cut into chunks, or a broken one, is moved to `path`.part.old, never
+    mixed in.
+    Errors: StorageError when another run holds the folder, its files cannot be written or the disk is full.
+    """
+    with failed_writes_told(path, WRITTEN_STAYS):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise StorageError(f"{path}: expected a file or nothing, found a folder; move it away.")
+        if path.exists():
+            refuse_in_use(path)
+    part, unfinished = part_file(path), unfinished_fields(path.parent, header)
+    with hold_lock(path.parent):
+        kept = _kept_rows(part, header) if unfinished is None or is_reserved(unfinished) else None
+        set_aside = _set_aside(part) if kept is None and _is_there(part) else None
+        _lay_out(part, unfinished, header, kept)
+        with open_hdf5(part, "r+") as file:
+            writer = EnsembleWriter(file, part, set_aside, unfinished)
+            yield writer
+            complete = len(writer.done) == header.chunks
+            _refuse_replaced(file, part)
+        if complete:
+            with failed_writes_told(path, WRITTEN_STAYS):
+                _finish(path, unfinished, header)
+
+
+def _refuse_replaced(file: h5py.File, part: Path) -> None:
+    """Errors: StorageError when the open file is no longer the one of its name: locks of some network disks do not
+    reach other machines, and another run has begun there.
+    """
+    mine = os.fstat(file.id.get_vfd_handle())
+    there = part.stat() if part.exists() else None
+    if there is None or (there.st_dev, there.st_ino) != (mine.st_dev, mine.st_ino):
+        raise StorageError(
+            f"{part}: was replaced by another run, on a machine that the lock of this one does not reach; wait for "
+            "that run to end, then give the same command again."
+        )
+
+
+def remove_left_over_fields(path: Path) -> None:
+    """Take away `fields.part` of a run that was killed after its ensemble at `path` was whole. Errors: StorageError."""
+    left = path.with_name(FIELDS_PART)
+    if left.exists() and not part_file(path).exists():
+        with hold_lock(path.parent), failed_writes_told(left, WRITTEN_STAYS):
+            left.unlink(missing_ok=True)
+
+
+def _attributes(header: Header) -> dict[str, Any]:
+    own = {name: getattr(header, name) for name in ("config", "config_hash", "seed", "version", "cut")}
+    return own | {"format": ENSEMBLE_FORMAT}
+
+
+def part_file(path: Path) -> Path:
+    """The file that a result grows in."""
+    return path.with_name(path.name + ".part")
+
+
+def begun_or_finished(path: Path) -> bool:
+    """Whether a result is there, or a part of one that was stopped."""
+    return path.exists() or part_file(path).exists()
+
+
+def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header, kept: KeptRows | None) -> None:
+    """All room a run will need, the fields first: a part of an ensemble without its fields cannot be.
+
+    What an earlier run has kept is laid out anew as well: nothing is ever written into a file as it was found.
+    """
+    if unfinished is not None and kept is None:
+        with failed_writes_told(unfinished.path, WRITTEN_STAYS):
+            reserve(unfinished)
+    groups = unsolved(header) if kept is None else _with_rows(unsolved(header), kept)
+    write_to_grow(part, groups, _attributes(header))
+
+
+def _finish(path: Path, unfinished: UnfinishedFields | None, header: Header) -> None:
+    """Fields before the ensemble, which stands for both: a run killed in between only has this to do again."""
+    if unfinished is not None:
+        group = fields_group(unfinished.window, header.experiments, all_fields(unfinished))
+        own = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
+        write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own)
+    append_digest(part_file(path))
+    os.replace(part_file(path), path)
+    if unfinished is not None:
+        unfinished.path.unlink()
+
+
+def _kept_rows(part: Path, header: Header) -> KeptRows | None:
+    """What is stored of members and progress by a run of exactly this header; None where there is no such file."""
+    if part.is_symlink():
+        return None
+    try:
+        with open_hdf5(part, "r") as file:
+            if any(file.attrs[name] != value for name, value in _attributes(header).items()):
+                return None
+            kept = {name: {key: file[name][key][...] for key in keys} for name, keys in GROWING.items()}
+            groups = unsolved(header)
+            for name, rows in kept.items():
+                if any(values.shape != groups[name].variables[key].values.shape for key, values in rows.items()):
+                    return None
+            return kept if all(_is_laid_out(file[name], group) for name, group in groups.items()) else None
+    except UNREADABLE:
+        pass
+    return None
+
+
+def _is_laid_out(stored: h5py.Group, group: Group) -> bool:
+    """Whether a group holds the values that do not change."""
+    growing = {key for keys in GROWING.values() for key in keys}
+    values = {**group.coordinates, **{key: one.values for key, one in group.variables.items()}}
+    return all(_equal(read_values(stored[name]), np.asarray(values[name])) for name in values.keys() - growing)
+
+
+def _with_rows(groups: Mapping[str, Group], kept: KeptRows) -> dict[str, Group]:
+    """The groups with the values of the rows kept."""
+
+    def filled(group: Group, rows: Mapping[str, np.ndarray]) -> Group:
+        variables = {
+            key: replace(group.variables[key], values=np.asarray(values, group.variables[key].values.dtype))
+            for key, values in rows.items()
+        }
+        return replace(group, variables={**group.variables, **variables})
+
+    return {name: filled(group, kept[name]) if name in kept else group for name, group in groups.items()}
+
+
+def _equal(found: np.ndarray, values: np.ndarray) -> bool:
+    return bool(
+        (found == values).all() if values.dtype.kind in "OUS" else np.array_equal(found, values, equal_nan=True)
+    )
+
+
+def _is_there(path: Path) -> bool:
+    return path.exists() or path.is_symlink()
+
+
+def _set_aside(part: Path) -> Path:
+    with failed_writes_told(part, f"remove {part} and run the same command again"):
+        return part.replace(part.with_name(part.name + ".old"))
+
+
+def _digest(arrays: Sequence[np.ndarray]) -> int:
+    """CRC-32 of the members of a chunk, in their order."""
+    found = 0
+    for values in arrays:
+        found = zlib.crc32(np.ascontiguousarray(values).tobytes(), found)
+    return found
+
+
+def _fitted(values: Any, dtype: np.dtype) -> np.ndarray:
+    """Values as a dataset of this type holds them; text cut to its room without splitting a character."""
+    if dtype.kind != "S":
+        return np.asarray(values, dtype)
+    room = dtype.itemsize
+    return np.array([str(text).encode()[:room].decode(errors="ignore").encode() for text in values], dtype)

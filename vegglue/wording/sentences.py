@@ -1,0 +1,92 @@
+"""Values as sentences: each class of findings has one macro of its own name in `templates/`."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Any
+
+from vegglue.wording.numbers import duration_in_short, in_digits, listed, so_many, telling_digits
+
+
+def sentence(value: Any) -> str:
+    """Render a value by the macro that bears the name of its class.
+
+    Parameters
+    ----------
+    value : dataclass instance or str
+        A finding. A text is returned as it is.
+
+    Returns
+    -------
+    str
+        Plain text on one line; an empty text if the template prints nothing.
+
+    Raises
+    ------
+    KeyError
+        If no template defines a macro for the class.
+    """
+    if isinstance(value, str):
+        return value
+    return " ".join(str(macros()[tag_of(value)](value)).split())
+
+
+def sentences(values: Any) -> tuple[str, ...]:
+    """Render several values, without those that render to nothing."""
+    return tuple(text for text in map(sentence, values) if text)
+
+
+def tag_of(value: Any) -> str:
+    """`parameter_far_from_prior` of an instance of the class ParameterFarFromPrior."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(value).__name__).lower()
+
+
+def tagged(value: Any) -> Any:
+    """A value as plain JSON objects: a dataclass becomes its fields and its tag under `kind`."""
+    if is_dataclass(value) and not isinstance(value, type):
+        own = {one.name: tagged(getattr(value, one.name)) for one in fields(value)}
+        return {"kind": tag_of(value), **own} if "kind" not in own else {"tag": tag_of(value), **own}
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): tagged(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [tagged(one) for one in value]
+    return value
+
+
+@cache
+def macros() -> dict[str, Callable[..., str]]:
+    """All macros of all templates by name.
+
+    Raises
+    ------
+    ValueError
+        If two templates define the same macro.
+    """
+    # Jinja takes 50 ms to import, which a refused config need not wait for.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("vegglue", "wording/templates"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, autoescape=False,
+    )  # fmt: skip
+    environment.filters |= {
+        "digits": in_digits,
+        "listed": listed,
+        "many": so_many,
+        "duration": duration_in_short,
+        "percent": lambda share: f"{share:.0%}",
+    }
+    environment.globals |= {"sentence": sentence, "digits_of_range": telling_digits}
+    found: dict[str, Callable[..., str]] = {}
+    for name in environment.list_templates():
+        for macro, render in vars(environment.get_template(name).module).items():
+            if macro.startswith("_"):
+                continue
+            if macro in found:
+                raise ValueError(f"{name}: expected each macro once, got {macro} again; rename one of the two.")
+            found[macro] = render
+    return found
