@@ -82,7 +82,7 @@ bench: $(TESTABLE)  # measured speed: members/s, cell-steps/s, share of the kern
 blind: $(TESTABLE)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)
 
-laws: $(TESTABLE)  # the study of docs/discover_study.md: hours; goes on where it was stopped
+laws: $(TESTABLE)  # the study of docs/discover.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/laws.py
 
 faults: $(TESTABLE)  # every command killed at random moments, counted in docs/faults.md: half an hour

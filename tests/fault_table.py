@@ -1,4 +1,4 @@
-"""What can go wrong around a command, what the user then sees and what is kept: made to happen by the tests.
+"""What can go wrong around a command, its exit code, and what is kept: made to happen by the tests.
 
 `python tests/fault_table.py` writes docs/faults.md from this table and from the kills that tests/kills.py has counted.
 """
@@ -12,6 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 from unittest.mock import patch
 
@@ -34,7 +35,7 @@ Trouble = Callable[[Path], AbstractContextManager[Any]]
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault, and the command it meets, in words; the exit code and the sentence (... for what differs each time).
+    """A fault, and the command it meets, in words; the exit code, and what the message names (nothing: no message).
 
     kept: what is kept, in words. trouble: makes it happen in the folder of a user for as long as it is entered. ready:
     whether an ensemble and a posterior are there already. solves: chunks of members, of four, that the command and the
@@ -44,7 +45,7 @@ class Fault:
     what: str
     command: str
     code: int
-    sees: str
+    names: str
     kept: str
     trouble: Trouble
     solves: int
@@ -149,78 +150,49 @@ def replaced(old: str, new: str) -> Callable[[Path], Any]:
 
 
 FULL, READ_ONLY = OSError(errno.ENOSPC, "No space left on device"), OSError(errno.EROFS, "Read-only file system")
-MAKE_ROOM = "make room and run it again."
-GO_ON = "what was written before is whole: make room, then run the same command again."
-AGAIN = "remove it and run the step that makes it again."
-BEFORE, OLD, CHUNKS = "what was there before", "the older result", "every finished chunk; the rest is solved next time"
-HEADING = "| what happens | command | code | what the user sees | what is kept | chunks solved |"
+SIMULATE = "vegglue simulate brook.yaml"
+BEFORE, OLD, CHUNKS = "what was there before", "the older result", "every finished chunk"
+HEADING = "| what happens | command | code | message names | what is kept | chunks solved |"
 FAULTS = (
-    Fault("full disk, from the start", "simulate", 3, f"{PART}: the disk is full; {GO_ON}", BEFORE,
-          failing(os, "fsync", FULL), 4, ready=False),
-    Fault("full disk, half-way", "simulate", 3, f"{PART}: the disk is full; {GO_ON}", CHUNKS,
-          failing(os, "fsync", FULL, after=6), 5, ready=False),
-    Fault("full disk", "infer", 3, f"{RUN}/posterior.h5: the disk is full; {GO_ON}", OLD,
-          failing(os, "fsync", FULL), 0),
-    Fault("full disk", "report", 3, f"{RUN}/figures/...: the disk is full; {MAKE_ROOM}", OLD,
-          failing(os, "fsync", FULL), 0),
-    Fault("full disk", "check", 3, f"{RUN}/channel.png: the disk is full; {MAKE_ROOM}", OLD,
-          failing(os, "fsync", FULL), 0),
-    Fault("read-only folder", "simulate", 3,
-          f"{RUN}: cannot be written (Read-only file system); make the folder runs writable, then run it again.",
-          BEFORE, failing(Path, "mkdir", READ_ONLY), 4, ready=False),
-    Fault("a file where the run's folder would be", "check", 3,
-          f"{RUN}: cannot be written (File exists); expected a folder that can be made there; give another one by "
-          "--runs.", BEFORE, done_to(RUN, without_solved), 4, ready=False),
-    Fault("a folder where the ensemble would be", "simulate", 3,
-          f"{ENSEMBLE}: expected a file or nothing, found a folder; move it away.", BEFORE,
-          done_to(ENSEMBLE, as_folder), 4),
-    Fault("a worker is killed, or runs out of memory", "simulate", 3,
-          "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
-          "the same command again, with fewer --jobs if this repeats.", CHUNKS,
+    Fault("full disk, from the start", "simulate", 3, f"{PART}", BEFORE, failing(os, "fsync", FULL), 4, ready=False),
+    Fault("full disk, half-way", "simulate", 3, f"{PART}", CHUNKS, failing(os, "fsync", FULL, after=6), 5, ready=False),
+    Fault("full disk", "infer", 3, f"{RUN}/posterior.h5", OLD, failing(os, "fsync", FULL), 0),
+    Fault("full disk", "report", 3, f"{RUN}/figures/", OLD, failing(os, "fsync", FULL), 0),
+    Fault("full disk", "check", 3, f"{RUN}/channel.png", OLD, failing(os, "fsync", FULL), 0),
+    Fault("read-only folder", "simulate", 3, f"{RUN}", BEFORE, failing(Path, "mkdir", READ_ONLY), 4, ready=False),
+    Fault("a file in place of the run's folder", "check", 3, f"{RUN}", BEFORE, done_to(RUN, without_solved), 4,
+          ready=False),
+    Fault("a folder in place of the ensemble", "simulate", 3, f"{ENSEMBLE}", BEFORE, done_to(ENSEMBLE, as_folder), 4),
+    Fault("a worker is killed, or out of memory", "simulate", 3, "--jobs", CHUNKS,
           failing(solve_ensemble, "solve_in_experiment", BrokenProcessPool(), after=2), 4, ready=False),
-    Fault("no memory left", "simulate", 3,
-          "The memory is full; what was finished is kept: run it again with fewer --jobs, or a coarser grid.", CHUNKS,
+    Fault("no memory left", "simulate", 3, "--jobs", CHUNKS,
           failing(solve_ensemble, "solve_in_experiment", MemoryError(), after=2), 4, ready=False),
-    Fault("two runs of one name", "simulate", 3, f"{RUN} is in use by ...; wait for it to end, or stop it.",
-          "what the first one does", lambda folder: locked(folder / RUN / ".lock"), 4, ready=False),
-    Fault("the ensemble is cut short", "infer", 3, f"{ENSEMBLE}: cannot be opened (...); {AGAIN}", OLD,
-          done_to(ENSEMBLE, cut_short), 4),
-    Fault("one bit of the ensemble flipped", "infer", 3,
-          f"{ENSEMBLE}: is broken, it has changed since it was written; {AGAIN}", OLD, done_to(ENSEMBLE, flipped), 4),
+    Fault("two runs of one name", "simulate", 3, f"{RUN}", "what the first one does",
+          lambda folder: locked(folder / RUN / ".lock"), 4, ready=False),
+    Fault("the ensemble is cut short", "infer", 3, f"{ENSEMBLE}", OLD, done_to(ENSEMBLE, cut_short), 4),
+    Fault("one bit of the ensemble flipped", "infer", 3, f"{ENSEMBLE}", OLD, done_to(ENSEMBLE, flipped), 4),
     Fault("one bit of the ensemble flipped", "simulate", 0, NOTHING, "nothing of it: all members are solved again",
           done_to(ENSEMBLE, flipped), 4),
-    Fault("one bit of the posterior flipped", "report", 3,
-          f"{RUN}/posterior.h5: is broken, it has changed since it was written; {AGAIN}", OLD,
+    Fault("one bit of the posterior flipped", "report", 3, f"{RUN}/posterior.h5", OLD,
           done_to(RUN / "posterior.h5", flipped), 0),
-    Fault("a foreign file that leads to another one", "infer", 3,
-          f"{ENSEMBLE}: members/prediction is a link, which vegglue never writes, and is not read; {AGAIN}",
-          "every other file: no link is followed", done_to(ENSEMBLE, leading_out), 4),
+    Fault("a foreign file that links to another", "infer", 3, f"{ENSEMBLE}", "every other file: no link is followed",
+          done_to(ENSEMBLE, leading_out), 4),
     Fault("a stopped run", "simulate", 0, NOTHING, CHUNKS, half_solved, 2, ready=False),
-    Fault("a stopped run, one bit of a member flipped", "simulate", 0, NOTHING,
-          "every other chunk; that one is solved again", lambda folder: half_solved(folder, damaged_member),
-          3, ready=False),
-    Fault("a stopped run whose file is cut short", "simulate", 0, NOTHING,
-          "the broken file, as ensemble.h5.part.old; all members are solved again",
+    Fault("the same, one bit of a member flipped", "simulate", 0, NOTHING, "every other chunk",
+          lambda folder: half_solved(folder, damaged_member), 3, ready=False),
+    Fault("the same, the file cut short", "simulate", 0, NOTHING, "the broken file, as ensemble.h5.part.old",
           lambda folder: half_solved(folder, cut_short), 4, ready=False),
-    Fault("a stopped run whose file leads to another one", "simulate", 0, NOTHING,
-          "every other file; the foreign one as ensemble.h5.part.old", lambda folder: half_solved(folder, leading_out),
-          4, ready=False),
-    Fault("a stopped run", "infer", 2,
-          f"{ENSEMBLE}: found only a part of the members; run `vegglue simulate brook.yaml` to solve the rest.",
-          CHUNKS, half_solved, 2, ready=False),
-    Fault("the clock jumps by twenty years", "simulate", 0, NOTHING, "everything: no time of a file is looked at",
+    Fault("the same, the file links to another", "simulate", 0, NOTHING, "the foreign file, as ensemble.h5.part.old",
+          lambda folder: half_solved(folder, leading_out), 4, ready=False),
+    Fault("a stopped run", "infer", 2, SIMULATE, CHUNKS, half_solved, 2, ready=False),
+    Fault("the clock jumps by twenty years", "simulate", 0, NOTHING, "everything: times of files do not count",
           done_to(ENSEMBLE, lambda path: os.utime(path, (2.5e9, 2.5e9))), 0),
-    Fault("the config was changed", "infer", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, "
-          "--members, a file it names or vegglue changed since this was made; run `vegglue simulate brook.yaml` again.",
-          OLD,
+    Fault("the config was changed", "infer", 2, SIMULATE, OLD,
           done_to("brook.yaml", replaced("high: 0.10", "high: 0.12")), 0),
-    Fault("a data file was changed", "report", 2, f"{ENSEMBLE}: expected config hash ..., found ...: the config, "
-          "--members, a file it names or vegglue changed since this was made; run `vegglue simulate brook.yaml` again.",
-          OLD,
-          done_to("velocities.csv", replaced("0.436", "0.437")), 0),
-    Fault("fewer members than are there", "simulate --members 8", 2,
-          f"{ENSEMBLE}: holds 256 members of this case, which 8 would replace; ask for --members 256, give another "
-          "folder by --runs, or add --force.", OLD, lambda folder: nullcontext(), 0),
+    Fault("a data file was changed", "report", 2, SIMULATE, OLD, done_to("velocities.csv", replaced("0.436", "0.437")),
+          0),
+    Fault("fewer members than are there", "simulate --members 8", 2, "--members 256", OLD,
+          lambda folder: nullcontext(), 0),
 )  # fmt: skip
 
 
@@ -228,22 +200,21 @@ def rows() -> str:
     """The table of the page."""
     lines = [HEADING, "|---|---|---:|---|---|---:|"]
     for one in FAULTS:
-        lines.append(
-            f"| {one.what} | `{one.command}` | {one.code} | {one.sees or 'nothing of it'} | {one.kept} | {one.solves} |"
-        )
+        names = f"`{one.names}`" if one.names else "-"
+        lines.append(f"| {one.what} | `{one.command}` | {one.code} | {names} | {one.kept} | {one.solves} |")
     return "\n".join(lines)
 
 
 def kills() -> str:
-    """What came of the kills, by command."""
+    """The outcome of the kills: total, and by command."""
     table = json.loads(KILLS.read_text(encoding="utf-8"))
     total, in_time = (sum(one[key] for one in table.values()) for key in ("kills", "in_time"))
-    lines = [
-        f"{total} kills, {in_time} of them before the command had ended. Every time the same command then finished,",
-        "and every file of the user's folder had the bits of an undisturbed run, but for the seconds members took.",
-        "", "| command | kills | before its end |", "|---|---:|---:|",
-    ]  # fmt: skip
-    return "\n".join([*lines, *(f"| `{name}` | {one['kills']} | {one['in_time']} |" for name, one in table.items())])
+    by_command = ", ".join(f"`{name}` {one['kills']}" for name, one in table.items())
+    text = (
+        f"{total} kills, {in_time} of them before the command had ended ({by_command}). Every time the same command "
+        "then finished, and every file had the bits of an undisturbed run, but for the seconds that members took."
+    )
+    return fill(text, 120, break_on_hyphens=False)
 
 
 def page() -> str:
@@ -253,50 +224,48 @@ def page() -> str:
 
 TEXT = """# When something goes wrong
 
-This page is made by the tests: `tests/end_to_end/test_fault_table.py` makes each of these faults happen, reads what is
-said, and then gives the same command once more, undisturbed. `python tests/fault_table.py` writes the page.
+The tests make each of these faults happen, and then give the same command once more, undisturbed
+(`tests/end_to_end/test_fault_table.py`; `python tests/fault_table.py` writes this page).
 
-## Faults and what comes of them
+## Faults and their outcome
 
-Codes are those of [the commands](commands.md#what-is-kept-and-how-a-command-ends). Wherever a command can go on
-afterwards, its numbers have the bits of a run that nothing disturbed. The ensemble has four chunks of members: the last
-column counts those that the command and the next `simulate` solve together.
+[Exit codes](commands.md#what-is-kept-and-how-a-command-ends) other than 0 come with one sentence on standard error: the
+file, what is wrong, and the command that mends it. Wherever a command can go on, its numbers have the bits of a run
+that nothing disturbed. The ensemble here has four chunks of members; the last column counts those that the command and
+the next `simulate` solve together.
 
 {rows}
 
-A worker that hangs cannot be told from one that is slow: the command waits. Stop it by Ctrl-C: nothing
-finished is lost.
+A worker that hangs cannot be distinguished from a slow one: the command waits. Stop it with Ctrl-C; finished work is
+kept.
 
 ## Kills
 
-`make faults` kills every command with signal 9 at random moments of its time; `make test` has a share of it.
+`make faults` kills every command with signal 9 at random moments; `make test` has a share of it.
 
 {kills}
 
 ## How it is done
 
-- A file appears under its name only when it is whole and on the disk. It grows beside that place with `.new` at its
+- A file appears under its name only when it is whole and on the disk. It grows beside that place, with `.new` at its
   end.
-- Whole results end with a line that holds the SHA-256 of all bytes before it. Other readers of HDF5 do not see it. A
-  result of an older version, or that another program opened to write, has none.
-- Every result, and every part file of a stopped run, is read by a process of its own first: the HDF5 library reads some
-  damaged files in circles, and anyone can put the right digest behind one.
-- What is read is held against the shapes and types it was stored with, before anyone computes with it.
-- One ensemble at a time is written in a folder: a lock of the operating system says who, and a second `simulate` or
-  `run` that needs it is refused. A diagnosis, a posterior or a page is put in place whole when it is done: of two at
-  once both end well, and the later one stays. Some network disks are mounted with locks that do not reach other
-  machines; of two runs the first then stops with a sentence, and the second is whole.
-- Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum. The next run lays the file out
-  anew, and takes over the chunks whose checksum is right.
-- Results hold no links and no data in other files. A file that has any is refused, and a soft or hard link in the
-  folder of a run is replaced, not followed. So a run folder may be taken from others.
-- `import`, `extend` and `twin` write among your files. Their configs end with checksums of what was written: what you
-  edited or made yourself is replaced with `--force` only.
+- Whole results end with a line with the SHA-256 of all bytes before it, which other readers of HDF5 ignore.
+- Every result is read by a separate process first, and compared with the shapes and types that it must have: the HDF5
+  library reads some damaged files without end.
+- An ensemble is written by one process at a time, by a lock of the operating system. Diagnosis, posterior and page are
+  put in place whole: of two writers the later one stays. Locks of some network disks reach one machine only; the first
+  of two runs then stops with a message, and the second is whole.
+- Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum. The next run takes over the chunks
+  whose checksum is right.
+- Results hold no links and no data in other files; a file with any is refused, and a link in the folder of a run is
+  replaced, not followed.
+- Configs that `import`, `extend` and `twin` write end with checksums of what was written: files that you edited are
+  replaced with `--force` only.
 
 ## Following a run
 
-The growing file may be read at any time, also by other programs and with HDF5's locks on. `progress/finished` says
-which chunks are there; the rows of the others are NaN. Open it, read, and close it again:
+The growing file may be read at any time, also with HDF5's locks on. `progress/finished` lists the finished chunks;
+other rows are NaN. Open it, read, and close it again:
 
 ```python
 import h5py

@@ -1,4 +1,4 @@
-"""Every fault of docs/faults.md happens here: what is said, what is kept, and that the next try has the same bits."""
+"""Every fault of docs/faults.md happens here: exit code, what is kept, and that the next try has the same bits."""
 
 import re
 import shutil
@@ -47,13 +47,9 @@ def words(command: str) -> list[str]:
     return [name, "brook.yaml", *options, *(["--jobs", "1"] if name in STEPS else [])]
 
 
-def pattern(sentence: str) -> str:
-    return re.escape(sentence).replace(re.escape("..."), ".+")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[f"{one.command}: {one.what}" for one in FAULTS])
-def test_a_fault_is_told_and_loses_nothing(
+def test_a_fault_has_its_code_and_loses_nothing(
     fault: Fault,
     undisturbed: Path,
     tmp_path: Path,
@@ -70,7 +66,8 @@ def test_a_fault_is_told_and_loses_nothing(
         there = contents(tmp_path)
         code, error = said_to(monkeypatch, capsys, *words(fault.command))
     assert code == fault.code, error
-    assert re.fullmatch(pattern(fault.sees), error.removesuffix("\n")), error
+    assert fault.names in error
+    assert error.count("\n") == (1 if fault.code else 0), error
     if code:
         now = contents(tmp_path)
         changed = [name for name, content in there.items() if now.get(name) != content]

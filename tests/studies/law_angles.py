@@ -5,7 +5,7 @@
 Everything is to first order: the residual is the trace of a hidden law, as long as in the study of laws, and errors as
 the noise allows. So what is lost here is lost by alike traces and by the width of the set, and not by a flow or a site
 that differ from the model's. One line of JSON for each hidden law at each true place of the prior, in
-data/blind/law_angles.jsonl: `laws.py --page` puts them into docs/discover_study.md.
+data/blind/law_angles.jsonl: `laws.py --page` puts their shares into docs/discover.md.
 """
 
 import argparse

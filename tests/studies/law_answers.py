@@ -77,11 +77,6 @@ def told_near_truth(record: Record) -> bool | None:
     return None if told is None or truth is None else bool(told <= NEAR * truth)
 
 
-def wrote_a_law(record: Record) -> bool:
-    """A law was the likeliest cause, and was written."""
-    return bool(record["best"])
-
-
 def is_silent(record: Record) -> bool:
     """No law was written."""
     return not record["best"]

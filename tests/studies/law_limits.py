@@ -1,6 +1,5 @@
-"""What the page of the study of laws says of its own limits: how alike traces are, and how good chances are."""
+"""Limits of the study of laws: what the data allow at most, and how good stated probabilities are."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -11,27 +10,12 @@ from law_answers import Record, Said, causes, is_true
 
 # Ways to weigh in records of `law_angles`, and in words.
 WAYS = {
-    "as it is": "to first order, in a model that is right but for the law: as `discover` weighs",
-    "whole evidence": "the same, fingerprints taken for nature's: no evidence taken back",
+    "as it is": "a model that is right but for the law, weighed as `discover` does",
+    "whole evidence": "the same, without an error of the traces",
     "true law tried": "the same, and the hidden law itself among those that are tried",
 }
 # Ends of the bins of the chance of the likeliest quantity [-].
 BINS = (0.0, 0.6, 0.8, 0.95, 1.0)
-
-
-def angle_lines(angles: Sequence[Mapping[str, Any]]) -> str:
-    """Law by law: the cosine of its trace with the nearest that says anything else, and shares alone, all places."""
-    rows = []
-    for law in BY_NAME.values():
-        of_law = [one for one in angles if one["hide"] == law.name]
-        if not of_law:
-            continue
-        cosine = float(np.median([one["nearest"] for one in of_law]))
-        (term, quantity), _ = Counter(tuple(one["says"]) for one in of_law).most_common(1)[0]
-        nearest = f"{term}: {quantity}" if quantity else term or "a place, an instrument, or another effect"
-        shares = " | ".join(f"{100 * _mean(of_law, way, 'alone'):.0f} %" for way in WAYS)
-        rows.append(f"| {law.term} | {law.quantity} | {law.form} | {nearest} | {cosine:.2f} | {shares} |")
-    return "\n".join(rows)
 
 
 def told_at_most(made: Sequence[Record], angles: Sequence[Mapping[str, Any]]) -> str:

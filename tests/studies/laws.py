@@ -1,4 +1,4 @@
-"""The study behind docs/discover_study.md: laws that stand in no list and not in the grammar, hidden and searched.
+"""The study of docs/discover.md: laws that stand in no list and not in the grammar, hidden and searched.
 
     python tests/studies/laws.py [--most N] [--page] [--runs FOLDER] [--anew]
 
@@ -148,7 +148,7 @@ def main() -> None:
     if not given.page:
         _make(path, {record["key"] for record in kept}, given.most)
     found = {record["key"]: record for record in (*kept, *records_in(path, LAW_EDITION))}
-    write_law_page(list(found.values()), list(records_in(ANGLES, LAW_EDITION)), ROOT / "docs")
+    write_law_page(list(found.values()), list(records_in(ANGLES, LAW_EDITION)), ROOT / "docs" / "discover.md")
 
 
 def _make(path: Path, kept: set[str], most: int | None) -> None:
